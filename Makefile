@@ -1,0 +1,41 @@
+.DEFAULT_GOAL := help
+.PHONY: help setup jump test check bench models clean
+
+PYTHON ?= python3.11
+BIN := .venv/bin
+STAMP := .venv/.installed
+
+help: ## show this list
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
+
+$(STAMP): pyproject.toml constraints.txt
+	@command -v $(PYTHON) >/dev/null || { echo "needs $(PYTHON); or say make PYTHON=python3.12" >&2; exit 1; }
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[viz,render,dev]'
+	@touch $@
+
+setup: $(STAMP) ## make .venv with everything, pinned
+
+jump: $(STAMP) ## the prototype jumps: table, recording, .rrd and phase plots in runs/
+	@$(BIN)/python scripts/jump.py
+
+typings/mujoco/__init__.pyi: $(STAMP)
+	@$(BIN)/python scripts/stubs.py typings
+
+check: $(STAMP) typings/mujoco/__init__.pyi ## lint, format, types, layers
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/pyright
+	$(BIN)/lint-imports
+
+test: check ## check, then the tests
+	$(BIN)/pytest
+
+bench: $(STAMP) ## performance targets as ratios against a baseline in the same run
+	$(BIN)/python scripts/bench.py
+
+models: $(STAMP) ## rewrite the golden MJCF files of models/
+	$(BIN)/python scripts/golden.py
+
+clean: ## remove .venv and generated stubs, keep runs/
+	rm -rf .venv typings

@@ -1,0 +1,19 @@
+"""Controllers: one a file, for one leg or a batch with the same code."""
+
+from legbench.control.abstract import AbstractController
+from legbench.control.bang_bang import BangBang, BangBangConfig
+from legbench.control.jump import Jump, JumpConfig
+from legbench.control.position_jump import PositionJump, PositionJumpConfig
+from legbench.control.setpoint import LegTargets, SetpointMeaning
+
+__all__ = [
+    "AbstractController",
+    "BangBang",
+    "BangBangConfig",
+    "Jump",
+    "JumpConfig",
+    "LegTargets",
+    "PositionJump",
+    "PositionJumpConfig",
+    "SetpointMeaning",
+]

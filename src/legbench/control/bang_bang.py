@@ -1,0 +1,96 @@
+"""Bang-bang on a torque threshold (section IV-B): feeds the mode what damping takes."""
+
+from dataclasses import dataclass
+from typing import ClassVar, final
+
+import numpy as np
+
+from legbench.control.abstract import AbstractController
+from legbench.control.setpoint import LegTargets
+from legbench.errors import ConfigError
+from legbench.signals import Command, Floats, Observation, Phase
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BangBangConfig:
+    """The equilibrium switches between z2 + dz2 and z2 - dz2 as the spring torque tells."""
+
+    kind: ClassVar[str] = "bang-bang"
+    z2: float = 1.0
+    """Set point in the middle, where the leg rests at first [rad]."""
+    dz2: float = 0.08
+    """Amplitude of the switching [rad]."""
+    threshold: float = 0.05
+    """Modal spring torque, zero at rest, that switches; the paper's epsilon [N m]."""
+    three_levels: bool = False
+    """Return to z2 while the torque is below the threshold, instead of holding."""
+    delay: float = 0.1
+    """Time at rest, to read the rest torque, before the first switch [s]."""
+    sign: int = 1
+    """-1 inverts the law: it then brakes the mode. For demonstrations."""
+
+
+@final
+class BangBang(AbstractController):
+    """`tau_z > eps` moves the equilibrium to z2 + dz2, `tau_z < -eps` to z2 - dz2.
+
+    `tau_z` is the spring torque along z2 less its value at rest, so that gravity does not hold
+    the switch. The first switch, to the longer leg, starts the motion.
+
+    Raises:
+        ConfigError: a set point that the leg cannot reach, or a threshold that its own
+            deflection cannot pass.
+    """
+
+    def __init__(self, config: BangBangConfig, targets: LegTargets) -> None:
+        if config.sign not in (-1, 1):
+            raise ConfigError(f"sign is {config.sign}; it must be 1 or -1")
+        if not config.dz2 > 0.0:
+            raise ConfigError(f"dz2 is {config.dz2:g} rad; bang-bang needs a positive amplitude")
+        limit = float(np.min(targets.modal_stiffness())) * config.dz2
+        if not 0.0 < config.threshold < limit:
+            raise ConfigError(
+                f"threshold is {config.threshold:g} N m; it must be positive and stay below "
+                f"k dz2 = {limit:.3g} N m, or the oscillation dies: lower it or raise dz2"
+            )
+        self._config, self._targets = config, targets
+        self._middle = targets.motor_at(config.z2, "z2")
+        self._folded = targets.motor_at(config.z2 + config.dz2, "z2 + dz2")
+        self._stretched = targets.motor_at(config.z2 - config.dz2, "z2 - dz2")
+        self._rest_torque = np.zeros(self._middle.shape[:-1])
+        self._level = np.full(self._middle.shape[:-1], Phase.STRETCHED, dtype=np.int64)
+
+    @property
+    def start_motor_pos(self) -> Floats:
+        """At z2."""
+        return self._middle
+
+    def reset(self, observation: Observation) -> None:
+        """Take the spring torque of the leg at rest as zero."""
+        self._rest_torque = self._targets.radial(observation.spring_torque)
+        self._level = np.full(self._rest_torque.shape, Phase.STRETCHED, dtype=np.int64)
+
+    def step(self, observation: Observation) -> Command:
+        """Switch on the zero-based modal torque."""
+        if observation.time < self._config.delay:
+            return Command.holding(self._middle)
+        torque = self._targets.radial(observation.spring_torque) - self._rest_torque
+        torque = self._config.sign * torque
+        between = Phase.MIDDLE if self._config.three_levels else self._level
+        level = np.where(
+            torque > self._config.threshold,
+            Phase.FOLDED,
+            np.where(torque < -self._config.threshold, Phase.STRETCHED, between),
+        )
+        if observation.time < self._config.delay + 0.5 * 0.001:
+            level = np.full(level.shape, Phase.STRETCHED)
+        self._level = level.astype(np.int64)
+        return Command(motor_pos=self._motor(self._level), phase=self._level)
+
+    def _motor(self, level: Floats) -> Floats:
+        chosen = level[..., np.newaxis]
+        return np.where(
+            chosen == Phase.FOLDED,
+            self._folded,
+            np.where(chosen == Phase.STRETCHED, self._stretched, self._middle),
+        )

@@ -1,0 +1,96 @@
+"""From a radial set point z2 to motor positions, within what the leg can do."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import final
+
+import numpy as np
+
+from legbench.design import LegDesign
+from legbench.design.statics import Support, equilibrium, gravity_load, motor_holding
+from legbench.errors import ConfigError, DesignError
+from legbench.kinematics import ModalConvention, joint_to_modal, modal_to_joint
+from legbench.signals import Floats
+
+
+class SetpointMeaning(StrEnum):
+    """What z2 is a position of."""
+
+    LINK = "link"
+    """The link's equilibrium: the motor is placed so that the leg rests there under gravity."""
+    MOTOR = "motor"
+    """The motor: the leg sags from it."""
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LegTargets:
+    """Motor positions for radial set points of one leg, or of one leg a row.
+
+    All postures lie on the radial mode, z1 = 0, at the link or at the motor.
+    """
+
+    designs: LegDesign | Sequence[LegDesign]
+    support: Support
+    meaning: SetpointMeaning = SetpointMeaning.LINK
+    convention: ModalConvention = ModalConvention.ORTHONORMAL
+
+    def motor_at(self, z2: float, name: str) -> Floats:
+        """Motor positions (..., 2) [rad] for the set point `z2` [rad], called `name` in errors.
+
+        Raises:
+            ConfigError: the leg has no equilibrium there, or it lies outside the joint limits.
+        """
+        if isinstance(self.designs, LegDesign):
+            return self._motor_of(self.designs, z2, name)
+        return np.array([self._motor_of(design, z2, name) for design in self.designs])
+
+    def link_at_rest(self, motor_pos: Floats) -> Floats:
+        """Link angles (..., 2) [rad] at which the supported leg rests for motor positions."""
+        if isinstance(self.designs, LegDesign):
+            return equilibrium(self.designs, motor_pos, self.support)
+        rows = zip(self.designs, motor_pos, strict=True)
+        return np.array([equilibrium(design, row, self.support) for design, row in rows])
+
+    def modal_stiffness(self) -> Floats:
+        """Stiffness of the springs along z2, smallest over the joints (...) [N m/rad]."""
+        if isinstance(self.designs, LegDesign):
+            return np.asarray(min(self.designs.stiffness))
+        return np.array([min(design.stiffness) for design in self.designs])
+
+    def radial(self, joint: Floats) -> Floats:
+        """The z2 component (...) of joint angles, rates or torques (..., 2)."""
+        return joint_to_modal(joint, self.convention)[..., 1]
+
+    def _motor_of(self, design: LegDesign, z2: float, name: str) -> Floats:
+        target = modal_to_joint(np.array([0.0, z2]), self.convention)
+        try:
+            if self.meaning is SetpointMeaning.LINK:
+                link, motor = target, motor_holding(design, target, self.support)
+                self._check_stable(design, link)
+            else:
+                link, motor = equilibrium(design, target, self.support), target
+        except DesignError as error:
+            raise ConfigError(f"set point {name} = {z2:g} rad ({self.meaning}): {error}") from None
+        self._check_limits(design, link, z2, name)
+        return motor
+
+    def _check_stable(self, design: LegDesign, link: Floats) -> None:
+        moment = np.asarray(gravity_load(design, self.support).moment)
+        if not np.all(np.asarray(design.stiffness) + moment * np.cos(link) > 0.0):
+            raise DesignError(
+                f"stiffness {design.stiffness} N m/rad does not hold the leg up there"
+            )
+
+    def _check_limits(self, design: LegDesign, link: Floats, z2: float, name: str) -> None:
+        knee, hip = float(link[1] - link[0]), float(link[0])
+        for joint, angle, (low, high) in (
+            ("knee", knee, design.limits.knee),
+            ("hip", hip, design.limits.hip),
+        ):
+            if not low <= angle <= high:
+                raise ConfigError(
+                    f"set point {name} = {z2:g} rad ({self.meaning}) puts the {joint} at "
+                    f"{angle:.3f} rad; design '{design.name}' allows {low:g} to {high:g} rad"
+                )

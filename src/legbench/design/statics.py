@@ -1,0 +1,90 @@
+"""What gravity makes of a leg at rest: torques, and which motor position holds which posture."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from legbench.design.leg import LegDesign
+from legbench.errors import DesignError
+from legbench.signals import Floats
+
+GRAVITY = 9.81
+"""[m/s^2]"""
+
+
+class Support(StrEnum):
+    """What carries the leg's weight."""
+
+    FOOT = "foot"
+    """The foot is pinned, the trunk rests on the leg (FFS, stance)."""
+    TRUNK = "trunk"
+    """The trunk is fixed, the leg hangs (vFTS)."""
+    NONE = "none"
+    """Nothing to carry: motion plane horizontal (hFTS), or free fall (flight)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GravityLoad:
+    """Gravity torque of a supported leg: `g_i(q) = moment_i sin(q_i)`.
+
+    Source: Appendix I for the pinned foot; the same potential with the hip fixed for the trunk.
+    """
+
+    moment: tuple[float, float]
+    """[N m]; negative where gravity drives the segment away from straight down."""
+
+    def torque(self, joint_pos: Floats) -> Floats:
+        """g(q) = dV/dq (..., 2) [N m]."""
+        return np.asarray(self.moment) * np.sin(joint_pos)
+
+
+def gravity_load(design: LegDesign, support: Support) -> GravityLoad:
+    """Gravity's moments on q1 and q2 for a way of carrying the leg."""
+    thigh, shank, foot = design.segments
+    if support is Support.NONE:
+        return GravityLoad(moment=(0.0, 0.0))
+    if support is Support.TRUNK:
+        first = thigh.mass * thigh.com + shank.mass * thigh.length
+        first += foot.mass * (thigh.length + foot.com)
+        second = shank.mass * shank.com + foot.mass * shank.length
+        return GravityLoad(moment=(GRAVITY * first, GRAVITY * second))
+    above_knee = design.trunk_mass + thigh.mass
+    above_ankle = above_knee + shank.mass
+    t1 = above_knee * thigh.length - thigh.com * thigh.mass
+    t2 = above_ankle * shank.length - shank.com * shank.mass
+    t3 = (above_ankle + foot.mass) * foot.length - foot.com * foot.mass
+    return GravityLoad(moment=(-GRAVITY * (t1 + t3), -GRAVITY * t2))
+
+
+def motor_holding(design: LegDesign, joint_pos: Floats, support: Support) -> Floats:
+    """Motor positions whose springs balance gravity at `joint_pos`: `q_d = q + g(q)/k`."""
+    load = gravity_load(design, support).torque(joint_pos)
+    return joint_pos + load / np.asarray(design.stiffness)
+
+
+def equilibrium(design: LegDesign, motor_pos: Floats, support: Support) -> Floats:
+    """Link posture at which gravity balances the springs for `motor_pos` (..., 2) [rad].
+
+    The joints decouple in statics, so Newton's method runs on each alone. It starts at the motor
+    position and follows the branch that continues into it when gravity is turned up from zero.
+
+    Raises:
+        DesignError: the springs are too soft to hold the leg at that motor position.
+    """
+    stiffness = np.asarray(design.stiffness)
+    moment = np.asarray(gravity_load(design, support).moment)
+    joint_pos = np.array(motor_pos, dtype=np.float64)
+    for share in np.linspace(0.1, 1.0, 10):
+        for _ in range(20):
+            residual = stiffness * (motor_pos - joint_pos) - share * moment * np.sin(joint_pos)
+            slope = stiffness + share * moment * np.cos(joint_pos)
+            joint_pos = joint_pos + residual / np.where(np.abs(slope) < 1e-9, 1e-9, slope)
+    residual = stiffness * (motor_pos - joint_pos) - moment * np.sin(joint_pos)
+    slope = stiffness + moment * np.cos(joint_pos)
+    if not (np.all(np.abs(residual) < 1e-9) and np.all(slope > 0.0)):
+        raise DesignError(
+            f"no stable equilibrium for motor positions {np.round(motor_pos, 3)} rad: stiffness "
+            f"{design.stiffness} N m/rad does not carry the leg on its {support.value}"
+        )
+    return joint_pos

@@ -1,0 +1,172 @@
+"""Design files: TOML in the units that its `[units]` table declares, SI when written."""
+
+import math
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from legbench.design.leg import LegDesign, Limits, Segment
+from legbench.errors import DesignError
+
+UNITS: dict[str, dict[str, float]] = {
+    "mass": {"kg": 1.0, "g": 1e3},
+    "length": {"m": 1.0, "mm": 1e3},
+    "inertia": {"kg m^2": 1.0, "kg mm^2": 1e6, "g mm^2": 1e9},
+    "stiffness": {"N m/rad": 1.0, "N mm/rad": 1e3},
+    "damping": {"N m s/rad": 1.0, "N mm s/rad": 1e3},
+    "angle": {"rad": 1.0, "deg": math.degrees(1.0)},
+}
+"""Quantity -> unit -> how many of it make one SI unit; the first unit of each is the default.
+
+Values are divided, not multiplied, so that 207 g is 0.207 kg to the last bit."""
+
+SEGMENT_KEYS = {"mass": "mass", "length": "length", "com": "length", "inertia": "inertia"}
+SECTIONS = ("units", "trunk", "thigh", "shank", "foot", "springs", "limits")
+
+
+class _Table:
+    """One table of the file: hands out numbers in SI, knows which keys were asked for."""
+
+    def __init__(self, name: str, content: Mapping[str, Any], per_si: Mapping[str, float]) -> None:
+        if not isinstance(content, Mapping):
+            raise DesignError(f"[{name}] must be a table, not {content!r}")
+        self.name, self.content, self.per_si = name, content, per_si
+        self.left = set(content)
+
+    def number(self, key: str, quantity: str) -> float:
+        if key not in self.content:
+            raise DesignError(f"[{self.name}] lacks '{key}' ({quantity})")
+        self.left.discard(key)
+        return self._si(key, self.content[key], quantity)
+
+    def pair(self, key: str, quantity: str) -> tuple[float, float]:
+        values = self.content.get(key)
+        if not isinstance(values, list) or len(values) != 2:
+            raise DesignError(f"[{self.name}] needs '{key}' = [a, b], not {values!r}")
+        self.left.discard(key)
+        return (self._si(key, values[0], quantity), self._si(key, values[1], quantity))
+
+    def _si(self, key: str, value: object, quantity: str) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise DesignError(f"[{self.name}] '{key}' is {value!r}; it must be a number")
+        return float(value) / self.per_si[quantity]
+
+    def finish(self) -> None:
+        if self.left:
+            raise DesignError(f"[{self.name}] has unknown keys: {', '.join(sorted(self.left))}")
+
+
+def _per_si(declared: Mapping[str, Any]) -> dict[str, float]:
+    per_si = {quantity: 1.0 for quantity in UNITS}
+    for quantity, unit in declared.items():
+        if quantity not in UNITS:
+            raise DesignError(f"[units] knows no '{quantity}'; it knows {', '.join(UNITS)}")
+        if unit not in UNITS[quantity]:
+            known = ", ".join(f"'{name}'" for name in UNITS[quantity])
+            raise DesignError(f"[units] {quantity} is '{unit}'; known are {known}")
+        per_si[quantity] = UNITS[quantity][unit]
+    return per_si
+
+
+def design_from_mapping(content: Mapping[str, Any]) -> LegDesign:
+    """Build a design from the tables of a design file.
+
+    Raises:
+        DesignError: a missing or unknown key, an unknown unit, or a value no leg can have.
+    """
+    unknown = set(content) - {"name", *SECTIONS}
+    if unknown:
+        raise DesignError(f"unknown entries: {', '.join(sorted(unknown))}")
+    per_si = _per_si(content.get("units", {}))
+
+    def table(name: str) -> _Table:
+        if name not in content:
+            raise DesignError(f"[{name}] is missing; a design has {', '.join(SECTIONS[1:])}")
+        return _Table(name, content[name], per_si)
+
+    def segment(name: str) -> Segment:
+        entries = table(name)
+        values = {key: entries.number(key, quantity) for key, quantity in SEGMENT_KEYS.items()}
+        entries.finish()
+        try:
+            return Segment(**values)
+        except DesignError as error:
+            raise DesignError(f"[{name}] {error}") from None
+
+    trunk, springs, limits = table("trunk"), table("springs"), table("limits")
+    design = LegDesign(
+        name=str(content.get("name", "unnamed")),
+        trunk_mass=trunk.number("mass", "mass"),
+        thigh=segment("thigh"),
+        shank=segment("shank"),
+        foot=segment("foot"),
+        stiffness=springs.pair("stiffness", "stiffness"),
+        damping=springs.pair("damping", "damping"),
+        limits=Limits(hip=limits.pair("hip", "angle"), knee=limits.pair("knee", "angle")),
+    )
+    for entries in (trunk, springs, limits):
+        entries.finish()
+    return design
+
+
+def load_design(path: Path) -> LegDesign:
+    """Read a design file.
+
+    Raises:
+        DesignError: the file is missing, is not TOML, or describes no leg; the message starts
+            with the path.
+    """
+    try:
+        with path.open("rb") as file:
+            return design_from_mapping(tomllib.load(file))
+    except FileNotFoundError:
+        raise DesignError(
+            f"{path}: no such design file; the paper's are models/optimal.toml and "
+            "models/prototype.toml"
+        ) from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise DesignError(f"{path}: cannot be read: {error}") from None
+    except tomllib.TOMLDecodeError as error:
+        raise DesignError(f"{path}: not valid TOML: {error}") from None
+    except DesignError as error:
+        raise DesignError(f"{path}: {error}") from None
+
+
+def design_to_mapping(design: LegDesign) -> dict[str, Any]:
+    """The tables of a design file, in SI; `design_from_mapping` inverts it exactly."""
+    tables: dict[str, Any] = {
+        "name": design.name,
+        "units": {quantity: next(iter(units)) for quantity, units in UNITS.items()},
+        "trunk": {"mass": design.trunk_mass},
+    }
+    for name in ("thigh", "shank", "foot"):
+        segment = getattr(design, name)
+        tables[name] = {key: getattr(segment, key) for key in SEGMENT_KEYS}
+    tables["springs"] = {"stiffness": list(design.stiffness), "damping": list(design.damping)}
+    tables["limits"] = {"hip": list(design.limits.hip), "knee": list(design.limits.knee)}
+    return tables
+
+
+def save_design(design: LegDesign, path: Path) -> None:
+    """Write a design file in SI units; `load_design` gives the same design back, bit for bit."""
+    lines: list[str] = []
+    for key, value in design_to_mapping(design).items():
+        if isinstance(value, dict):
+            lines += [
+                "",
+                f"[{key}]",
+                *(f"{name} = {_toml(entry)}" for name, entry in value.items()),
+            ]
+        else:
+            lines.append(f"{key} = {_toml(value)}")
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, str):
+        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+        return f'"{escaped}"'
+    if isinstance(value, list):
+        return "[" + ", ".join(_toml(entry) for entry in value) + "]"
+    return repr(value)

@@ -1,0 +1,41 @@
+"""The error tree: every error also subclasses the built-in it resembles.
+
+A message says the value, the limit, the unit and the way out. The command line turns any
+`LegbenchError` into one line on stderr and a non-zero exit status.
+"""
+
+
+class LegbenchError(Exception):
+    """Base of everything that legbench raises on purpose."""
+
+
+class DesignError(LegbenchError, ValueError):
+    """A design file or a parameter set that no leg can have."""
+
+
+class ConfigError(LegbenchError, ValueError):
+    """A setting that the chosen design, setup or controller refuses."""
+
+
+class RecordingError(LegbenchError, OSError):
+    """A run folder that cannot be written, read or repaired."""
+
+
+class FormatError(RecordingError):
+    """A run folder written in a format that this version does not know."""
+
+
+class MissingExtraError(LegbenchError, ImportError):
+    """An optional package or a display that a command needs is not there."""
+
+
+class PlantFault(LegbenchError, RuntimeError):
+    """The plant cannot go on: the run ends, the cause is kept, the recording survives.
+
+    Attributes:
+        cause: a short name of the fault, as written into the run's manifest.
+    """
+
+    def __init__(self, cause: str, message: str) -> None:
+        super().__init__(message)
+        self.cause = cause

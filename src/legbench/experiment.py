@@ -1,0 +1,179 @@
+"""A named set of choices, and what running it leaves: a run folder."""
+
+import platform
+from dataclasses import asdict, dataclass, field
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from legbench.control import (
+    AbstractController,
+    BangBang,
+    BangBangConfig,
+    Jump,
+    JumpConfig,
+    LegTargets,
+    PositionJump,
+    PositionJumpConfig,
+    SetpointMeaning,
+)
+from legbench.design import LegDesign
+from legbench.design.setup import Setup, SetupKind
+from legbench.design.toml import design_to_mapping
+from legbench.errors import ConfigError, LegbenchError, RecordingError
+from legbench.kinematics import ModalConvention
+from legbench.loop import Outcome, Progress, StopFlag, run
+from legbench.mjcf import BuildOptions, Linkage, Numerics, xml_hash
+from legbench.plant.sim import SimPlant
+from legbench.plant.start import PERIOD, Start
+from legbench.recording.writer import RunWriter
+from legbench.servo import ServoConfig
+
+ControllerConfig = JumpConfig | BangBangConfig | PositionJumpConfig
+USUAL_SETUP = {
+    JumpConfig: SetupKind.JUMP,
+    BangBangConfig: SetupKind.FFS,
+    PositionJumpConfig: SetupKind.FFS,
+}
+"""Where each controller is at home."""
+RECORDED_PACKAGES = ("mujoco-core", "numpy", "scipy", "pyarrow")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Experiment:
+    """Everything that decides a simulated run.
+
+    Raises:
+        ConfigError: a duration that is not positive.
+    """
+
+    design: LegDesign
+    controller: ControllerConfig
+    setup: Setup = field(default_factory=Setup)
+    linkage: Linkage = field(default_factory=Linkage)
+    numerics: Numerics = field(default_factory=Numerics)
+    servo: ServoConfig = field(default_factory=ServoConfig)
+    meaning: SetpointMeaning = SetpointMeaning.LINK
+    convention: ModalConvention = ModalConvention.ORTHONORMAL
+    duration: float = 8.0
+    """[s]"""
+
+    def __post_init__(self) -> None:
+        if not self.duration >= PERIOD:
+            raise ConfigError(
+                f"duration is {self.duration:g} s; it must be at least one cycle of {PERIOD:g} s"
+            )
+
+    @property
+    def options(self) -> BuildOptions:
+        """What the model is made of besides the design."""
+        return BuildOptions(setup=self.setup, linkage=self.linkage, numerics=self.numerics)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finished:
+    """A run that has ended, one way or another."""
+
+    path: Path
+    outcome: Outcome
+
+
+def make_controller(config: ControllerConfig, targets: LegTargets) -> AbstractController:
+    """The controller of a configuration, for the legs of `targets`.
+
+    Raises:
+        ConfigError: settings that the leg refuses.
+    """
+    match config:
+        case JumpConfig():
+            return Jump(config, targets)
+        case BangBangConfig():
+            return BangBang(config, targets)
+        case PositionJumpConfig():
+            return PositionJump(config, targets)
+
+
+def targets_of(experiment: Experiment) -> LegTargets:
+    """Set points of the experiment's leg in its setup."""
+    return LegTargets(
+        designs=experiment.design,
+        support=experiment.setup.support,
+        meaning=experiment.meaning,
+        convention=experiment.convention,
+    )
+
+
+def record(
+    experiment: Experiment,
+    out: Path,
+    *,
+    stop: StopFlag | None = None,
+    progress: Progress | None = None,
+    on_started: Any = None,
+) -> Finished:
+    """Run an experiment in virtual time and leave a run folder under `out`.
+
+    Raises:
+        ConfigError: settings that the leg refuses; nothing is written.
+        RecordingError: the folder cannot be written, or the disk failed on the way; what was
+            written by then stays readable.
+    """
+    targets = targets_of(experiment)
+    controller = make_controller(experiment.controller, targets)
+    motor_pos = controller.start_motor_pos
+    start = Start(joint_pos=targets.link_at_rest(motor_pos), motor_pos=motor_pos)
+    cycles = round(experiment.duration / PERIOD)
+    with SimPlant(experiment.design, experiment.options, start, experiment.servo) as plant:
+        manifest = _manifest(experiment, start, plant.xml)
+        kind = experiment.controller.kind
+        writer = RunWriter.create(out, manifest, name=f"{kind}-{experiment.design.name}")
+        try:
+            (writer.path / "leg.xml").write_text(plant.xml, encoding="utf-8")
+            if on_started is not None:
+                on_started(writer.path)
+            outcome = run(plant, controller, cycles, sink=writer, stop=stop, progress=progress)
+            writer.event(outcome.cycles * PERIOD, "end", status=outcome.status, cause=outcome.cause)
+        except LegbenchError as error:
+            writer.close("fault", type(error).__name__)
+            raise
+        except OSError as error:
+            writer.close("fault", type(error).__name__)
+            raise RecordingError(f"{writer.path}: {error}") from error
+        writer.close(outcome.status, outcome.cause)
+    return Finished(path=writer.path, outcome=outcome)
+
+
+def _manifest(experiment: Experiment, start: Start, xml: str) -> dict[str, Any]:
+    """What a run has to say of itself; everything a reader needs to judge it."""
+    return {
+        "design": design_to_mapping(experiment.design),
+        "mjcf_sha256": xml_hash(xml),
+        "plant": "sim",
+        "setup": asdict(experiment.setup),
+        "linkage": asdict(experiment.linkage),
+        "numerics": asdict(experiment.numerics),
+        "servo": asdict(experiment.servo),
+        "controller": {"kind": experiment.controller.kind, **asdict(experiment.controller)},
+        "conventions": {
+            "modal": str(experiment.convention),
+            "setpoint": str(experiment.meaning),
+            "rating_reference": "motor",
+        },
+        "period": PERIOD,
+        "seed": None,
+        "initial_state": {
+            "joint_pos": start.joint_pos.tolist(),
+            "motor_pos": start.motor_pos.tolist(),
+        },
+        "versions": {"python": platform.python_version(), **_versions()},
+    }
+
+
+def _versions() -> dict[str, str]:
+    found: dict[str, str] = {}
+    for package in RECORDED_PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "not installed"
+    return found

@@ -1,0 +1,128 @@
+"""The only while-loop: observation in, command out, one row a cycle."""
+
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from types import FrameType
+from typing import Protocol
+
+from legbench.clock import AbstractClock, VirtualClock
+from legbench.control import AbstractController
+from legbench.errors import PlantFault
+from legbench.plant.abstract import AbstractPlant
+from legbench.signals import Command, Observation
+
+Progress = Callable[[int, int], None]
+"""Called now and then with cycles done and cycles in all."""
+PROGRESS_EVERY = 250
+"""Cycles between two calls of the progress function."""
+
+
+class RowSink(Protocol):
+    """What the loop needs of a recording."""
+
+    def append(
+        self, command: Command, observation: Observation, cycle_us: float, late_us: float
+    ) -> None:
+        """Take one row; must not wait."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """How a run ended."""
+
+    status: str
+    """`complete`, `interrupted` (^C) or `fault`."""
+    cause: str | None
+    """Short name of the fault, if one ended the run."""
+    message: str | None
+    """What to tell the user about it."""
+    cycles: int
+    wall_time: float
+    """[s]"""
+
+
+class StopFlag:
+    """Set by ^C or by whoever holds it; the loop ends before the next cycle."""
+
+    def __init__(self) -> None:
+        self.is_set = False
+
+    def set(self) -> None:
+        """Ask the loop to end."""
+        self.is_set = True
+
+
+@contextmanager
+def stop_on_interrupt() -> Iterator[StopFlag]:
+    """Turn ^C and SIGTERM into a flag while the loop runs, so that no row is cut in half."""
+    flag = StopFlag()
+    if threading.current_thread() is not threading.main_thread():
+        yield flag
+        return
+
+    def handle(_signal: int, _frame: FrameType | None) -> None:
+        flag.set()
+
+    previous = {name: signal.signal(name, handle) for name in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield flag
+    finally:
+        for name, handler in previous.items():
+            signal.signal(name, handler)
+
+
+def run(
+    plant: AbstractPlant,
+    controller: AbstractController,
+    cycles: int,
+    *,
+    clock: AbstractClock | None = None,
+    sink: RowSink | None = None,
+    stop: StopFlag | None = None,
+    progress: Progress | None = None,
+) -> Outcome:
+    """Control a plant for a number of cycles.
+
+    The first fault ends the run and is returned as its cause; every row until then is kept.
+
+    Raises:
+        RecordingError: the recording failed; the plant has been left in its last state.
+    """
+    clock, stop = clock or VirtualClock(), stop or StopFlag()
+    observation = plant.reset()
+    controller.reset(observation)
+    began = time.perf_counter()
+    previous = began
+    cycle_us = 0.0
+    cycle = 0
+    fault: PlantFault | None = None
+    clock.start()
+    while cycle < cycles and not stop.is_set:
+        late = clock.wait(cycle)
+        command = controller.step(observation)
+        if sink is not None:
+            sink.append(command, observation, cycle_us, 1e6 * late)
+        cycle += 1
+        try:
+            observation = plant.step(command)
+        except PlantFault as error:
+            fault = error
+            break
+        if progress is not None and cycle % PROGRESS_EVERY == 0:
+            progress(cycle, cycles)
+        now = time.perf_counter()
+        cycle_us, previous = 1e6 * (now - previous), now
+    wall_time = time.perf_counter() - began
+    if fault is not None:
+        ending = ("fault", fault.cause, str(fault))
+    elif stop.is_set:
+        ending = ("interrupted", None, None)
+    else:
+        ending = ("complete", None, None)
+    status, cause, message = ending
+    return Outcome(status=status, cause=cause, message=message, cycles=cycle, wall_time=wall_time)

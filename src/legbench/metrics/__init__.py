@@ -1,0 +1,40 @@
+"""What is measured from recordings alone, whatever plant made them."""
+
+from legbench.metrics.budget import EnergyBudget, energy_budget
+from legbench.metrics.energy import Flows, energy_flows, energy_residual, loop_gap_max
+from legbench.metrics.jump import JumpFigures, jump_figures
+from legbench.metrics.modal import Trajectory, trajectory
+from legbench.metrics.periods import Periods, find_periods
+from legbench.metrics.phases import Gait, Intervals, Jumps, find_gait
+from legbench.metrics.rating import alignment, deflection, rate, rate_phases
+from legbench.metrics.source import Recorded, Reference, Terms, terms_of
+from legbench.metrics.summary import Summary, summarise
+
+__all__ = [
+    "EnergyBudget",
+    "Flows",
+    "Gait",
+    "Intervals",
+    "JumpFigures",
+    "Jumps",
+    "Periods",
+    "Recorded",
+    "Reference",
+    "Summary",
+    "Terms",
+    "Trajectory",
+    "alignment",
+    "deflection",
+    "energy_budget",
+    "energy_flows",
+    "energy_residual",
+    "find_gait",
+    "find_periods",
+    "jump_figures",
+    "loop_gap_max",
+    "rate",
+    "rate_phases",
+    "summarise",
+    "terms_of",
+    "trajectory",
+]

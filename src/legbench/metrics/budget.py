@@ -1,0 +1,67 @@
+"""Where the energy of each jump comes from and goes to: what bounds the hop."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from legbench.metrics.energy import Flows, stop_intervals
+from legbench.metrics.phases import Gait
+from legbench.metrics.source import Recorded
+from legbench.metrics.stance import MINIMUM_PHASE
+from legbench.signals import Bools, Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EnergyBudget:
+    """Energy of each complete jump, lower apex to lower apex (m,) [J]; NaN without truth.
+
+    `gain = motor_work - damper_loss - impact_loss - stop_loss - contact_loss - other_loss`, each
+    interval's unexplained energy being counted once, in this order.
+    """
+
+    gain: Floats
+    """What the leg has more of at the next lower apex: zero in a limit cycle."""
+    motor_work: Floats
+    damper_loss: Floats
+    impact_loss: Floats
+    """Unexplained in the first `MINIMUM_PHASE` after touchdown."""
+    stop_loss: Floats
+    """Unexplained while a joint is at a stop."""
+    contact_loss: Floats
+    """Unexplained in the rest of stance: sliding, yielding ground."""
+    other_loss: Floats
+    """Unexplained in the rest of flight: friction, numerics."""
+
+
+def energy_budget(recording: Recorded, gait: Gait, flows: Flows) -> EnergyBudget:
+    """Where the energy of each complete jump comes from and goes to (m,) [J]."""
+    impact, stance = _stance_intervals(recording.time, gait)
+    stop = stop_intervals(recording) & ~impact
+    stance &= ~(impact | stop)
+    total = {
+        "gain": flows.gain,
+        "motor_work": flows.motor_work,
+        "damper_loss": flows.damper_loss,
+        "impact_loss": np.where(impact, -flows.unexplained, 0.0),
+        "stop_loss": np.where(stop, -flows.unexplained, 0.0),
+        "contact_loss": np.where(stance, -flows.unexplained, 0.0),
+        "other_loss": np.where(impact | stop | stance, 0.0, -flows.unexplained),
+    }
+    low = np.searchsorted(recording.time, gait.jumps.start)
+    high = np.searchsorted(recording.time, gait.jumps.end)
+    sums = {}
+    for name, flow in total.items():
+        running = np.concatenate([[0.0], np.cumsum(flow)])
+        sums[name] = running[high] - running[low]
+    return EnergyBudget(**sums)
+
+
+def _stance_intervals(time: Floats, gait: Gait) -> tuple[Bools, Bools]:
+    """Intervals just after a touchdown, and all that touch a complete stance (n - 1,)."""
+    impact = np.zeros(max(len(time) - 1, 0), dtype=bool)
+    stance = impact.copy()
+    for first, stop in zip(gait.stance.first, gait.stance.stop, strict=True):
+        stance[max(first - 1, 0) : stop] = True
+        after = int(np.searchsorted(time, time[first] + MINIMUM_PHASE))
+        impact[max(first - 1, 0) : min(after, stop)] = True
+    return impact, stance

@@ -1,0 +1,121 @@
+"""The energy that flows through a simulated run, and how much of it nothing explains."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from legbench.design.leg import LegDesign
+from legbench.design.setup import SetupKind
+from legbench.metrics.rows import runs_of
+from legbench.metrics.source import Recorded, terms_of
+from legbench.signals import Bools, Floats
+
+STOP_MARGIN = 0.02
+"""Distance to a joint stop from which it may act [rad]: stops are soft, and touch early."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Flows:
+    """Energy that flowed in each interval between two rows (n - 1,) [J]; NaN without truth.
+
+    `gain = motor_work - damper_loss + unexplained` holds by definition of the last.
+    """
+
+    gain: Floats
+    """Change of gravitational, kinetic and spring energy together."""
+    motor_work: Floats
+    """U(theta_k+1, q_k) - U(theta_k, q_k): the motor moves within the interval's first instant."""
+    damper_loss: Floats
+    """Viscous loss in both joints."""
+    unexplained: Floats
+    """The rest: contact, impact, stops, friction, and what the numerics make or lose."""
+
+
+def spring_energy(design: LegDesign, motor_pos: Floats, joint_pos: Floats) -> Floats:
+    """U = 1/2 sum k_i (theta_i - q_i)^2 of the series springs, positions (..., 2) [rad] -> [J]."""
+    return 0.5 * np.square(motor_pos - joint_pos) @ np.asarray(design.stiffness)
+
+
+def energy_flows(recording: Recorded) -> Flows:
+    """Split the change of energy over each interval into work, loss and the unexplained.
+
+    Raises:
+        FormatError: a manifest without a leg.
+    """
+    design = terms_of(recording.manifest).design
+    motor, joint = recording["motor_pos"], recording["joint_pos"]
+    after_move = spring_energy(design, motor[1:], joint[:-1])
+    work = after_move - spring_energy(design, motor[:-1], joint[:-1])
+    passive = np.diff(recording["energy"].sum(axis=-1))
+    passive += spring_energy(design, motor[1:], joint[1:]) - after_move
+    power = np.square(recording["joint_vel"]) @ np.asarray(design.damping)
+    loss = _integral(recording.time, power, motor)
+    return Flows(gain=work + passive, motor_work=work, damper_loss=loss, unexplained=passive + loss)
+
+
+def _integral(time: Floats, power: Floats, motor_pos: Floats) -> Floats:
+    """Integral of `power` over each interval (n - 1,).
+
+    Cubic through four rows where the motors stood still around the interval, else trapezoid: a
+    moved motor bends the velocities.
+    """
+    step = np.diff(time)
+    integral = 0.5 * step * (power[:-1] + power[1:])
+    if len(power) < 4:
+        return integral
+    bend = power[:-3] - power[1:-2] - power[2:-1] + power[3:]
+    moved = np.any(motor_pos[1:] != motor_pos[:-1], axis=-1)
+    even = np.abs(np.diff(step)) < 1e-6 * step[1:]
+    smooth = ~(moved[1:-1] | moved[2:]) & even[:-1] & even[1:]
+    integral[1:-1] -= np.where(smooth, step[1:-1] * bend / 24.0, 0.0)
+    return integral
+
+
+def stop_intervals(recording: Recorded) -> Bools:
+    """Intervals (n - 1,) in which a joint stop may act, one row spared around."""
+    limits = terms_of(recording.manifest).design.limits
+    joint = recording["joint_pos"]
+    near = np.zeros(len(joint), dtype=bool)
+    angles = ((joint[:, 0], limits.hip), (joint[:, 1] - joint[:, 0], limits.knee))
+    for angle, (low, high) in angles:
+        near |= (angle < low + STOP_MARGIN) | (angle > high - STOP_MARGIN)
+    return _around(near)
+
+
+def clean_intervals(recording: Recorded) -> Bools:
+    """Intervals (n - 1,) in which only springs, dampers and gravity act, one row spared around."""
+    stops = stop_intervals(recording)
+    if terms_of(recording.manifest).setup is not SetupKind.JUMP:
+        return ~stops
+    return ~(stops | _around(np.asarray(recording["contact"], dtype=bool)))
+
+
+def _around(rows: Bools) -> Bools:
+    """Intervals (n - 1,) that one of the rows (n,) ends, begins, or is next to."""
+    wide = rows.copy()
+    wide[1:] |= rows[:-1]
+    wide[:-1] |= rows[1:]
+    return wide[:-1] | wide[1:]
+
+
+def energy_residual(recording: Recorded, flows: Flows) -> float:
+    """Worst drift of the unexplained energy over a clean stretch, over the peak kinetic energy [-].
+
+    NaN without truth, motion or a clean stretch.
+    """
+    clean = clean_intervals(recording)
+    kinetic = recording["energy"][:, 1]
+    if not (clean.any() and np.all(np.isfinite(flows.unexplained))):
+        return np.nan
+    runs = runs_of(clean)
+    stretches = zip(runs.first[runs.value], runs.stop[runs.value], strict=True)
+    worst = max(np.abs(np.cumsum(flows.unexplained[low:high])).max() for low, high in stretches)
+    peak = float(kinetic.max())
+    return float(worst) / peak if peak > 0.0 else np.nan
+
+
+def loop_gap_max(recording: Recorded) -> float:
+    """Widest opening of a bar loop in the whole run [m]; NaN without truth."""
+    gaps = np.abs(recording["loop_gap"])
+    gaps = gaps[np.isfinite(gaps)]
+    return float(gaps.max()) if len(gaps) else np.nan

@@ -1,0 +1,115 @@
+"""Oscillation periods of a leg in a fixed setup, from the turning points of its radial mode.
+
+A period runs from one turning point of z2 to the next on the same side (section VI-B, Fig. 5).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from legbench.metrics.modal import trajectory
+from legbench.metrics.rows import runs_of
+from legbench.metrics.source import Recorded, terms_of
+from legbench.signals import Floats, Ints, Phase
+
+STILL = 0.02
+"""Share of the fastest z2 rate below which the leg counts as still [-]: noise around zero makes
+no turning point. Far below the slowest oscillation that Fig. 5 counts, a tenth of dz2."""
+
+SMALLEST = 0.1
+"""Share of dz2 that an oscillation after a position jump must exceed to count [-] (Fig. 5)."""
+
+BANG_BANG_PERIODS = 20
+"""How many periods of a bang-bang run count (Fig. 5)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Periods:
+    """Complete oscillation periods, in order and without gaps."""
+
+    start: Floats
+    """Turning point that begins each period, between the rows (m,) [s]."""
+    end: Floats
+    """Turning point that ends it (m,) [s]."""
+    amplitude: Floats
+    """Half of z2's range within it (m,) [rad]."""
+    first: Ints
+    """First row of each period (m,)."""
+    stop: Ints
+    """Row after the last (m,)."""
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+
+def turning_points(time: Floats, rate: Floats) -> Floats:
+    """Instants at which `rate` (n,) passes zero in the direction of its first motion (m,) [s].
+
+    The first row is one of them when the leg is still there. A zero counts once the rate has
+    exceeded `STILL` of its maximum on both sides of it; instants are interpolated linearly.
+    """
+    threshold = STILL * np.max(np.abs(rate), initial=0.0)
+    moving = np.flatnonzero(np.abs(rate) > threshold)
+    if len(moving) == 0:
+        return np.zeros(0)
+    direction = np.sign(rate[moving])
+    runs = runs_of(direction)
+    points = [time[0]] if moving[0] > 0 else []
+    for begin in runs.first[1:][runs.value[1:] == direction[0]]:
+        last, now = moving[begin - 1], moving[begin]
+        ahead = direction[0] * rate[last : now + 1]
+        row = last + int(np.flatnonzero(ahead[:-1] <= 0.0)[-1])
+        share = rate[row] / (rate[row] - rate[row + 1])
+        points.append(time[row] + share * (time[row + 1] - time[row]))
+    return np.array(points, dtype=np.float64)
+
+
+def first_action(recording: Recorded) -> int:
+    """Row of the first control action: the first whose phase is not `Phase.REST`; n if none."""
+    acting = np.flatnonzero(recording["phase"] != Phase.REST)
+    return int(acting[0]) if len(acting) else len(recording.time)
+
+
+def find_periods(recording: Recorded) -> Periods:
+    """Periods of a run from its first control action on, as many as Fig. 5 counts.
+
+    After a position jump the leading periods whose amplitude exceeds `SMALLEST` of dz2 count,
+    under a bang-bang controller the first `BANG_BANG_PERIODS`, else all.
+
+    Raises:
+        FormatError: a manifest without a leg or with an unknown convention.
+    """
+    terms = terms_of(recording.manifest)
+    start = first_action(recording)
+    time, moved = recording.time, trajectory(recording)
+    points = turning_points(time[start:], moved.modal_rate[start:, 1])
+    periods = _between(time, moved.modal[:, 1], points)
+    if terms.controller == "bang-bang":
+        return _leading(periods, BANG_BANG_PERIODS)
+    if terms.controller == "position-jump":
+        small = np.flatnonzero(periods.amplitude <= SMALLEST * terms.deflection)
+        return _leading(periods, int(small[0]) if len(small) else len(periods))
+    return periods
+
+
+def _between(time: Floats, radial: Floats, points: Floats) -> Periods:
+    rows = np.searchsorted(time, points)
+    first, stop = rows[:-1], rows[1:]
+    amplitude = [0.5 * np.ptp(radial[low:high]) for low, high in zip(first, stop, strict=True)]
+    return Periods(
+        start=points[:-1],
+        end=points[1:],
+        amplitude=np.array(amplitude, dtype=np.float64),
+        first=first,
+        stop=stop,
+    )
+
+
+def _leading(periods: Periods, count: int) -> Periods:
+    return Periods(
+        start=periods.start[:count],
+        end=periods.end[:count],
+        amplitude=periods.amplitude[:count],
+        first=periods.first[:count],
+        stop=periods.stop[:count],
+    )

@@ -1,0 +1,139 @@
+"""Design + setup + linkage -> `mujoco.MjSpec`."""
+
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+
+from legbench.design import LegDesign, Segment
+from legbench.design.setup import Setup, SetupKind
+from legbench.design.statics import GRAVITY
+from legbench.mjcf import look, sensors
+from legbench.mjcf.ground import Ground, add_world
+from legbench.mjcf.linkage import (
+    HINGE_AXIS,
+    Linkage,
+    LinkageKind,
+    add_bars,
+    add_reduced,
+    linear_damping,
+)
+from legbench.mjcf.numerics import Numerics
+from legbench.mjcf.pose import BENT, hip_height, rest_qpos
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BuildOptions:
+    """What a model is made of besides the design."""
+
+    setup: Setup = field(default_factory=Setup)
+    linkage: Linkage = field(default_factory=Linkage)
+    ground: Ground = field(default_factory=Ground)
+    numerics: Numerics = field(default_factory=Numerics)
+
+
+def build_spec(design: LegDesign, options: BuildOptions) -> mujoco.MjSpec:
+    """The leg as an editable MuJoCo specification; `spec.compile()` makes the model.
+
+    Coordinates: x forward, y to the left, z up, motion in the x-z plane. Joints `hip` = q1,
+    `knee` = q2 - q1, `ankle` = q1 - q2; `trunk_x`, `trunk_z` where the trunk moves. Actuators
+    `motor_1`, `motor_2` take motor positions [rad] and act through the series springs.
+    """
+    setup, numerics = options.setup, options.numerics
+    spec = mujoco.MjSpec()
+    spec.modelname = f"{design.name}_{setup.kind}_{options.linkage.kind}"
+    spec.compiler.degree = False
+    numerics.apply(spec)
+    spec.option.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
+    flat = setup.kind is SetupKind.HFTS
+    spec.option.gravity = GRAVITY * np.array([0.0, 1.0, 0.0] if flat else [0.0, 0.0, -1.0])
+    look.add_scenery(spec)
+
+    height = hip_height(design, BENT)
+    _add_trunk(spec, design, options, height)
+    _add_segments(spec, design)
+    if options.linkage.kind is LinkageKind.BARS:
+        add_bars(spec, design, options.linkage, numerics)
+    else:
+        add_reduced(spec, design, numerics)
+    _add_springs(spec, design, options.linkage.kind)
+    add_world(spec, setup, options.ground, numerics)
+    sensors.add_sensors(spec, setup.kind, bars=options.linkage.kind is LinkageKind.BARS)
+    look.add_camera(spec, 0.6 * height)
+    _add_keyframe(spec, design)
+    return spec
+
+
+def _add_trunk(
+    spec: mujoco.MjSpec, design: LegDesign, options: BuildOptions, height: float
+) -> None:
+    setup = options.setup
+    base = [0.0, 0.0, height] if not setup.trunk_moves or setup.boom_radius else [0.0, 0.0, 0.0]
+    trunk = spec.worldbody.add_body(name="trunk", pos=base)
+    trunk.explicitinertial = True
+    trunk.mass = design.trunk_mass - options.linkage.mass(design)
+    trunk.ipos = np.array([0.0, 0.0, 0.03])
+    trunk.inertia = np.array([5e-4, 7e-4, 7e-4])
+    trunk.add_site(name="hip", size=[0.004] * 3, group=3)
+    look.add_trunk_box(trunk)
+    if not setup.trunk_moves:
+        return
+    if setup.boom_radius:
+        pivot = [0.0, -setup.boom_radius, 0.0]
+        trunk.add_joint(name="boom_yaw", pos=pivot, axis=[0.0, 0.0, 1.0])
+        trunk.add_joint(name="boom_roll", pos=pivot, axis=[1.0, 0.0, 0.0])
+        return
+    for name, axis in (("trunk_x", [1.0, 0.0, 0.0]), ("trunk_z", [0.0, 0.0, 1.0])):
+        trunk.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
+
+
+def _add_segments(spec: mujoco.MjSpec, design: LegDesign) -> None:
+    parent, down = spec.body("trunk"), 0.0
+    limits = {"hip": design.limits.hip, "knee": design.limits.knee, "ankle": None}
+    names = ("thigh", "shank", "foot")
+    for name, joint, segment in zip(names, limits, design.segments, strict=True):
+        body = parent.add_body(name=name, pos=[0.0, 0.0, -down])
+        hinge = body.add_joint(name=joint, axis=HINGE_AXIS)
+        if joint == "hip":
+            hinge.damping = np.array(linear_damping(design.damping[0]))
+        if (span := limits[joint]) is not None:
+            hinge.limited, hinge.range = mujoco.mjtLimited.mjLIMITED_TRUE, span
+        _set_inertia(body, segment)
+        look.add_capsule(body, name, segment.length, 0.006, look.GREY)
+        parent, down = body, segment.length
+    look.add_servo(spec.body("thigh"), "servo_thigh", 0.0)
+    look.add_servo(spec.body("shank"), "servo_shank", 0.0)
+    parent.add_site(name="tip", pos=[0.0, 0.0, -down], size=[0.004] * 3, group=3)
+
+
+def _set_inertia(body: mujoco.MjsBody, segment: Segment) -> None:
+    """A slender segment: the inertia about its own axis takes no part in planar motion."""
+    body.explicitinertial = True
+    body.mass = segment.mass
+    body.ipos = np.array([0.0, 0.0, -segment.com])
+    body.inertia = segment.inertia * np.array([1.0, 1.0, 0.1])
+
+
+def _add_springs(spec: mujoco.MjSpec, design: LegDesign, kind: LinkageKind) -> None:
+    """Series springs as position actuators: torque k (motor - link), no damping of their own."""
+    second = (
+        (mujoco.mjtTrn.mjTRN_JOINT, "crank")
+        if kind is LinkageKind.BARS
+        else (mujoco.mjtTrn.mjTRN_TENDON, "q2")
+    )
+    for index, (transmission, target) in enumerate(((mujoco.mjtTrn.mjTRN_JOINT, "hip"), second)):
+        stiffness = design.stiffness[index]
+        spec.add_actuator(
+            name=f"motor_{index + 1}",
+            trntype=transmission,
+            target=target,
+            gaintype=mujoco.mjtGain.mjGAIN_FIXED,
+            gainprm=[stiffness] + [0.0] * 9,
+            biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+            biasprm=[0.0, -stiffness] + [0.0] * 8,
+        )
+
+
+def _add_keyframe(spec: mujoco.MjSpec, design: LegDesign) -> None:
+    model = spec.compile()
+    spec.add_key(name="bent", qpos=rest_qpos(model, design, BENT).tolist(), ctrl=BENT.tolist())

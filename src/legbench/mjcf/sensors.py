@@ -1,0 +1,109 @@
+"""The truth that the model reports, and where it stands in MuJoCo's sensor array."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from legbench.design.setup import SetupKind
+from legbench.signals import Bools, Floats
+
+SITE = mujoco.mjtObj.mjOBJ_SITE
+GEOM = mujoco.mjtObj.mjOBJ_GEOM
+FOUND_AND_FORCE = 0b11
+"""Contact sensor fields: bit `mjCONDATA_FOUND`, bit `mjCONDATA_FORCE`."""
+NET_FORCE = 3
+"""Reduction of the contact sensor: one force, in world axes."""
+LOOPS = {
+    "gap_thigh": ("loop_thigh_shank", "loop_thigh_bar_thigh"),
+    "gap_foot": ("loop_foot_foot", "loop_foot_bar_shank"),
+}
+
+
+def add_sensors(spec: mujoco.MjSpec, kind: SetupKind, *, bars: bool) -> None:
+    """Add the sensors; position and velocity ones describe the state, forces the last step."""
+
+    def add(name: str, kind: mujoco.mjtSensor, **target: Any) -> None:
+        spec.add_sensor(name=name, type=kind, **target)
+
+    add("trunk_pos", mujoco.mjtSensor.mjSENS_FRAMEPOS, objtype=SITE, objname="hip")
+    add("foot_pos", mujoco.mjtSensor.mjSENS_FRAMEPOS, objtype=SITE, objname="tip")
+    add("trunk_vel", mujoco.mjtSensor.mjSENS_FRAMELINVEL, objtype=SITE, objname="hip")
+    add("energy_potential", mujoco.mjtSensor.mjSENS_E_POTENTIAL)
+    add("energy_kinetic", mujoco.mjtSensor.mjSENS_E_KINETIC)
+    for name, (segment, bar) in LOOPS.items() if bars else ():
+        frame = {"objtype": SITE, "objname": segment, "reftype": SITE, "refname": bar}
+        add(name, mujoco.mjtSensor.mjSENS_FRAMEPOS, **frame)
+    if kind is SetupKind.JUMP:
+        pair = {"objtype": GEOM, "objname": "tip", "reftype": GEOM, "refname": "ground"}
+        reading = [FOUND_AND_FORCE, NET_FORCE, 1]
+        add("contact", mujoco.mjtSensor.mjSENS_CONTACT, **pair, intprm=reading)
+    if kind is SetupKind.FFS:
+        add("pin_force", mujoco.mjtSensor.mjSENS_FORCE, objtype=SITE, objname="pin")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SensorLayout:
+    """Slices of the sensor array; vectors in the plane are every other entry of (x, y, z)."""
+
+    trunk_pos: slice
+    trunk_vel: slice
+    foot_pos: slice
+    energy: slice
+    force: slice
+    """Ground on foot; an empty-handed slice of zeros where nothing touches."""
+    found: int | None
+    """Where the contact sensor says whether it touches; none where the setup decides."""
+    always_contact: bool
+    gaps: slice | None
+
+    @classmethod
+    def of(cls, model: mujoco.MjModel) -> "SensorLayout":
+        """Look the sensors up once."""
+        address = {
+            model.sensor(index).name: int(model.sensor_adr[index]) for index in range(model.nsensor)
+        }
+
+        def plane(start: int) -> slice:
+            return slice(start, start + 3, 2)
+
+        found = address.get("contact")
+        pinned = "pin_force" in address
+        if found is not None:
+            force = plane(found + 1)
+        elif pinned:
+            force = plane(address["pin_force"])
+        else:
+            force = slice(0, 0)
+        gaps = address.get("gap_thigh")
+        energy = address["energy_potential"]
+        return cls(
+            trunk_pos=plane(address["trunk_pos"]),
+            trunk_vel=plane(address["trunk_vel"]),
+            foot_pos=plane(address["foot_pos"]),
+            energy=slice(energy, energy + 2),
+            force=force,
+            found=found,
+            always_contact=pinned,
+            gaps=None if gaps is None else slice(gaps, gaps + 6),
+        )
+
+    def contact_of(self, values: Floats) -> Bools:
+        """Whether the foot is held by the ground (...)."""
+        if self.found is None:
+            return np.full(values.shape[:-1], self.always_contact)
+        return values[..., self.found] > 0.0
+
+    def force_of(self, values: Floats) -> Floats:
+        """Ground on foot (..., 2) [N]; zero where no ground is."""
+        if self.force.stop == 0:
+            return np.zeros((*values.shape[:-1], 2))
+        return values[..., self.force]
+
+    def gap_of(self, values: Floats) -> Floats:
+        """Opening of both loops (..., 2) [m]; zero where there are no bars."""
+        if self.gaps is None:
+            return np.zeros((*values.shape[:-1], 2))
+        gap = values[..., self.gaps].reshape((*values.shape[:-1], 2, 3))
+        return np.sqrt(np.einsum("...i,...i->...", gap, gap))

@@ -1,0 +1,1 @@
+"""Legs to control: one seam, one class a file."""

@@ -1,0 +1,50 @@
+"""The plant seam: everything that can be controlled looks like this.
+
+    with SimPlant(...) as plant:
+        observation = plant.reset()
+        while ...:
+            observation = plant.step(controller.step(observation))
+
+`command_k` is computed from `observation_k` and holds over `[t_k, t_k + period)`; its effect is
+first seen in `observation_{k+1}`. Time comes from the plant, waiting from the loop.
+"""
+
+from abc import ABC, abstractmethod
+from types import TracebackType
+from typing import Self
+
+from legbench.signals import Command, Observation
+
+
+class AbstractPlant(ABC):
+    """One leg, or a batch of legs in step, at a fixed control period."""
+
+    period: float
+    """[s]"""
+
+    @abstractmethod
+    def reset(self) -> Observation:
+        """Put the leg into its initial state and look at it."""
+
+    @abstractmethod
+    def step(self, command: Command) -> Observation:
+        """Apply a command over one period.
+
+        Raises:
+            PlantFault: the plant cannot go on; what it did until then stands.
+        """
+
+    @abstractmethod
+    def close(self) -> None:
+        """Leave everything safe; may be called twice, never raises."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()

@@ -1,0 +1,122 @@
+"""Many legs in step, each with a design of its own, bit-identical to as many single ones."""
+
+import os
+from collections.abc import Sequence
+from typing import final
+
+import mujoco
+import numpy as np
+from mujoco import batch
+
+from legbench.design import LegDesign
+from legbench.errors import ConfigError
+from legbench.mjcf import BuildOptions, build_spec, rest_qpos, to_xml
+from legbench.mjcf.sensors import SensorLayout
+from legbench.plant.abstract import AbstractPlant
+from legbench.plant.observe import JointLayout, branch_fault_mask, observe
+from legbench.plant.start import PERIOD, Start
+from legbench.servo import Servo, ServoConfig
+from legbench.signals import Bools, Command, Observation
+
+
+@final
+class BatchPlant(AbstractPlant):
+    """Legs that differ in design but share setup, linkage and servo.
+
+    A leg that leaves its branch does not stop the others: it is marked in `faulted` and its
+    observations mean nothing from then on.
+
+    Attributes:
+        faulted: which legs have left their branch or diverged (n,).
+
+    Raises:
+        ConfigError: no design, or a start that is not one row a leg.
+    """
+
+    def __init__(
+        self,
+        designs: Sequence[LegDesign],
+        options: BuildOptions,
+        start: Start,
+        servo: ServoConfig | None = None,
+        threads: int | None = None,
+    ) -> None:
+        if not designs:
+            raise ConfigError("a batch needs at least one design")
+        if start.joint_pos.shape != (len(designs), 2):
+            raise ConfigError(
+                f"start posture has shape {start.joint_pos.shape}; {len(designs)} designs need "
+                f"({len(designs)}, 2)"
+            )
+        self.period = PERIOD
+        models = _models(designs, options)
+        self._batch = batch.Batch(
+            models[0], nsim=len(models), nthread=threads or os.cpu_count() or 1
+        )
+        self._batch.set_models(models)
+        self._substeps = round(PERIOD / models[0].opt.timestep)
+        self._start = start
+        self._start_qpos = np.array(
+            [
+                rest_qpos(model, design, posture)
+                for model, design, posture in zip(models, designs, start.joint_pos, strict=True)
+            ]
+        )
+        self._servo = Servo(servo or ServoConfig(), PERIOD)
+        self._stiffness = np.array([design.stiffness for design in designs])
+        self._joints = JointLayout.of(models[0])
+        self._sensors = SensorLayout.of(models[0])
+        self._qpos, self._qvel = self._batch.bind("qpos"), self._batch.bind("qvel")
+        self._ctrl = self._batch.bind("ctrl")
+        self._sensordata = self._batch.bind("sensordata")
+        self.faulted: Bools = np.zeros(len(designs), dtype=np.bool_)
+        self._cycle = 0
+
+    def reset(self) -> Observation:
+        """Put every leg at rest in its start posture."""
+        self._batch.reset(stage=int(mujoco.mjtStage.mjSTAGE_NONE))
+        self._qpos[:] = self._start_qpos
+        self._ctrl[:] = self._start.motor_pos
+        self._servo.reset(self._start.motor_pos)
+        self._batch.forward()
+        self.faulted = np.zeros(len(self._start_qpos), dtype=np.bool_)
+        self._cycle = 0
+        return self._observe(Command.holding(self._start.motor_pos))
+
+    def step(self, command: Command) -> Observation:
+        """Apply each leg's command over one period of substeps."""
+        self._ctrl[:] = self._servo.follow(command.motor_pos)
+        try:
+            self._batch.step(nstep=self._substeps, stage=int(mujoco.mjtStage.mjSTAGE_VEL))
+        except batch.SimulationError:
+            self.faulted |= np.asarray(self._batch.status) != 0
+        self._cycle += 1
+        self.faulted |= branch_fault_mask(self._joints, self._qpos)
+        return self._observe(command)
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+    def _observe(self, command: Command) -> Observation:
+        return observe(
+            time=self._cycle * PERIOD,
+            qpos=self._qpos,
+            qvel=self._qvel,
+            sensordata=self._sensordata,
+            joints=self._joints,
+            sensors=self._sensors,
+            stiffness=self._stiffness,
+            servo=self._servo,
+            motor_pos=self._ctrl.copy(),
+            applied_pos=command.motor_pos,
+        )
+
+
+def _models(designs: Sequence[LegDesign], options: BuildOptions) -> list[mujoco.MjModel]:
+    """A compiled model a leg; equal designs share one."""
+    compiled: dict[LegDesign, mujoco.MjModel] = {}
+    for design in designs:
+        if design not in compiled:
+            xml = to_xml(build_spec(design, options))
+            compiled[design] = mujoco.MjModel.from_xml_string(xml)
+    return [compiled[design] for design in designs]

@@ -1,0 +1,112 @@
+"""From MuJoCo's arrays to an observation, for one leg or a batch with the same code."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from legbench.mjcf.sensors import SensorLayout
+from legbench.servo import Servo
+from legbench.signals import Bools, Floats, Observation, Truth
+
+CROSSED_TOLERANCE = 0.05
+"""A foot or crank this far from parallel sits on the crossed branch of its loop [rad]; the bars
+of a healthy leg stay within 1e-4."""
+STRAIGHT_MARGIN = 0.02
+"""A knee this close to 0 or pi has gone through its stop [rad]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointLayout:
+    """Where the leg's coordinates stand in qpos (and, being all one-dimensional, in qvel)."""
+
+    hip: int
+    knee: int
+    ankle: int
+    crank: int | None
+
+    @classmethod
+    def of(cls, model: mujoco.MjModel) -> "JointLayout":
+        """Look the joints up once; named access in the loop is slow."""
+        address = {
+            model.joint(index).name: int(model.jnt_qposadr[index]) for index in range(model.njnt)
+        }
+        return cls(
+            hip=address["hip"],
+            knee=address["knee"],
+            ankle=address["ankle"],
+            crank=address.get("crank"),
+        )
+
+
+def absolute(layout: JointLayout, coordinates: Floats) -> Floats:
+    """q1, q2 or their rates (..., 2) from MuJoCo's relative coordinates (..., nq)."""
+    joint = np.empty((*coordinates.shape[:-1], 2))
+    joint[..., 0] = coordinates[..., layout.hip]
+    joint[..., 1] = coordinates[..., layout.hip] + coordinates[..., layout.knee]
+    return joint
+
+
+def branch_fault(layout: JointLayout, qpos: Floats) -> str | None:
+    """Name what happened to a leg (nq,) that is no longer the pantograph it was built as."""
+    angles = qpos.tolist()
+    knee = angles[layout.knee]
+    if knee < STRAIGHT_MARGIN:
+        return "leg straightened through"
+    if knee > np.pi - STRAIGHT_MARGIN:
+        return "leg folded through"
+    if abs(angles[layout.ankle] + knee) > CROSSED_TOLERANCE:
+        return "foot loop crossed"
+    if layout.crank is not None:
+        lag = angles[layout.crank] - angles[layout.hip] - knee
+        if abs(lag) > CROSSED_TOLERANCE:
+            return "thigh loop crossed"
+    return None
+
+
+def branch_fault_mask(layout: JointLayout, qpos: Floats) -> Bools:
+    """Which legs of a batch (n, nq) `branch_fault` would name; (n,)."""
+    knee = qpos[:, layout.knee]
+    fault = (knee < STRAIGHT_MARGIN) | (knee > np.pi - STRAIGHT_MARGIN)
+    fault |= np.abs(qpos[:, layout.ankle] + knee) > CROSSED_TOLERANCE
+    if layout.crank is not None:
+        lag = qpos[:, layout.crank] - qpos[:, layout.hip] - knee
+        fault |= np.abs(lag) > CROSSED_TOLERANCE
+    return fault
+
+
+def observe(
+    *,
+    time: float,
+    qpos: Floats,
+    qvel: Floats,
+    sensordata: Floats,
+    joints: JointLayout,
+    sensors: SensorLayout,
+    stiffness: Floats,
+    servo: Servo,
+    motor_pos: Floats,
+    applied_pos: Floats,
+) -> Observation:
+    """Build the observation of the current state; nothing in it aliases the simulation."""
+    joint_pos = servo.encode(absolute(joints, qpos))
+    motor_pos = servo.encode(motor_pos)
+    values = sensordata.copy()
+    truth = Truth(
+        trunk_pos=values[..., sensors.trunk_pos],
+        trunk_vel=values[..., sensors.trunk_vel],
+        foot_pos=values[..., sensors.foot_pos],
+        contact_force=sensors.force_of(values),
+        contact=sensors.contact_of(values),
+        energy=values[..., sensors.energy],
+        loop_gap=sensors.gap_of(values),
+    )
+    return Observation(
+        time=time,
+        motor_pos=motor_pos,
+        joint_pos=joint_pos,
+        joint_vel=absolute(joints, qvel),
+        spring_torque=stiffness * (motor_pos - joint_pos),
+        applied_pos=applied_pos,
+        truth=truth,
+    )

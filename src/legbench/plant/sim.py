@@ -1,0 +1,98 @@
+"""One leg in MuJoCo."""
+
+from typing import final
+
+import mujoco
+import numpy as np
+
+from legbench.design import LegDesign
+from legbench.errors import PlantFault
+from legbench.mjcf import BuildOptions, build_spec, rest_qpos, to_xml
+from legbench.mjcf.sensors import SensorLayout
+from legbench.plant.abstract import AbstractPlant
+from legbench.plant.observe import JointLayout, branch_fault, observe
+from legbench.plant.start import PERIOD, Start
+from legbench.servo import Servo, ServoConfig
+from legbench.signals import Command, Observation
+
+
+@final
+class SimPlant(AbstractPlant):
+    """The leg of a design, simulated at 1 kHz with substeps.
+
+    Attributes:
+        xml: the MJCF text that was compiled; saved with a run, it is exactly what ran.
+        model: the compiled model, for viewers and renderers.
+        data: the live simulation state, for viewers and renderers.
+    """
+
+    def __init__(
+        self,
+        design: LegDesign,
+        options: BuildOptions,
+        start: Start,
+        servo: ServoConfig | None = None,
+    ) -> None:
+        self.period = PERIOD
+        self.xml = to_xml(build_spec(design, options))
+        self.model = mujoco.MjModel.from_xml_string(self.xml)
+        self.data = mujoco.MjData(self.model)
+        self._substeps = round(PERIOD / self.model.opt.timestep)
+        self._start_qpos = rest_qpos(self.model, design, start.joint_pos)
+        self._start = start
+        self._servo = Servo(servo or ServoConfig(), PERIOD)
+        self._stiffness = np.asarray(design.stiffness)
+        self._joints = JointLayout.of(self.model)
+        self._sensors = SensorLayout.of(self.model)
+        self._qpos, self._qvel = self.data.qpos, self.data.qvel
+        self._ctrl, self._sensordata = self.data.ctrl, self.data.sensordata
+        self._cycle = 0
+
+    def reset(self) -> Observation:
+        """Put the leg at rest in its start posture."""
+        mujoco.mj_resetData(self.model, self.data)
+        self._qpos[:] = self._start_qpos
+        self._ctrl[:] = self._start.motor_pos
+        self._servo.reset(self._start.motor_pos)
+        mujoco.mj_forward(self.model, self.data)
+        self._cycle = 0
+        return self._observe(Command.holding(self._start.motor_pos))
+
+    def step(self, command: Command) -> Observation:
+        """Apply a command over one period of substeps.
+
+        Raises:
+            PlantFault: the simulation diverged, or the leg left its branch: it straightened or
+                folded through, or a bar loop crossed.
+        """
+        self._ctrl[:] = self._servo.follow(command.motor_pos)
+        try:
+            mujoco.mj_step(self.model, self.data, self._substeps)
+            mujoco.mj_step1(self.model, self.data)
+        except mujoco.FatalError as error:
+            raise PlantFault("simulation failed", str(error)) from error
+        self._cycle += 1
+        if (cause := branch_fault(self._joints, self._qpos)) is not None:
+            raise PlantFault(
+                cause,
+                f"{cause} at t = {self._cycle * PERIOD:.3f} s: the leg is no longer on the branch "
+                "it was assembled on; push less (--dz2) or limit the servo (--slew-rate)",
+            )
+        return self._observe(command)
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+    def _observe(self, command: Command) -> Observation:
+        return observe(
+            time=self._cycle * PERIOD,
+            qpos=self._qpos,
+            qvel=self._qvel,
+            sensordata=self._sensordata,
+            joints=self._joints,
+            sensors=self._sensors,
+            stiffness=self._stiffness,
+            servo=self._servo,
+            motor_pos=self._ctrl.copy(),
+            applied_pos=command.motor_pos,
+        )

@@ -1,0 +1,103 @@
+"""`run.json`: what ran, on what, and how it ended."""
+
+import json
+import math
+import platform
+from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from legbench import __version__
+from legbench.errors import ConfigError, FormatError, RecordingError
+from legbench.recording.files import reason, write_whole
+from legbench.recording.layout import FORMAT, RUN, RUNNING, UNITS
+
+Manifest = dict[str, Any]
+
+OWN_KEYS = ("format", "legbench", "id", "created", "status", "cause", "units", "rows", "duration")
+"""Keys that the recording fills in itself; `versions` is merged with the caller's."""
+
+
+def plain(value: Any) -> Any:
+    """Return `value` made of JSON's own types alone.
+
+    Arrays become lists, keys strings, and a number that JSON lacks its text ("nan", "inf"),
+    which `float` reads back. Anything else becomes its `str`.
+    """
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, float):
+        return value if math.isfinite(value) else str(value)
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    return str(value)
+
+
+def new_manifest(given: Mapping[str, Any], *, id: str, created: str) -> Manifest:
+    """Return the manifest of a run that starts now.
+
+    Raises:
+        ConfigError: the caller's part names a key that the recording fills in itself.
+    """
+    taken = [key for key in OWN_KEYS if key in given]
+    if taken:
+        raise ConfigError(f"the manifest's {', '.join(taken)} are filled in by the recording")
+    versions = {name: version(name) for name in ("numpy", "pyarrow")}
+    versions = {"python": platform.python_version()} | versions | dict(given.get("versions", {}))
+    head = {"format": FORMAT, "legbench": __version__, "id": id, "created": created}
+    end = {"status": RUNNING, "cause": None}
+    return plain({**head, **end, **given, "versions": versions, "units": UNITS})
+
+
+def to_json(manifest: Mapping[str, Any]) -> bytes:
+    """Return the manifest as indented UTF-8 JSON."""
+    return json.dumps(plain(manifest), indent=2, allow_nan=False, ensure_ascii=False).encode()
+
+
+def write_manifest(run: Path, manifest: Mapping[str, Any]) -> None:
+    """Write `run.json` into the folder `run`, or leave the old one and raise OSError."""
+    write_whole(run / RUN, to_json(manifest) + b"\n")
+
+
+def read_manifest(run: Path) -> Manifest | None:
+    """Return the manifest of the folder `run`, or None where there is no `run.json`.
+
+    Raises:
+        RecordingError: it cannot be read or is no JSON object.
+        FormatError: a newer version wrote it.
+    """
+    path = run / RUN
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        raise RecordingError(f"{path} cannot be read: {reason(error)}") from error
+    return parse_manifest(content, source=str(path))
+
+
+def parse_manifest(content: bytes, *, source: str) -> Manifest:
+    """Return the manifest in `content`; raises as `read_manifest`."""
+    try:
+        manifest = json.loads(content)
+    except ValueError as error:
+        raise RecordingError(
+            f"{source} is damaged: {error}; move it away and the copy in the samples is used"
+        ) from error
+    found = manifest.get("format") if isinstance(manifest, dict) else None
+    if not isinstance(found, int) or found < 1:
+        raise FormatError(f"{source} is no run manifest: its format is {found!r}, not 1..{FORMAT}")
+    if found > FORMAT:
+        raise FormatError(
+            f"{source}: format {found} was written by a newer legbench"
+            f" ({manifest.get('legbench', 'unknown')}); this one ({__version__}) reads up to"
+            f" {FORMAT}: upgrade"
+        )
+    return manifest

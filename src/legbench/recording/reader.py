@@ -1,0 +1,156 @@
+"""Reading a run: whatever state it was left in, as arrays by the name of the signal."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+import pyarrow as pa
+
+from legbench.errors import LegbenchError, RecordingError
+from legbench.recording.archive import read_archive
+from legbench.recording.events import Event, read_events
+from legbench.recording.files import reason
+from legbench.recording.layout import ARCHIVE, COMPLETE, EVENTS, RUN, STREAM, TIME
+from legbench.recording.manifest import Manifest, read_manifest
+from legbench.recording.stream import WholeBatches, carried_manifest, schema_for
+from legbench.signals import SIGNALS, Floats
+
+
+class UnknownSignalError(LegbenchError, KeyError):
+    """A signal that a run does not have."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Recording:
+    """What a run left; `recording["joint_pos"]` is a signal as one array."""
+
+    path: Path
+    """The run folder."""
+    manifest: Manifest
+    """`run.json`, or the copy in the samples as of the start of the run."""
+    time: Floats
+    """Plant time since reset (n,) [s]."""
+    columns: Mapping[str, np.ndarray]
+    """Column on disk -> its values (n,), read-only; `contact` is -1 where unknown."""
+    events: tuple[Event, ...]
+    """What happened rarely, each with `time` [s] and `name`."""
+    torn: str | None = None
+    """What is missing or unreadable at the end, None for a run that was closed."""
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """Return the signal `name`, components last, as a new array.
+
+        A pair is (n, 2) float64, `phase` (n,) int64, `contact` (n,) bool (False where
+        unknown), "t" and "time" are the time (n,) [s].
+
+        Raises:
+            UnknownSignalError: the run has no such signal; lists those that it has.
+        """
+        if name in ("t", "time"):
+            return self.time.copy()
+        columns = {signal.name: signal.columns for signal in SIGNALS}.get(name, (name,))
+        if any(column not in self.columns for column in columns):
+            known = ", ".join(self.signals)
+            raise UnknownSignalError(f"{self.path.name} has no signal {name!r}; it has {known}")
+        if name == "contact":
+            return self.columns[name] == 1
+        if name == "phase":
+            return self.columns[name].astype(np.int64)
+        arrays = [self.columns[column] for column in columns]
+        return arrays[0].copy() if len(arrays) == 1 else np.stack(arrays, axis=-1)
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """Names of the signals that this run has, "t" first."""
+        names = [s.name for s in SIGNALS if all(column in self.columns for column in s.columns)]
+        return ("t", *names)
+
+    @property
+    def complete(self) -> bool:
+        """Whether the run came to its end and nothing is missing."""
+        return self.manifest.get("status") == COMPLETE and self.torn is None
+
+    @property
+    def has_truth(self) -> bool:
+        """Whether every row has what only a simulation knows (False for an empty run)."""
+        contact = self.columns.get("contact")
+        return contact is not None and len(contact) > 0 and bool(np.all(contact >= 0))
+
+
+def load(path: Path) -> Recording:
+    """Read the run in the folder `path`, or the run whose `run.json` or samples `path` is.
+
+    A run that is being written or was torn gives its whole batches; one that ended before its
+    first row gives empty arrays.
+
+    Raises:
+        RecordingError: `path` is no run folder, has no samples, or a file in it is damaged.
+        FormatError: a newer version wrote it.
+    """
+    run = run_folder(path)
+    manifest = read_manifest(run)
+    table, torn = _samples(run, manifest)
+    if manifest is None:
+        manifest = carried_manifest(table.schema, run)
+    columns = {name: _values(table[name]) for name in table.column_names}
+    if TIME not in columns:
+        raise RecordingError(f"the samples of {run} have no column {TIME}")
+    events, bad = read_events(run)
+    if bad:
+        torn = "; ".join(filter(None, (torn, f"{EVENTS} has {bad} unreadable lines")))
+    return Recording(
+        path=run,
+        manifest=manifest,
+        time=columns[TIME] / 1e9,
+        columns=MappingProxyType(columns),
+        events=tuple(events),
+        torn=torn,
+    )
+
+
+def run_folder(path: Path) -> Path:
+    """Return the folder of the run at `path`.
+
+    Raises:
+        RecordingError: there is no run; names those that lie below, if any.
+    """
+    path = Path(path)
+    run = path.parent if path.name in (RUN, ARCHIVE, STREAM) else path
+    if any((run / name).is_file() for name in (RUN, ARCHIVE, STREAM)):
+        return run
+    if not run.is_dir():
+        raise RecordingError(f"{path} does not exist")
+    inside = sorted(manifest.parent.name for manifest in run.glob(f"*/{RUN}"))
+    hint = f"; it holds the runs {', '.join(inside[-5:])}" if inside else ""
+    raise RecordingError(f"{run} is no run folder: it has no {RUN}{hint}")
+
+
+def _samples(run: Path, manifest: Manifest | None) -> tuple[pa.Table, str | None]:
+    """Return the samples and what is missing of them, from the archive or else the stream."""
+    if (run / ARCHIVE).is_file():
+        return read_archive(run), None
+    try:
+        stream = WholeBatches(run / STREAM)
+    except FileNotFoundError as error:
+        raise RecordingError(f"{run} has no samples: no {ARCHIVE}, no {STREAM}") from error
+    except OSError as error:
+        raise RecordingError(f"{run / STREAM} cannot be read: {reason(error)}") from error
+    batches = list(stream)
+    schema = stream.schema
+    if schema is None:
+        schema = schema_for(manifest if manifest is not None else carried_manifest(None, run))
+    return pa.Table.from_batches(batches, schema), stream.tear
+
+
+def _values(column: pa.ChunkedArray) -> np.ndarray:
+    """Return one column (n,), read-only; nulls of an integer are -1."""
+    values = column.to_numpy()
+    if column.null_count and pa.types.is_integer(column.type):
+        values = np.where(np.isnan(values), -1, values).astype(column.type.to_pandas_dtype())
+    values.flags.writeable = False
+    return values

@@ -1,0 +1,138 @@
+"""The words that cross the plant seam, and the columns in which a run remembers them.
+
+Every array has the leg's components last; a batch adds one leading dimension, nothing else
+changes. Angles are absolute in the plane of motion, measured from straight down, positive
+forward: `q1` is the thigh (and the foot, parallel to it), `q2` the shank.
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+Ints = NDArray[np.int64]
+
+
+class Phase(IntEnum):
+    """What a controller is doing; recorded in every row."""
+
+    REST = 0
+    """Holding the rest posture, nothing commanded yet."""
+    STEPPED = 1
+    """Position jump: the equilibrium has been moved."""
+    MIDDLE = 2
+    """Three-level bang-bang: the equilibrium at the rest posture."""
+    FOLDED = 3
+    """Bang-bang: the equilibrium at z2 + dz2 (shorter leg)."""
+    STRETCHED = 4
+    """Bang-bang: the equilibrium at z2 - dz2 (longer leg)."""
+    FLIGHT = 5
+    """Jump: unloaded, waiting for the load of touchdown."""
+    COMPRESS = 6
+    """Jump: loaded, the leg shortens towards the lower apex."""
+    PUSH = 7
+    """Jump: the equilibrium at the longer leg, past the lower apex."""
+    RELEASE = 8
+    """Jump: unloaded after the push, the equilibrium goes back to the shorter leg."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Truth:
+    """What only a simulation knows; shapes `(..., 2)` are (forward, up) in the plane of motion.
+
+    The contact force is that of the plant's last internal step, one substep before `time`:
+    a solver reports a force over a step, not at an instant.
+    """
+
+    trunk_pos: Floats
+    """Hip in the world (..., 2) [m]."""
+    trunk_vel: Floats
+    """(..., 2) [m/s]."""
+    foot_pos: Floats
+    """Foot tip in the world (..., 2) [m]."""
+    contact_force: Floats
+    """Ground on foot (..., 2) [N]."""
+    contact: Bools
+    """Whether the foot touches the ground (...)."""
+    energy: Floats
+    """Gravitational potential and kinetic energy of all bodies (..., 2) [J]."""
+    loop_gap: Floats
+    """Opening of the thigh-side and foot-side bar loops (..., 2) [m]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Observation:
+    """What the plant shows at `time`; the effect of the command given before that time."""
+
+    time: float
+    """Plant time since reset [s]."""
+    motor_pos: Floats
+    """Measured motor positions (..., 2) [rad]."""
+    joint_pos: Floats
+    """Measured link angles q1, q2 (..., 2) [rad]."""
+    joint_vel: Floats
+    """(..., 2) [rad/s]."""
+    spring_torque: Floats
+    """Torque of the series springs on the links, stiffness only (..., 2) [N m]."""
+    applied_pos: Floats
+    """Command as the lowest layer let it through, before the servo (..., 2) [rad]."""
+    truth: Truth | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Command:
+    """What a controller asks of the motors over the next period."""
+
+    motor_pos: Floats
+    """Desired motor positions (..., 2) [rad]."""
+    phase: Ints
+    """`Phase` of the controller (...)."""
+
+    @classmethod
+    def holding(cls, motor_pos: Floats) -> "Command":
+        """Stay at `motor_pos` (..., 2) [rad], at rest."""
+        phase = np.full(motor_pos.shape[:-1], Phase.REST, dtype=np.int64)
+        return cls(motor_pos=motor_pos, phase=phase)
+
+
+@dataclass(frozen=True, slots=True)
+class Signal:
+    """One recorded quantity: its columns are `name` or `name_<component>`."""
+
+    name: str
+    components: tuple[str, ...]
+    unit: str
+    doc: str
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Column names on disk, one a component."""
+        if not self.components:
+            return (self.name,)
+        return tuple(f"{self.name}_{component}" for component in self.components)
+
+
+JOINTS = ("1", "2")
+PLANE = ("x", "z")
+
+SIGNALS: tuple[Signal, ...] = (
+    Signal("command_pos", JOINTS, "rad", "motor positions that the controller asked for"),
+    Signal("applied_pos", JOINTS, "rad", "the command that went to the servo, one row later"),
+    Signal("motor_pos", JOINTS, "rad", "measured motor positions"),
+    Signal("joint_pos", JOINTS, "rad", "measured link angles q1, q2"),
+    Signal("joint_vel", JOINTS, "rad/s", "link velocities"),
+    Signal("spring_torque", JOINTS, "N m", "torque of the series springs on the links"),
+    Signal("phase", (), "-", "Phase of the controller"),
+    Signal("trunk_pos", PLANE, "m", "hip in the world (simulation only)"),
+    Signal("trunk_vel", PLANE, "m/s", "velocity of the hip (simulation only)"),
+    Signal("foot_pos", PLANE, "m", "foot tip in the world (simulation only)"),
+    Signal("contact_force", PLANE, "N", "ground on foot (simulation only)"),
+    Signal("contact", (), "-", "1 where the foot touches the ground (simulation only)"),
+    Signal("energy", ("potential", "kinetic"), "J", "gravity and motion (simulation only)"),
+    Signal("loop_gap", ("thigh", "foot"), "m", "opening of the bar loops (simulation only)"),
+    Signal("cycle_us", (), "us", "wall time that the cycle took, this row's writing excluded"),
+    Signal("late_us", (), "us", "wall time past the cycle's deadline (0 in virtual time)"),
+)

@@ -1,0 +1,130 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from metrics_runs import PERIOD, Hop, clock, truncated
+
+from legbench.metrics.phases import find_gait
+from legbench.metrics.stance import loaded_by_contact
+from legbench.signals import Phase
+
+HOPS = st.builds(
+    Hop,
+    speed=st.floats(0.4, 1.0),
+    stance=st.floats(0.08, 0.2),
+    tuck=st.floats(1.0, 2.0),
+    offset=st.floats(0.0, 0.00099),
+)
+
+
+@settings(derandomize=True, max_examples=60)
+@given(HOPS)
+def test_events_of_a_ballistic_hop_come_out_in_closed_form(hop: Hop) -> None:
+    gait = find_gait(hop.recording())
+    assert (len(gait.stance), len(gait.flight), len(gait.jumps)) == (4, 5, 3)
+    index = np.arange(5)
+    liftoff, touchdown = hop.liftoff(0) + index * hop.cycle, hop.touchdown(0) + index * hop.cycle
+    # A line is drawn where the foot is on a parabola: off by at most g dt^2 / speed, 25 us.
+    np.testing.assert_allclose(gait.flight.start, liftoff, atol=2e-5)
+    np.testing.assert_allclose(gait.flight.end, touchdown, atol=2.5e-5)
+    np.testing.assert_allclose(gait.flight.apex, hop.upper_apex(0) + index * hop.cycle, atol=1e-9)
+    np.testing.assert_allclose(gait.flight.apex_height, hop.height + hop.rise, atol=1e-9)
+    np.testing.assert_allclose(
+        gait.stance.apex, hop.lower_apex(1) + index[:4] * hop.cycle, atol=1e-5
+    )
+    np.testing.assert_allclose(gait.stance.apex_height, hop.height - hop.dip, atol=1e-6)
+
+
+def test_a_jump_is_a_flight_between_two_complete_stances() -> None:
+    hop = Hop()
+    gait = find_gait(hop.recording())
+    jumps = gait.jumps
+    np.testing.assert_array_equal(gait.stance.stop[jumps.takeoff], gait.flight.first[jumps.flight])
+    np.testing.assert_array_equal(gait.flight.stop[jumps.flight], gait.stance.first[jumps.landing])
+    np.testing.assert_allclose(jumps.end - jumps.start, hop.cycle, atol=1e-5)
+
+
+def test_rows_of_phases_are_those_of_the_contact() -> None:
+    run = Hop().recording()
+    gait = find_gait(run)
+    for kind, touching in ((gait.stance, True), (gait.flight, False)):
+        for first, stop in zip(kind.first, kind.stop, strict=True):
+            assert np.all(run["contact"][first:stop] == touching)
+            assert run["contact"][first - 1] != touching
+            assert run["contact"][stop] != touching
+
+
+@settings(derandomize=True, max_examples=60)
+@given(st.integers(0, 2**32 - 1))
+def test_chattering_contact_changes_no_phase(seed: int) -> None:
+    hop = Hop()
+    signals = hop.signals()
+    contact, clean = signals["contact"].copy(), find_gait(hop.recording())
+    chatter = np.random.default_rng(seed)
+    for event in np.flatnonzero(np.diff(contact)):
+        contact[event - 4 : event + 5] = chatter.random(9) < 0.5
+    gait = find_gait(hop.recording(contact=contact))
+    for kind in ("stance", "flight"):
+        seen, true = getattr(gait, kind), getattr(clean, kind)
+        np.testing.assert_allclose(seen.start, true.start, atol=6 * PERIOD)
+        np.testing.assert_allclose(seen.end, true.end, atol=6 * PERIOD)
+        np.testing.assert_allclose(seen.apex, true.apex, atol=1e-12)
+
+
+def test_contact_that_begins_while_the_foot_rises_is_no_touchdown() -> None:
+    time = clock(400)
+    contact = (time < 0.1) | (time >= 0.3)
+    foot = np.interp(time, [0.0, 0.1, 0.2, 0.3, 0.4], [0.0, 0.0, 0.05, 0.0, 0.0])
+    grazing = contact | ((time >= 0.12) & (time < 0.14))
+    np.testing.assert_array_equal(loaded_by_contact(time, grazing, foot), contact)
+    falling = contact | ((time >= 0.25) & (time < 0.27))
+    np.testing.assert_array_equal(loaded_by_contact(time, falling, foot), falling)
+
+
+def test_without_truth_the_controller_phases_give_the_same_gait() -> None:
+    hop = Hop()
+    seen, true = find_gait(hop.real()), find_gait(hop.recording())
+    for kind in ("stance", "flight"):
+        np.testing.assert_array_equal(getattr(seen, kind).first, getattr(true, kind).first)
+        np.testing.assert_array_equal(getattr(seen, kind).stop, getattr(true, kind).stop)
+        np.testing.assert_allclose(
+            getattr(seen, kind).start, getattr(true, kind).start, atol=PERIOD
+        )
+    np.testing.assert_allclose(seen.stance.apex_height, true.stance.apex_height, atol=1e-12)
+    np.testing.assert_allclose(seen.jumps.start, true.jumps.start, atol=1e-12)
+    assert np.isnan(seen.flight.apex).all()
+
+
+def test_a_phase_next_to_rest_may_be_cut_and_does_not_count() -> None:
+    hop = Hop()
+    signals = hop.signals()
+    resting = signals["time"] < hop.touchdown(0) - 0.05
+    phase = np.where(resting, Phase.REST, signals["phase"])
+    real = hop.real()
+    seen = find_gait(replace(real, columns={**real.columns, "phase": phase}))
+    assert (len(seen.stance), len(seen.flight)) == (4, 4)
+    assert seen.flight.start[0] == pytest.approx(hop.liftoff(1), abs=PERIOD)
+
+
+@pytest.mark.parametrize("rows", [slice(0, 0), slice(0, 1), slice(0, 2), slice(0, 100)])
+@pytest.mark.parametrize("real", [False, True])
+def test_phases_that_an_end_cuts_do_not_count(rows: slice, real: bool) -> None:
+    run = Hop().real() if real else Hop().recording()
+    gait = find_gait(truncated(run, rows))
+    assert (len(gait.stance), len(gait.flight), len(gait.jumps)) == (0, 0, 0)
+
+
+@settings(derandomize=True, max_examples=40)
+@given(st.integers(0, 1600), st.integers(0, 1600))
+def test_cutting_a_run_keeps_the_phases_that_are_left_whole(one: int, other: int) -> None:
+    run = Hop().recording()
+    low, high = sorted((one, other))
+    whole, part = find_gait(run), find_gait(truncated(run, slice(low, high)))
+    for kind in ("stance", "flight"):
+        all_of, left = getattr(whole, kind), getattr(part, kind)
+        inside = (all_of.first > low) & (all_of.stop < high)
+        assert set(all_of.first[inside] - low) >= set(left.first)
+        comfortable = (all_of.first > low + 20) & (all_of.stop < high - 20)
+        assert set(all_of.first[comfortable] - low) <= set(left.first)

@@ -1,0 +1,144 @@
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import recorded_rows
+from recorded_rows import append_rows, cycle
+
+from legbench.errors import RecordingError
+from legbench.recording.disk import MAX_WAITING, Disk
+from legbench.recording.files import Appender, append_to
+from legbench.recording.manifest import new_manifest, read_manifest
+from legbench.recording.reader import load
+from legbench.recording.repair import recover
+from legbench.recording.rows import BATCH_ROWS
+from legbench.recording.stream import schema_for
+from legbench.recording.writer import RunWriter
+
+
+def writer_onto(run: Path, samples: Appender, events: Appender) -> RunWriter:
+    manifest = new_manifest({}, id="x", created="now")
+    return RunWriter(run, manifest, Disk(samples, events, schema_for(manifest)))
+
+
+def read_all(fd: int) -> None:
+    while os.read(fd, 1 << 20):
+        pass
+
+
+def check_starved(run: Path, appended: int, message: str) -> None:
+    """What every run whose disk filled up must have kept."""
+    found = load(run)
+    rows = len(found.time)
+    assert rows % BATCH_ROWS == 0
+    assert 0 < rows < appended
+    assert f"{rows} rows are safe on disk; make room, then `legbench recover" in message
+    assert "--out" in message
+    assert found["t"].tolist() == [row / 1000 for row in range(rows)]
+    assert not found.complete
+
+
+def test_a_file_that_may_not_grow(tmp_path: Path) -> None:
+    command = [sys.executable, recorded_rows.__file__, "starved", str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
+    appended, message = done.stdout.splitlines()
+    (run,) = tmp_path.iterdir()
+    assert "File too large [EFBIG]" in message
+    check_starved(run, int(appended), message)
+    manifest = load(run).manifest
+    assert (manifest["status"], manifest["cause"]) == ("fault", "recording")
+    assert manifest["recording_error"] == "File too large [EFBIG]"
+    assert manifest["rows_lost"] == int(appended) - manifest["rows"]
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    mount = ["mount", "-t", "tmpfs", "-o", "size=256k", "tmpfs", str(tmp_path)]
+    try:
+        refused = subprocess.run(mount, capture_output=True, check=False).returncode
+    except FileNotFoundError:
+        refused = 1
+    if refused:
+        pytest.skip("only root can mount a small disk")
+    yield tmp_path
+    subprocess.run(["umount", str(tmp_path)], check=True)
+
+
+def test_a_full_disk(small_disk: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    writer = RunWriter.create(small_disk, {})
+    recorded_rows.until_full(writer)
+    appended, message = capfd.readouterr().out.splitlines()
+    assert "No space left on device [ENOSPC]" in message
+    check_starved(writer.path, int(appended), message)
+    (small_disk / writer.path.name / "run.json").read_text().index('"format": 1')
+    rows = len(load(writer.path).time)
+    subprocess.run(["mount", "-o", "remount,size=4m", str(small_disk)], check=True)
+    assert recover(writer.path).rows_kept == rows
+    assert len(load(writer.path).time) == rows
+    assert not (writer.path / "samples.arrows").exists()
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
+def test_an_error_is_told_once_by_append_or_else_by_close(tmp_path: Path) -> None:
+    for told_by_append in (True, False):
+        run = tmp_path / str(told_by_append)
+        run.mkdir()
+        full = Appender(os.open("/dev/full", os.O_WRONLY))
+        writer = writer_onto(run, append_to(run / "samples.arrows"), full)
+        append_rows(writer, 60)
+        writer.event(0.06, "touchdown")
+        if told_by_append:
+            with pytest.raises(RecordingError, match=r"No space left .* \[ENOSPC\]; 50 rows"):
+                append_rows(writer, 10_000_000)
+            with pytest.raises(RecordingError, match="ENOSPC"):
+                append_rows(writer, 1)
+            writer.close("fault", "recording")
+        else:
+            with pytest.raises(RecordingError, match=r"ENOSPC\]; \d+ rows are safe"):
+                writer.close()
+        manifest = read_manifest(run)
+        assert manifest is not None
+        assert (manifest["status"], manifest["cause"]) == ("fault", "recording")
+
+
+def test_a_stuck_disk_never_stops_the_loop_but_ends_the_run(tmp_path: Path) -> None:
+    drain, stuck = os.pipe()
+    writer = writer_onto(tmp_path, Appender(stuck), append_to(tmp_path / "events.jsonl"))
+    row = cycle(0)
+    for _ in range(MAX_WAITING * BATCH_ROWS):
+        writer.append(*row)
+    with pytest.raises(RecordingError, match="too slow, 60 s of rows wait"):
+        append_rows(writer, 20 * BATCH_ROWS)
+    drained = threading.Thread(target=read_all, args=(drain,))
+    drained.start()
+    writer.close("fault", "recording")
+    drained.join()
+    os.close(drain)
+    manifest = read_manifest(tmp_path)
+    assert manifest is not None
+    assert manifest["status"] == "fault"
+
+
+def test_a_short_write_is_cut_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = append_to(tmp_path / "x")
+    file.append(b"whole")
+    write = os.write
+
+    def half(fd: int, data: memoryview) -> int:
+        if len(data) < 4:
+            raise OSError(28, "full")
+        return write(fd, data[: len(data) // 2])
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "write", half)
+        with pytest.raises(OSError, match="full"):
+            file.append(memoryview(b"12345678"))
+    assert (tmp_path / "x").read_bytes() == b"whole"
+    file.append(b" again")
+    assert (tmp_path / "x").read_bytes() == b"whole again"
+    assert file.size == 11
+    file.close()
