@@ -1,6 +1,7 @@
 """A named set of choices, and what running it leaves: a run folder."""
 
 import platform
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -23,7 +24,7 @@ from legbench.design.toml import design_to_mapping
 from legbench.errors import ConfigError, LegbenchError, RecordingError
 from legbench.kinematics import ModalConvention
 from legbench.loop import Outcome, Progress, StopFlag, run
-from legbench.mjcf import BuildOptions, Linkage, Numerics, xml_hash
+from legbench.mjcf import BuildOptions, Ground, Linkage, Numerics, xml_hash
 from legbench.plant.sim import SimPlant
 from legbench.plant.start import PERIOD, Start
 from legbench.recording.writer import RunWriter
@@ -51,6 +52,7 @@ class Experiment:
     controller: ControllerConfig
     setup: Setup = field(default_factory=Setup)
     linkage: Linkage = field(default_factory=Linkage)
+    ground: Ground = field(default_factory=Ground)
     numerics: Numerics = field(default_factory=Numerics)
     servo: ServoConfig = field(default_factory=ServoConfig)
     meaning: SetpointMeaning = SetpointMeaning.LINK
@@ -67,7 +69,9 @@ class Experiment:
     @property
     def options(self) -> BuildOptions:
         """What the model is made of besides the design."""
-        return BuildOptions(setup=self.setup, linkage=self.linkage, numerics=self.numerics)
+        return BuildOptions(
+            setup=self.setup, linkage=self.linkage, ground=self.ground, numerics=self.numerics
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,7 +113,7 @@ def record(
     *,
     stop: StopFlag | None = None,
     progress: Progress | None = None,
-    on_started: Any = None,
+    on_started: Callable[[Path], None] | None = None,
 ) -> Finished:
     """Run an experiment in virtual time and leave a run folder under `out`.
 
@@ -151,6 +155,7 @@ def _manifest(experiment: Experiment, start: Start, xml: str) -> dict[str, Any]:
         "plant": "sim",
         "setup": asdict(experiment.setup),
         "linkage": asdict(experiment.linkage),
+        "ground": asdict(experiment.ground),
         "numerics": asdict(experiment.numerics),
         "servo": asdict(experiment.servo),
         "controller": {"kind": experiment.controller.kind, **asdict(experiment.controller)},

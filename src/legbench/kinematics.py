@@ -4,6 +4,7 @@ Pure and batched: every function takes arrays whose last axis holds the two comp
 on any number of leading axes. Angles are absolute, from straight down, positive forward.
 """
 
+import math
 from enum import StrEnum
 
 import numpy as np
@@ -22,7 +23,7 @@ class ModalConvention(StrEnum):
     @property
     def scale(self) -> float:
         """Factor on the sum and the difference of the joint angles."""
-        return 1.0 / np.sqrt(2.0) if self is ModalConvention.ORTHONORMAL else 0.5
+        return math.sqrt(0.5) if self is ModalConvention.ORTHONORMAL else 0.5
 
 
 MODE_RADIAL = np.array([-1.0, 1.0])

@@ -54,7 +54,7 @@ class Servo:
     """Motor positions of one leg or a batch, cycle by cycle."""
 
     def __init__(self, config: ServoConfig, period: float) -> None:
-        self._config = config
+        self._ideal, self._delay = config.ideal, config.delay_cycles
         self._step_max = math.inf if config.slew_rate is None else config.slew_rate * period
         self._gain = (
             1.0
@@ -70,11 +70,11 @@ class Servo:
     def reset(self, position: Floats) -> None:
         """Stand still at `position` (..., 2) [rad], with nothing on the way."""
         self._position = position.copy()
-        self._waiting = deque(position.copy() for _ in range(self._config.delay_cycles))
+        self._waiting = deque(position.copy() for _ in range(self._delay))
 
     def follow(self, command: Floats) -> Floats:
         """Motor positions (..., 2) [rad] held over the cycle that starts with `command`."""
-        if self._config.ideal:
+        if self._ideal:
             self._position = command
             return command
         self._waiting.append(command.copy())

@@ -1,14 +1,16 @@
 """Hopping in place: push along the mode in the second half of stance (section IV-A, VI-C).
 
-The phases come from the springs alone, so nothing needs to know about the ground:
+The phases come from the springs alone, so nothing needs to know about the ground. They form a
+ring, each with one way out:
 
-    REST -> PUSH --unloaded--> RELEASE --settled--> FLIGHT --loaded--> COMPRESS --+
-             ^ |                                                                  |
-             | +--upper apex without lift-off--> COMPRESS                         |
-             +-----------------------lower apex-----------------------------------+
+    REST      after a while                               -> PUSH
+    PUSH      unloaded, or at an upper apex on the ground -> RELEASE
+    RELEASE   after a while                               -> FLIGHT
+    FLIGHT    loaded: touchdown                           -> COMPRESS
+    COMPRESS  at the lower apex                           -> PUSH
 
-Their torque is the load, `-tau_z`; motor position less torque over stiffness is how far the leg
-is folded, whose maximum is the lower apex and whose minimum is the upper one.
+The springs' torque is the load, `-tau_z`; motor position less torque over stiffness is how far
+the leg is folded, whose maximum is the lower apex and whose minimum is the upper one.
 """
 
 from dataclasses import dataclass
@@ -43,6 +45,20 @@ class JumpConfig:
     """Shortest time from release to the next touchdown [s]."""
 
 
+NEXT = np.zeros(len(Phase), dtype=np.int64)
+NEXT[Phase.REST] = NEXT[Phase.COMPRESS] = Phase.PUSH
+NEXT[Phase.PUSH], NEXT[Phase.RELEASE] = Phase.RELEASE, Phase.FLIGHT
+NEXT[Phase.FLIGHT] = Phase.COMPRESS
+"""Phase -> the phase after it."""
+
+
+def _by_phase(otherwise: float, entries: dict[Phase, float]) -> Floats:
+    table = np.full(len(Phase), otherwise)
+    for phase, value in entries.items():
+        table[phase] = value
+    return table
+
+
 @final
 class Jump(AbstractController):
     """Pumps the radial mode until the leg hops, and keeps it hopping.
@@ -60,15 +76,22 @@ class Jump(AbstractController):
                 f"{config.touchdown_load:g} must satisfy 0 < release < touchdown < 1 (shares of "
                 "the load of standing)"
             )
-        self._config, self._targets = config, targets
+        self._targets, self._apex_turn = targets, config.apex_turn
         self._folded = targets.motor_at(config.z2 + config.dz2, "z2 + dz2")
         self._stretched = targets.motor_at(config.z2 - config.dz2, "z2 - dz2")
         self._stiffness = targets.modal_stiffness()
-        shape = self._folded.shape[:-1]
-        self._phase: Ints = np.full(shape, Phase.REST, dtype=np.int64)
-        self._extreme: Floats = np.zeros(shape)
-        self._since: Floats = np.zeros(shape)
-        self._standing: Floats = np.ones(shape)
+        self._dwell_of = _by_phase(
+            np.inf, {Phase.REST: config.delay, Phase.RELEASE: config.release_time}
+        )
+        self._apex_of = _by_phase(0.0, {Phase.COMPRESS: 1.0, Phase.PUSH: -1.0})
+        self._load_sense_of = _by_phase(0.0, {Phase.FLIGHT: 1.0, Phase.PUSH: -1.0})
+        self._load_of = _by_phase(
+            0.0, {Phase.FLIGHT: config.touchdown_load, Phase.PUSH: config.release_load}
+        )
+        self._standing: Floats = np.ones(self._folded.shape[:-1])
+        self._since: Floats = np.zeros(self._folded.shape[:-1])
+        self._extreme: Floats = np.zeros(self._folded.shape[:-1])
+        self._enter(np.full(self._folded.shape[:-1], Phase.REST, dtype=np.int64))
 
     @property
     def start_motor_pos(self) -> Floats:
@@ -82,43 +105,30 @@ class Jump(AbstractController):
             raise ConfigError(
                 "the leg does not load its springs at rest; jumping needs setup 'jump' or 'ffs'"
             )
-        self._phase = np.full(self._standing.shape, Phase.REST, dtype=np.int64)
-        self._extreme = np.zeros(self._standing.shape)
         self._since = np.zeros(self._standing.shape)
+        self._extreme = np.zeros(self._standing.shape)
+        self._enter(np.full(self._standing.shape, Phase.REST, dtype=np.int64))
 
     def step(self, observation: Observation) -> Command:
-        """Advance the phases, then command the equilibrium that belongs to them."""
-        time = observation.time
+        """Leave the phase whose end has come, command the equilibrium that belongs to the next."""
         torque = self._targets.radial(observation.spring_torque)
         fold = self._targets.radial(observation.motor_pos) - torque / self._stiffness
-        phase = self._next(-torque / self._standing, fold, time)
-        entered = phase != self._phase
-        self._since = np.where(entered, time, self._since)
-        self._extreme = np.where(entered, fold, self._track(phase, fold))
+        self._extreme = self._apex * np.maximum(self._apex * self._extreme, self._apex * fold)
+        at_apex = self._apex * (self._extreme - fold) > self._apex_turn
+        loaded = self._load_sense * (-torque / self._standing - self._load) > 0.0
+        waited = observation.time - self._since >= self._dwell
+        leaving = at_apex | loaded | waited
+        if leaving.any():
+            self._since = np.where(leaving, observation.time, self._since)
+            self._extreme = np.where(leaving, fold, self._extreme)
+            self._enter(np.where(leaving, NEXT[self._phase], self._phase))
+        return self._command
+
+    def _enter(self, phase: Ints) -> None:
+        """Look up what ends each leg's phase, and make the command that goes with it."""
         self._phase = phase
+        self._dwell, self._apex = self._dwell_of[phase], self._apex_of[phase]
+        self._load_sense, self._load = self._load_sense_of[phase], self._load_of[phase]
         pushing = (phase == Phase.PUSH)[..., np.newaxis]
-        return Command(motor_pos=np.where(pushing, self._stretched, self._folded), phase=phase)
-
-    def _next(self, load: Floats, fold: Floats, time: float) -> Ints:
-        """Phase of this cycle from the last one; at most one transition a cycle."""
-        config, last = self._config, self._phase
-        settled = time - self._since >= config.release_time
-        past_lower_apex = fold < self._extreme - config.apex_turn
-        past_upper_apex = fold > self._extreme + config.apex_turn
-        transitions = (
-            (Phase.REST, np.asarray(time >= config.delay), Phase.PUSH),
-            (Phase.PUSH, past_upper_apex, Phase.COMPRESS),
-            (Phase.PUSH, load < config.release_load, Phase.RELEASE),
-            (Phase.RELEASE, settled, Phase.FLIGHT),
-            (Phase.FLIGHT, load > config.touchdown_load, Phase.COMPRESS),
-            (Phase.COMPRESS, past_lower_apex, Phase.PUSH),
-        )
-        phase = last
-        for origin, condition, target in transitions:
-            phase = np.where((last == origin) & condition, target, phase)
-        return phase
-
-    def _track(self, phase: Ints, fold: Floats) -> Floats:
-        """Largest fold of the compression so far, smallest of the push."""
-        tracked = np.where(phase == Phase.COMPRESS, np.maximum(self._extreme, fold), self._extreme)
-        return np.where(phase == Phase.PUSH, np.minimum(self._extreme, fold), tracked)
+        motor_pos = np.where(pushing, self._stretched, self._folded)
+        self._command = Command(motor_pos=motor_pos, phase=phase)

@@ -10,7 +10,7 @@ import numpy as np
 from legbench.design import LegDesign
 from legbench.design.statics import Support, equilibrium, gravity_load, motor_holding
 from legbench.errors import ConfigError, DesignError
-from legbench.kinematics import ModalConvention, joint_to_modal, modal_to_joint
+from legbench.kinematics import ModalConvention, modal_to_joint
 from legbench.signals import Floats
 
 
@@ -60,8 +60,8 @@ class LegTargets:
         return np.array([min(design.stiffness) for design in self.designs])
 
     def radial(self, joint: Floats) -> Floats:
-        """The z2 component (...) of joint angles, rates or torques (..., 2)."""
-        return joint_to_modal(joint, self.convention)[..., 1]
+        """The z2 component (...) of joint angles, rates or torques (..., 2), eq. (15)."""
+        return self.convention.scale * (joint[..., 1] - joint[..., 0])
 
     def _motor_of(self, design: LegDesign, z2: float, name: str) -> Floats:
         target = modal_to_joint(np.array([0.0, z2]), self.convention)

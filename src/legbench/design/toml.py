@@ -2,12 +2,14 @@
 
 import math
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from legbench.design.leg import LegDesign, Limits, Segment
 from legbench.errors import DesignError
+
+Built = TypeVar("Built")
 
 UNITS: dict[str, dict[str, float]] = {
     "mass": {"kg": 1.0, "g": 1e3},
@@ -25,7 +27,7 @@ SEGMENT_KEYS = {"mass": "mass", "length": "length", "com": "length", "inertia": 
 SECTIONS = ("units", "trunk", "thigh", "shank", "foot", "springs", "limits")
 
 
-class _Table:
+class Table:
     """One table of the file: hands out numbers in SI, knows which keys were asked for."""
 
     def __init__(self, name: str, content: Mapping[str, Any], per_si: Mapping[str, float]) -> None:
@@ -35,17 +37,37 @@ class _Table:
         self.left = set(content)
 
     def number(self, key: str, quantity: str) -> float:
+        """The number under `key`, in SI.
+
+        Raises:
+            DesignError: it is missing, or no number.
+        """
         if key not in self.content:
             raise DesignError(f"[{self.name}] lacks '{key}' ({quantity})")
         self.left.discard(key)
         return self._si(key, self.content[key], quantity)
 
     def pair(self, key: str, quantity: str) -> tuple[float, float]:
+        """The two numbers under `key`, in SI.
+
+        Raises:
+            DesignError: they are missing, or not two numbers.
+        """
+        low, high = self.numbers(key, quantity, ("a", "b"))
+        return (low, high)
+
+    def numbers(self, key: str, quantity: str, names: Sequence[str]) -> tuple[float, ...]:
+        """The numbers under `key`, in SI, one for each of `names`.
+
+        Raises:
+            DesignError: they are missing, too few or too many, or not numbers.
+        """
         values = self.content.get(key)
-        if not isinstance(values, list) or len(values) != 2:
-            raise DesignError(f"[{self.name}] needs '{key}' = [a, b], not {values!r}")
+        if not isinstance(values, list) or len(values) != len(names):
+            wanted = ", ".join(names)
+            raise DesignError(f"[{self.name}] needs '{key}' = [{wanted}], not {values!r}")
         self.left.discard(key)
-        return (self._si(key, values[0], quantity), self._si(key, values[1], quantity))
+        return tuple(self._si(key, value, quantity) for value in values)
 
     def _si(self, key: str, value: object, quantity: str) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
@@ -53,19 +75,31 @@ class _Table:
         return float(value) / self.per_si[quantity]
 
     def finish(self) -> None:
+        """Refuse the keys that nobody asked for.
+
+        Raises:
+            DesignError: there are some; the message names them.
+        """
         if self.left:
             raise DesignError(f"[{self.name}] has unknown keys: {', '.join(sorted(self.left))}")
 
 
-def _per_si(declared: Mapping[str, Any]) -> dict[str, float]:
-    per_si = {quantity: 1.0 for quantity in UNITS}
+def units_per_si(
+    declared: Mapping[str, Any], units: Mapping[str, Mapping[str, float]] = UNITS
+) -> dict[str, float]:
+    """How many of its declared unit make one SI unit, for every quantity of `units`.
+
+    Raises:
+        DesignError: an unknown quantity, or a unit that the quantity is not known in.
+    """
+    per_si = {quantity: 1.0 for quantity in units}
     for quantity, unit in declared.items():
-        if quantity not in UNITS:
-            raise DesignError(f"[units] knows no '{quantity}'; it knows {', '.join(UNITS)}")
-        if unit not in UNITS[quantity]:
-            known = ", ".join(f"'{name}'" for name in UNITS[quantity])
+        if quantity not in units:
+            raise DesignError(f"[units] knows no '{quantity}'; it knows {', '.join(units)}")
+        if unit not in units[quantity]:
+            known = ", ".join(f"'{name}'" for name in units[quantity])
             raise DesignError(f"[units] {quantity} is '{unit}'; known are {known}")
-        per_si[quantity] = UNITS[quantity][unit]
+        per_si[quantity] = units[quantity][unit]
     return per_si
 
 
@@ -78,12 +112,12 @@ def design_from_mapping(content: Mapping[str, Any]) -> LegDesign:
     unknown = set(content) - {"name", *SECTIONS}
     if unknown:
         raise DesignError(f"unknown entries: {', '.join(sorted(unknown))}")
-    per_si = _per_si(content.get("units", {}))
+    per_si = units_per_si(content.get("units", {}))
 
-    def table(name: str) -> _Table:
+    def table(name: str) -> Table:
         if name not in content:
             raise DesignError(f"[{name}] is missing; a design has {', '.join(SECTIONS[1:])}")
-        return _Table(name, content[name], per_si)
+        return Table(name, content[name], per_si)
 
     def segment(name: str) -> Segment:
         entries = table(name)
@@ -117,14 +151,22 @@ def load_design(path: Path) -> LegDesign:
         DesignError: the file is missing, is not TOML, or describes no leg; the message starts
             with the path.
     """
+    hint = "no such design file; the paper's are models/optimal.toml and models/prototype.toml"
+    return load_tables(path, design_from_mapping, hint)
+
+
+def load_tables(path: Path, build: Callable[[Mapping[str, Any]], Built], hint: str) -> Built:
+    """What `build` makes of the tables of a TOML file.
+
+    Raises:
+        DesignError: the file is missing (`hint` says what there is), is not TOML, or `build`
+            refuses it; the message starts with the path.
+    """
     try:
         with path.open("rb") as file:
-            return design_from_mapping(tomllib.load(file))
+            return build(tomllib.load(file))
     except FileNotFoundError:
-        raise DesignError(
-            f"{path}: no such design file; the paper's are models/optimal.toml and "
-            "models/prototype.toml"
-        ) from None
+        raise DesignError(f"{path}: {hint}") from None
     except (OSError, UnicodeDecodeError) as error:
         raise DesignError(f"{path}: cannot be read: {error}") from None
     except tomllib.TOMLDecodeError as error:
@@ -150,8 +192,13 @@ def design_to_mapping(design: LegDesign) -> dict[str, Any]:
 
 def save_design(design: LegDesign, path: Path) -> None:
     """Write a design file in SI units; `load_design` gives the same design back, bit for bit."""
+    path.write_text(tables_to_toml(design_to_mapping(design)), encoding="utf-8")
+
+
+def tables_to_toml(tables: Mapping[str, Any]) -> str:
+    """TOML text of one level of tables; numbers in full."""
     lines: list[str] = []
-    for key, value in design_to_mapping(design).items():
+    for key, value in tables.items():
         if isinstance(value, dict):
             lines += [
                 "",
@@ -160,7 +207,7 @@ def save_design(design: LegDesign, path: Path) -> None:
             ]
         else:
             lines.append(f"{key} = {_toml(value)}")
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return "\n".join(lines) + "\n"
 
 
 def _toml(value: object) -> str:

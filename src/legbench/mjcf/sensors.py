@@ -105,5 +105,5 @@ class SensorLayout:
         """Opening of both loops (..., 2) [m]; zero where there are no bars."""
         if self.gaps is None:
             return np.zeros((*values.shape[:-1], 2))
-        gap = values[..., self.gaps].reshape((*values.shape[:-1], 2, 3))
-        return np.sqrt(np.einsum("...i,...i->...", gap, gap))
+        gap = values[..., self.gaps]
+        return np.hypot(gap[..., 0::3], gap[..., 2::3])

@@ -27,6 +27,8 @@ class BatchPlant(AbstractPlant):
     observations mean nothing from then on.
 
     Attributes:
+        model: the first leg's compiled model.
+        threads: how many threads step the legs.
         faulted: which legs have left their branch or diverged (n,).
 
     Raises:
@@ -50,9 +52,9 @@ class BatchPlant(AbstractPlant):
             )
         self.period = PERIOD
         models = _models(designs, options)
-        self._batch = batch.Batch(
-            models[0], nsim=len(models), nthread=threads or os.cpu_count() or 1
-        )
+        self.model = models[0]
+        self.threads = threads or os.cpu_count() or 1
+        self._batch = batch.Batch(models[0], nsim=len(models), nthread=self.threads)
         self._batch.set_models(models)
         self._substeps = round(PERIOD / models[0].opt.timestep)
         self._start = start

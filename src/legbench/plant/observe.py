@@ -22,6 +22,7 @@ class JointLayout:
 
     hip: int
     knee: int
+    """Follows the hip at once, as the shank follows the thigh in the tree."""
     ankle: int
     crank: int | None
 
@@ -41,10 +42,8 @@ class JointLayout:
 
 def absolute(layout: JointLayout, coordinates: Floats) -> Floats:
     """q1, q2 or their rates (..., 2) from MuJoCo's relative coordinates (..., nq)."""
-    joint = np.empty((*coordinates.shape[:-1], 2))
-    joint[..., 0] = coordinates[..., layout.hip]
-    joint[..., 1] = coordinates[..., layout.hip] + coordinates[..., layout.knee]
-    return joint
+    relative = coordinates[..., layout.hip : layout.knee + 1]
+    return np.add.accumulate(relative, axis=-1)
 
 
 def branch_fault(layout: JointLayout, qpos: Floats) -> str | None:

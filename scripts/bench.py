@@ -1,0 +1,194 @@
+"""Performance targets, each a ratio against a baseline measured in the same run.
+
+    make bench                 every target
+    scripts/bench.py loop row  some of them
+
+Baseline and candidate take turns, so that a machine that changes its speed changes both; the
+ratio is the median over the pairs.
+"""
+
+import statistics
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from mujoco import batch
+
+from legbench.control import Jump, JumpConfig, LegTargets
+from legbench.design import LegDesign, load_design
+from legbench.design.statics import Support
+from legbench.experiment import Experiment, record
+from legbench.loop import run
+from legbench.mjcf import BuildOptions
+from legbench.plant.batch import BatchPlant
+from legbench.plant.sim import SimPlant
+from legbench.plant.start import Start
+from legbench.recording.reader import load
+from legbench.recording.writer import RunWriter
+from legbench.signals import Floats
+
+MODELS = Path(__file__).parent.parent / "models"
+PAIRS = 5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Result:
+    """What was measured, what it had to be."""
+
+    name: str
+    value: float
+    bound: float
+    unit: str
+    detail: str
+
+
+def timed(work: Callable[[], object]) -> float:
+    """Wall time of a call [s]."""
+    began = time.perf_counter()
+    work()
+    return time.perf_counter() - began
+
+
+def ratio_of(candidate: Callable[[], object], baseline: Callable[[], object]) -> tuple[float, str]:
+    """Median of candidate over baseline, in turns after a warm-up, and the medians in words."""
+    candidate(), baseline()
+    pairs = [(timed(candidate), timed(baseline)) for _ in range(PAIRS)]
+    ratio = statistics.median(ours / bare for ours, bare in pairs)
+    ours, bare = (statistics.median(column) for column in zip(*pairs, strict=True))
+    return ratio, f"{1e3 * ours:.0f} ms against {1e3 * bare:.0f} ms"
+
+
+def prototype() -> LegDesign:
+    """The leg of every benchmark."""
+    return load_design(MODELS / "prototype.toml")
+
+
+def hopping(designs: LegDesign | list[LegDesign]) -> tuple[Jump, Start]:
+    """The jump controller and its start."""
+    targets = LegTargets(designs=designs, support=Support.FOOT)
+    controller = Jump(JumpConfig(), targets)
+    motor_pos = controller.start_motor_pos
+    return controller, Start(joint_pos=targets.link_at_rest(motor_pos), motor_pos=motor_pos)
+
+
+def played(plant: SimPlant, controller: Jump, cycles: int) -> Floats:
+    """Motor positions (cycles, 2) of a closed-loop run, so that a bare loop repeats its motion."""
+    observation = plant.reset()
+    controller.reset(observation)
+    targets = np.empty((cycles, 2))
+    for cycle in range(cycles):
+        command = controller.step(observation)
+        targets[cycle] = command.motor_pos
+        observation = plant.step(command)
+    return targets
+
+
+def bench_loop() -> Result:
+    """Closed loop with recording against bare `mj_step` of the same model and steps."""
+    cycles = 8000
+    controller, start = hopping(prototype())
+    plant = SimPlant(prototype(), BuildOptions(), start)
+
+    with tempfile.TemporaryDirectory() as folder:
+
+        def ours() -> None:
+            with RunWriter.create(Path(folder), {}, name="bench") as writer:
+                run(plant, controller, cycles, sink=writer)
+
+        def bare() -> None:
+            plant.reset()
+            for _ in range(cycles):
+                mujoco.mj_step(plant.model, plant.data, 4)
+
+        ratio, detail = ratio_of(ours, bare)
+    return Result(
+        name="loop with recording / mj_step", value=ratio, bound=1.4, unit="x", detail=detail
+    )
+
+
+def bench_batch() -> Result:
+    """512 legs with their controller against bare `mujoco.batch`."""
+    legs, cycles = 512, 60
+    controller, start = hopping([prototype()] * legs)
+    plant = BatchPlant([prototype()] * legs, BuildOptions(), start)
+    raw = batch.Batch(plant.model, nsim=legs, nthread=plant.threads)
+
+    def ours() -> None:
+        run(plant, controller, cycles)
+
+    def bare() -> None:
+        raw.reset(keyframe=0)
+        for _ in range(cycles):
+            raw.step(nstep=4)
+
+    ratio, detail = ratio_of(ours, bare)
+    return Result(
+        name="batch of 512 / mujoco.batch", value=ratio, bound=1.3, unit="x", detail=detail
+    )
+
+
+def bench_row() -> Result:
+    """A row written in the loop, without what it waits for nothing."""
+    rows = 20000
+    controller, start = hopping(prototype())
+    plant = SimPlant(prototype(), BuildOptions(), start)
+    observation = plant.reset()
+    controller.reset(observation)
+    command = controller.step(observation)
+    costs = np.empty(rows)
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        RunWriter.create(Path(folder), {}, name="bench") as writer,
+    ):
+        for index in range(rows):
+            began = time.perf_counter_ns()
+            writer.append(command, observation, 0.0, 0.0)
+            costs[index] = time.perf_counter_ns() - began
+    median, high = np.percentile(costs, (50, 99)) / 1e3
+    return Result(
+        name="row in the loop", value=median, bound=5.0, unit="us", detail=f"p99 {high:.1f} us"
+    )
+
+
+def bench_rrd() -> Result:
+    """An 8 s run to `.rrd` with all plots."""
+    from legbench.viz.rrd import write_rrd
+
+    with tempfile.TemporaryDirectory() as folder:
+        experiment = Experiment(design=prototype(), controller=JumpConfig())
+        recording = load(record(experiment, Path(folder)).path)
+        target = Path(folder) / "view.rrd"
+        write_rrd(recording, target)
+        times = [timed(lambda: write_rrd(recording, target)) for _ in range(PAIRS)]
+        size = target.stat().st_size
+    value = statistics.median(times)
+    return Result(
+        name="8 s run to .rrd", value=value, bound=0.5, unit="s", detail=f"{size / 1e6:.1f} MB"
+    )
+
+
+BENCHES = {"loop": bench_loop, "batch": bench_batch, "row": bench_row, "rrd": bench_rrd}
+
+
+def main() -> int:
+    """Measure and print; 1 if a target was missed."""
+    missed = 0
+    for name in sys.argv[1:] or BENCHES:
+        result = BENCHES[name]()
+        met = result.value <= result.bound
+        missed += not met
+        print(
+            f"{'ok    ' if met else 'MISSED'} {result.name:<32} {result.value:6.2f} {result.unit:<2} "
+            f"(bound {result.bound:g})  {result.detail}",
+            flush=True,
+        )
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,55 @@
+"""The command line: wiring only. A command's module is imported when it is called."""
+
+import sys
+from importlib import import_module
+
+from legbench import __version__
+from legbench.cli.output import report_error
+from legbench.errors import LegbenchError
+
+COMMANDS = {
+    "run": "run a controller on a leg and record it",
+    "replay": "rate and show a recorded run again",
+    "recover": "repair a run that was cut off",
+    "model": "write or view the MuJoCo model of a design",
+    "render": "make a video or a picture of a recorded run",
+}
+"""Command -> one line of help; the module is `legbench.cli.<command>` with `main(arguments)`."""
+
+USAGE = """usage: legbench COMMAND [options]
+
+A testbed for segmented legs whose natural motion is a pure radial oscillation.
+
+{commands}
+
+`legbench COMMAND --help` tells the options of a command, with units.
+"""
+
+
+def usage() -> str:
+    """The text of `legbench --help`."""
+    lines = [f"  {name:<10} {text}" for name, text in COMMANDS.items()]
+    return USAGE.format(commands="\n".join(lines))
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run a command; 0 when all went well, 1 for a refusal or a fault, 2 for wrong usage.
+
+    Every `LegbenchError` becomes one line on stderr, never a traceback.
+    """
+    arguments = sys.argv[1:] if arguments is None else arguments
+    if not arguments or arguments[0] in ("-h", "--help", "help"):
+        print(usage(), end="")
+        return 0 if arguments else 2
+    name, rest = arguments[0], arguments[1:]
+    if name == "--version":
+        print(f"legbench {__version__}")
+        return 0
+    if name not in COMMANDS:
+        report_error(f"no command '{name}'; there are {', '.join(COMMANDS)}")
+        return 2
+    try:
+        return import_module(f"legbench.cli.{name}").main(rest)
+    except LegbenchError as error:
+        report_error(str(error))
+        return 1

@@ -1,0 +1,56 @@
+"""`legbench model`: the MuJoCo model of a design."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from legbench.cli.output import note, print_json
+from legbench.cli.parse import parse
+from legbench.design import load_design
+from legbench.design.setup import Setup, SetupKind
+from legbench.errors import RecordingError
+from legbench.mjcf import BuildOptions, Linkage, LinkageKind, build_spec, to_xml, xml_hash
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModelArguments:
+    """Write or view the MuJoCo model of a design."""
+
+    design: Path = Path("models/optimal.toml")
+    """Design file of the leg."""
+    setup: SetupKind = SetupKind.JUMP
+    """How the leg is held."""
+    boom_radius: float | None = None
+    """Length of the boom that guides the trunk in ffs [m]; by default a plane."""
+    linkage: LinkageKind = LinkageKind.BARS
+    """Physical parallel bars, or the constraint they make."""
+    out: Path | None = None
+    """MJCF file to write; by default it goes to stdout."""
+    view: bool = False
+    """Open it in MuJoCo's viewer."""
+    json: bool = False
+    """Print one JSON object on stdout: file, SHA-256, sizes."""
+
+
+def main(arguments: list[str]) -> int:
+    """Build, then write or view."""
+    chosen = parse(ModelArguments, "model", arguments)
+    options = BuildOptions(
+        setup=Setup(kind=chosen.setup, boom_radius=chosen.boom_radius),
+        linkage=Linkage(kind=chosen.linkage),
+    )
+    xml = to_xml(build_spec(load_design(chosen.design), options))
+    if chosen.out is not None:
+        try:
+            chosen.out.write_text(xml, encoding="utf-8")
+        except OSError as error:
+            raise RecordingError(f"cannot write {chosen.out}: {error.strerror}") from None
+        note(f"wrote {chosen.out}")
+    if chosen.view:
+        from legbench.viz.mujoco_viewer import view_model
+
+        view_model(xml)
+    if chosen.json:
+        print_json({"out": chosen.out and str(chosen.out), "mjcf_sha256": xml_hash(xml)})
+    elif chosen.out is None and not chosen.view:
+        print(xml, end="")
+    return 0

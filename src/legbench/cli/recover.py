@@ -1,0 +1,32 @@
+"""`legbench recover`: make a run whole that was cut off."""
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional
+
+from legbench.cli.output import print_json
+from legbench.cli.parse import parse
+from legbench.recording.repair import recover
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecoverArguments:
+    """Repair a run that was cut off: keeps every whole batch of rows, loses nothing else."""
+
+    run: Annotated[Path, Positional]
+    """Run folder."""
+    json: bool = False
+    """Print one JSON object on stdout."""
+
+
+def main(arguments: list[str]) -> int:
+    """Repair; 0 also when there was nothing to do."""
+    chosen = parse(RecoverArguments, "recover", arguments)
+    report = recover(chosen.run)
+    if chosen.json:
+        print_json(asdict(report) | {"path": str(report.path)})
+    else:
+        print(report)
+    return 0

@@ -1,0 +1,39 @@
+"""`legbench render`: a video or a picture of a recorded run."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional
+
+from legbench.cli.output import print_json, progress
+from legbench.cli.parse import parse
+from legbench.recording.reader import load
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RenderArguments:
+    """Draw a recorded run with MuJoCo's renderer; needs no display."""
+
+    run: Annotated[Path, Positional]
+    """Run folder."""
+    out: Path = Path("leg.mp4")
+    """File to write: .mp4, .gif, or .png for stills of one jump."""
+    time: float | None = None
+    """Draw this one instant instead, .png only [s]."""
+    json: bool = False
+    """Print one JSON object on stdout: the file."""
+
+
+def main(arguments: list[str]) -> int:
+    """Render."""
+    chosen = parse(RenderArguments, "render", arguments)
+    recording = load(chosen.run)
+    from legbench.viz.render import render
+
+    written = render(recording, chosen.out, time=chosen.time, progress=progress)
+    if chosen.json:
+        print_json({"out": str(written)})
+    else:
+        print(f"wrote {written}")
+    return 0

@@ -1,0 +1,56 @@
+"""`legbench replay`: a recorded run, rated again and shown."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional
+
+from legbench.cli.output import note, print_json
+from legbench.cli.parse import parse
+from legbench.cli.table import print_summary
+from legbench.metrics import summarise
+from legbench.recording.reader import load
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReplayArguments:
+    """Rate a recorded run again, from its file alone; show it."""
+
+    run: Annotated[Path, Positional]
+    """Run folder; a torn one is read as far as it goes."""
+    view: bool = False
+    """Open it in rerun."""
+    rrd: Path | None = None
+    """Write a rerun file that anyone can open."""
+    figure: Path | None = None
+    """Write the phase plots of Fig. 4 or 6: .png, .svg or .pdf."""
+    json: bool = False
+    """Print one JSON object on stdout."""
+
+
+def main(arguments: list[str]) -> int:
+    """Replay; 0 also for a run that a fault had ended."""
+    chosen = parse(ReplayArguments, "replay", arguments)
+    recording = load(chosen.run)
+    if recording.torn is not None:
+        note(f"legbench: {chosen.run} is torn ({recording.torn}); read as far as it goes")
+    summary = summarise(recording)
+    if chosen.rrd is not None or chosen.view:
+        from legbench.viz.rrd import write_rrd
+
+        rrd = write_rrd(recording, chosen.rrd or recording.path / "view.rrd")
+        note(f"wrote {rrd}")
+        if chosen.view:
+            from legbench.viz.viewer import open_viewer
+
+            open_viewer(rrd)
+    if chosen.figure is not None:
+        from legbench.viz.figures import phase_figure, save_figure
+
+        note(f"wrote {save_figure(phase_figure(recording), chosen.figure)}")
+    if chosen.json:
+        print_json(summary.to_json())
+    else:
+        print_summary(summary)
+    return 0

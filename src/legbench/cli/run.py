@@ -1,0 +1,106 @@
+"""`legbench run`: a controller drives a leg, the run is recorded and rated."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Literal
+
+from tyro.conf import subcommand
+
+from legbench.cli.output import note, print_json, progress
+from legbench.cli.parse import parse
+from legbench.cli.table import print_summary
+from legbench.control import BangBangConfig, JumpConfig, PositionJumpConfig, SetpointMeaning
+from legbench.design import load_design
+from legbench.design.setup import Setup, SetupKind
+from legbench.experiment import USUAL_SETUP, Experiment, record
+from legbench.kinematics import ModalConvention
+from legbench.loop import stop_on_interrupt
+from legbench.metrics import summarise
+from legbench.mjcf import Ground, Linkage, LinkageKind
+from legbench.recording.reader import load
+from legbench.servo import ServoConfig
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunArguments:
+    """Run a controller on a leg, record it, rate it."""
+
+    controller: (
+        Annotated[JumpConfig, subcommand("jump", description="hop in place")]
+        | Annotated[BangBangConfig, subcommand("bang-bang", description="sustain the mode")]
+        | Annotated[PositionJumpConfig, subcommand("position-jump", description="step response")]
+    )
+    design: Path = Path("models/optimal.toml")
+    """Design file of the leg."""
+    setup: SetupKind | None = None
+    """How the leg is held; by default jump for jump, ffs for the others."""
+    boom_radius: float | None = None
+    """Length of the boom that guides the trunk in ffs [m]; by default a plane."""
+    linkage: LinkageKind = LinkageKind.BARS
+    """Physical parallel bars, or the constraint they make."""
+    tip_radius: float = Ground().tip_radius
+    """Radius of the rolling foot tip [m]."""
+    plant: Literal["sim"] = "sim"
+    """What is controlled: sim is MuJoCo."""
+    setpoint: SetpointMeaning = SetpointMeaning.LINK
+    """Whether z2 is the link's equilibrium or the motor's position."""
+    convention: ModalConvention = ModalConvention.ORTHONORMAL
+    """How eq. (15) is read."""
+    servo: ServoConfig = field(default_factory=ServoConfig)
+    duration: float = 8.0
+    """[s]"""
+    out: Path = Path("runs")
+    """Folder of the runs."""
+    view: bool = False
+    """Watch live in rerun, from a process of its own."""
+    json: bool = False
+    """Print one JSON object on stdout."""
+
+
+def experiment_of(chosen: RunArguments) -> Experiment:
+    """The experiment that the flags describe.
+
+    Raises:
+        LegbenchError: the design file or a setting makes no sense.
+    """
+    kind = chosen.setup or USUAL_SETUP[type(chosen.controller)]
+    return Experiment(
+        design=load_design(chosen.design),
+        controller=chosen.controller,
+        setup=Setup(kind=kind, boom_radius=chosen.boom_radius),
+        linkage=Linkage(kind=chosen.linkage),
+        ground=Ground(tip_radius=chosen.tip_radius),
+        servo=chosen.servo,
+        meaning=chosen.setpoint,
+        convention=chosen.convention,
+        duration=chosen.duration,
+    )
+
+
+def main(arguments: list[str]) -> int:
+    """Run; 0 when it came to its end or was stopped by ^C, 1 when a fault ended it."""
+    chosen = parse(RunArguments, "run", arguments)
+    experiment = experiment_of(chosen)
+    views = []
+
+    def watch(folder: Path) -> None:
+        from legbench.viz.live import start_live
+
+        views.append(start_live(folder))
+
+    with stop_on_interrupt() as stop:
+        finished = record(
+            experiment,
+            chosen.out,
+            stop=stop,
+            progress=progress,
+            on_started=watch if chosen.view else None,
+        )
+    if finished.outcome.message is not None:
+        note(f"legbench: {finished.outcome.message}")
+    summary = summarise(load(finished.path))
+    if chosen.json:
+        print_json(summary.to_json())
+    else:
+        print_summary(summary)
+    return 1 if finished.outcome.status == "fault" else 0
