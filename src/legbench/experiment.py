@@ -7,6 +7,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from legbench.clock import AbstractClock
 from legbench.control import (
     AbstractController,
     BangBang,
@@ -111,11 +112,20 @@ def record(
     experiment: Experiment,
     out: Path,
     *,
+    clock: AbstractClock | None = None,
     stop: StopFlag | None = None,
     progress: Progress | None = None,
     on_started: Callable[[Path], None] | None = None,
 ) -> Finished:
-    """Run an experiment in virtual time and leave a run folder under `out`.
+    """Run an experiment, in virtual time by default, and leave a run folder under `out`.
+
+    Args:
+        experiment: what to run.
+        out: folder of the runs, made if need be.
+        clock: when cycles begin.
+        stop: ends the run when it is set.
+        progress: told now and then how far the run is.
+        on_started: told the run folder before the first cycle.
 
     Raises:
         ConfigError: settings that the leg refuses; nothing is written.
@@ -135,7 +145,9 @@ def record(
             (writer.path / "leg.xml").write_text(plant.xml, encoding="utf-8")
             if on_started is not None:
                 on_started(writer.path)
-            outcome = run(plant, controller, cycles, sink=writer, stop=stop, progress=progress)
+            outcome = run(
+                plant, controller, cycles, clock=clock, sink=writer, stop=stop, progress=progress
+            )
             writer.event(outcome.cycles * PERIOD, "end", status=outcome.status, cause=outcome.cause)
         except LegbenchError as error:
             writer.close("fault", type(error).__name__)

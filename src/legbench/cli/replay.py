@@ -1,5 +1,6 @@
 """`legbench replay`: a recorded run, rated again and shown."""
 
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -10,7 +11,7 @@ from legbench.cli.output import note, print_json
 from legbench.cli.parse import parse
 from legbench.cli.table import print_summary
 from legbench.metrics import summarise
-from legbench.recording.reader import load
+from legbench.recording.reader import Recording, load
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,6 +22,8 @@ class ReplayArguments:
     """Run folder; a torn one is read as far as it goes."""
     view: bool = False
     """Open it in rerun."""
+    serve: bool = False
+    """Show it in a browser on this machine, until ^C."""
     rrd: Path | None = None
     """Write a rerun file that anyone can open."""
     figure: Path | None = None
@@ -36,15 +39,6 @@ def main(arguments: list[str]) -> int:
     if recording.torn is not None:
         note(f"legbench: {chosen.run} is torn ({recording.torn}); read as far as it goes")
     summary = summarise(recording)
-    if chosen.rrd is not None or chosen.view:
-        from legbench.viz.rrd import write_rrd
-
-        rrd = write_rrd(recording, chosen.rrd or recording.path / "view.rrd")
-        note(f"wrote {rrd}")
-        if chosen.view:
-            from legbench.viz.viewer import open_viewer
-
-            open_viewer(rrd)
     if chosen.figure is not None:
         from legbench.viz.figures import phase_figure, save_figure
 
@@ -53,4 +47,23 @@ def main(arguments: list[str]) -> int:
         print_json(summary.to_json())
     else:
         print_summary(summary)
+    if chosen.rrd is not None or chosen.view or chosen.serve:
+        show(recording, chosen)
     return 0
+
+
+def show(recording: Recording, chosen: ReplayArguments) -> None:
+    """Write the rerun file, and open it where that was asked for."""
+    from legbench.viz.rrd import write_rrd
+    from legbench.viz.viewer import open_viewer
+
+    rrd = write_rrd(recording, chosen.rrd or recording.path / "view.rrd")
+    note(f"wrote {rrd}")
+    if not (chosen.view or chosen.serve):
+        return
+    viewer = open_viewer(rrd, serve=chosen.serve)
+    if viewer.url is not None:
+        note(f"look at {viewer.url}; ^C ends it")
+        with suppress(KeyboardInterrupt):
+            viewer.wait()
+        viewer.stop()

@@ -9,14 +9,17 @@ from tyro.conf import subcommand
 from legbench.cli.output import note, print_json, progress
 from legbench.cli.parse import parse
 from legbench.cli.table import print_summary
+from legbench.clock import VirtualClock, WallClock
 from legbench.control import BangBangConfig, JumpConfig, PositionJumpConfig, SetpointMeaning
 from legbench.design import load_design
 from legbench.design.setup import Setup, SetupKind
+from legbench.errors import MissingExtraError
 from legbench.experiment import USUAL_SETUP, Experiment, record
 from legbench.kinematics import ModalConvention
 from legbench.loop import stop_on_interrupt
 from legbench.metrics import summarise
 from legbench.mjcf import Ground, Linkage, LinkageKind
+from legbench.plant.start import PERIOD
 from legbench.recording.reader import load
 from legbench.servo import ServoConfig
 
@@ -51,8 +54,12 @@ class RunArguments:
     """[s]"""
     out: Path = Path("runs")
     """Folder of the runs."""
+    real_time: bool = False
+    """Pace the simulation by the wall clock; watching does so, too."""
     view: bool = False
     """Watch live in rerun, from a process of its own."""
+    serve: bool = False
+    """Watch live in a browser on this machine."""
     json: bool = False
     """Print one JSON object on stdout."""
 
@@ -77,24 +84,33 @@ def experiment_of(chosen: RunArguments) -> Experiment:
     )
 
 
+def watch(run: Path, *, serve: bool) -> None:
+    """Start a live view; a machine that has none gets a note, the run goes on."""
+    from legbench.viz.live import start_live
+
+    try:
+        view = start_live(run, serve=serve)
+    except MissingExtraError as error:
+        note(f"legbench: {error}")
+        return
+    if view.url is not None:
+        note(f"watch at {view.url}")
+
+
 def main(arguments: list[str]) -> int:
     """Run; 0 when it came to its end or was stopped by ^C, 1 when a fault ended it."""
     chosen = parse(RunArguments, "run", arguments)
     experiment = experiment_of(chosen)
-    views = []
-
-    def watch(folder: Path) -> None:
-        from legbench.viz.live import start_live
-
-        views.append(start_live(folder))
-
+    watched = chosen.view or chosen.serve
+    clock = WallClock(PERIOD) if watched or chosen.real_time else VirtualClock()
     with stop_on_interrupt() as stop:
         finished = record(
             experiment,
             chosen.out,
+            clock=clock,
             stop=stop,
             progress=progress,
-            on_started=watch if chosen.view else None,
+            on_started=(lambda run: watch(run, serve=chosen.serve)) if watched else None,
         )
     if finished.outcome.message is not None:
         note(f"legbench: {finished.outcome.message}")
