@@ -2,6 +2,7 @@
 
 import time
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from typing import final
 
 
@@ -33,18 +34,24 @@ class VirtualClock(AbstractClock):
 class WallClock(AbstractClock):
     """Cycle k is due k periods after the start, however long the others took."""
 
-    def __init__(self, period: float) -> None:
-        self._period = period
+    def __init__(
+        self,
+        period: float,
+        now: Callable[[], float] = time.perf_counter,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        """Periods, and what `now` and `sleep` count in, are seconds."""
+        self._period, self._now, self._sleep = period, now, sleep
         self._start = 0.0
 
     def start(self) -> None:
         """Lay the grid of deadlines."""
-        self._start = time.perf_counter()
+        self._start = self._now()
 
     def wait(self, cycle: int) -> float:
         """Sleep until the deadline, if it lies ahead."""
         due = self._start + cycle * self._period
-        ahead = due - time.perf_counter()
+        ahead = due - self._now()
         if ahead > 0.0:
-            time.sleep(ahead)
-        return max(0.0, time.perf_counter() - due)
+            self._sleep(ahead)
+        return max(0.0, self._now() - due)

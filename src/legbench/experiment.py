@@ -1,5 +1,6 @@
 """A named set of choices, and what running it leaves: a run folder."""
 
+import math
 import platform
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
@@ -22,7 +23,7 @@ from legbench.control import (
 from legbench.design import LegDesign
 from legbench.design.setup import Setup, SetupKind
 from legbench.design.toml import design_to_mapping
-from legbench.errors import ConfigError, LegbenchError, RecordingError
+from legbench.errors import ConfigError, RecordingError
 from legbench.kinematics import ModalConvention
 from legbench.loop import Outcome, Progress, StopFlag, run
 from legbench.mjcf import BuildOptions, Ground, Linkage, Numerics, xml_hash
@@ -46,7 +47,7 @@ class Experiment:
     """Everything that decides a simulated run.
 
     Raises:
-        ConfigError: a duration that is not positive.
+        ConfigError: a duration that is shorter than a cycle, or endless.
     """
 
     design: LegDesign
@@ -62,9 +63,10 @@ class Experiment:
     """[s]"""
 
     def __post_init__(self) -> None:
-        if not self.duration >= PERIOD:
+        if not PERIOD <= self.duration < math.inf:
             raise ConfigError(
-                f"duration is {self.duration:g} s; it must be at least one cycle of {PERIOD:g} s"
+                f"duration is {self.duration:g} s; it must be at least one cycle of {PERIOD:g} s, "
+                "and finite"
             )
 
     @property
@@ -140,22 +142,19 @@ def record(
     with SimPlant(experiment.design, experiment.options, start, experiment.servo) as plant:
         manifest = _manifest(experiment, start, plant.xml)
         kind = experiment.controller.kind
-        writer = RunWriter.create(out, manifest, name=f"{kind}-{experiment.design.name}")
-        try:
-            (writer.path / "leg.xml").write_text(plant.xml, encoding="utf-8")
-            if on_started is not None:
-                on_started(writer.path)
+        name = f"{kind}-{experiment.design.name}"
+        with RunWriter.create(out, manifest, name=name) as writer:
+            try:
+                (writer.path / "leg.xml").write_text(plant.xml, encoding="utf-8")
+                if on_started is not None:
+                    on_started(writer.path)
+            except OSError as error:
+                raise RecordingError(f"{writer.path}: {error}") from error
             outcome = run(
                 plant, controller, cycles, clock=clock, sink=writer, stop=stop, progress=progress
             )
             writer.event(outcome.cycles * PERIOD, "end", status=outcome.status, cause=outcome.cause)
-        except LegbenchError as error:
-            writer.close("fault", type(error).__name__)
-            raise
-        except OSError as error:
-            writer.close("fault", type(error).__name__)
-            raise RecordingError(f"{writer.path}: {error}") from error
-        writer.close(outcome.status, outcome.cause)
+            writer.close(outcome.status, outcome.cause)
     return Finished(path=writer.path, outcome=outcome)
 
 

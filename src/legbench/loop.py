@@ -16,7 +16,7 @@ from legbench.plant.abstract import AbstractPlant
 from legbench.signals import Command, Observation
 
 Progress = Callable[[int, int], None]
-"""Called now and then with cycles done and cycles in all."""
+"""Called now and then, and at the end, with cycles done and cycles in all."""
 PROGRESS_EVERY = 250
 """Cycles between two calls of the progress function."""
 
@@ -113,7 +113,7 @@ def run(
         except PlantFault as error:
             fault = error
             break
-        if progress is not None and cycle % PROGRESS_EVERY == 0:
+        if progress is not None and (cycle % PROGRESS_EVERY == 0 or cycle == cycles):
             progress(cycle, cycles)
         now = time.perf_counter()
         cycle_us, previous = 1e6 * (now - previous), now

@@ -14,13 +14,16 @@ import numpy as np
 from legbench.errors import ConfigError
 from legbench.signals import Floats
 
+MAX_DELAY_CYCLES = 1000
+"""One second: a drive that reacts later is broken, not slow."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServoConfig:
     """Limits of both drives; a limit that is not given does not act.
 
     Raises:
-        ConfigError: a limit that is zero or negative.
+        ConfigError: a limit that is zero or negative, or a delay of more than a second.
     """
 
     slew_rate: float | None = None
@@ -40,8 +43,10 @@ class ServoConfig:
         ):
             if value is not None and not value > 0:
                 raise ConfigError(f"servo {name} is {value:g} {unit}; it must be positive")
-        if self.delay_cycles < 0:
-            raise ConfigError(f"servo delay_cycles is {self.delay_cycles}; it must be 0 or more")
+        if not 0 <= self.delay_cycles <= MAX_DELAY_CYCLES:
+            raise ConfigError(
+                f"servo delay_cycles is {self.delay_cycles}; it must be 0 to {MAX_DELAY_CYCLES}"
+            )
 
     @property
     def ideal(self) -> bool:

@@ -133,6 +133,6 @@ SIGNALS: tuple[Signal, ...] = (
     Signal("contact", (), "-", "1 where the foot touches the ground (simulation only)"),
     Signal("energy", ("potential", "kinetic"), "J", "gravity and motion (simulation only)"),
     Signal("loop_gap", ("thigh", "foot"), "m", "opening of the bar loops (simulation only)"),
-    Signal("cycle_us", (), "us", "wall time that the cycle took, this row's writing excluded"),
+    Signal("cycle_us", (), "us", "wall time of the cycle before this row, waiting included"),
     Signal("late_us", (), "us", "wall time past the cycle's deadline (0 in virtual time)"),
 )

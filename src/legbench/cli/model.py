@@ -28,7 +28,7 @@ class ModelArguments:
     view: bool = False
     """Open it in MuJoCo's viewer."""
     json: bool = False
-    """Print one JSON object on stdout: file, SHA-256, sizes."""
+    """Print one JSON object on stdout: file and SHA-256."""
 
 
 def main(arguments: list[str]) -> int:

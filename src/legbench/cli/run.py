@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import subcommand
 
@@ -22,6 +22,9 @@ from legbench.mjcf import Ground, Linkage, LinkageKind
 from legbench.plant.start import PERIOD
 from legbench.recording.reader import load
 from legbench.servo import ServoConfig
+
+if TYPE_CHECKING:
+    from legbench.viz.live import LiveView
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,17 +87,29 @@ def experiment_of(chosen: RunArguments) -> Experiment:
     )
 
 
-def watch(run: Path, *, serve: bool) -> None:
-    """Start a live view; a machine that has none gets a note, the run goes on."""
-    from legbench.viz.live import start_live
+@dataclass(slots=True)
+class Watching:
+    """The live view of a run, if there is one."""
 
-    try:
-        view = start_live(run, serve=serve)
-    except MissingExtraError as error:
-        note(f"legbench: {error}")
-        return
-    if view.url is not None:
-        note(f"watch at {view.url}")
+    serve: bool
+    view: "LiveView | None" = None
+
+    def start(self, run: Path) -> None:
+        """Open the view; a machine that has none gets a note, the run goes on."""
+        from legbench.viz.live import start_live
+
+        try:
+            self.view = start_live(run, serve=self.serve)
+        except MissingExtraError as error:
+            note(f"legbench: {error}")
+            return
+        if self.view.url is not None:
+            note(f"watch at {self.view.url}; `legbench replay {run} --serve` shows it again")
+
+    def stop(self) -> None:
+        """Let the view show the last rows, and no more."""
+        if self.view is not None:
+            self.view.stop()
 
 
 def main(arguments: list[str]) -> int:
@@ -102,6 +117,7 @@ def main(arguments: list[str]) -> int:
     chosen = parse(RunArguments, "run", arguments)
     experiment = experiment_of(chosen)
     watched = chosen.view or chosen.serve
+    watching = Watching(serve=chosen.serve)
     clock = WallClock(PERIOD) if watched or chosen.real_time else VirtualClock()
     with stop_on_interrupt() as stop:
         finished = record(
@@ -110,8 +126,9 @@ def main(arguments: list[str]) -> int:
             clock=clock,
             stop=stop,
             progress=progress,
-            on_started=(lambda run: watch(run, serve=chosen.serve)) if watched else None,
+            on_started=watching.start if watched else None,
         )
+    watching.stop()
     if finished.outcome.message is not None:
         note(f"legbench: {finished.outcome.message}")
     summary = summarise(load(finished.path))

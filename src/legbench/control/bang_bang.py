@@ -6,9 +6,9 @@ from typing import ClassVar, final
 import numpy as np
 
 from legbench.control.abstract import AbstractController
-from legbench.control.setpoint import LegTargets
+from legbench.control.setpoint import LegTargets, check_delay
 from legbench.errors import ConfigError
-from legbench.signals import Command, Floats, Observation, Phase
+from legbench.signals import Command, Floats, Ints, Observation, Phase
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,11 +35,12 @@ class BangBang(AbstractController):
     """`tau_z > eps` moves the equilibrium to z2 + dz2, `tau_z < -eps` to z2 - dz2.
 
     `tau_z` is the spring torque along z2 less its value at rest, so that gravity does not hold
-    the switch. The first switch, to the longer leg, starts the motion.
+    the switch. The first switch, to the longer leg, starts the motion; it is held until the
+    torque has passed the threshold once, however slowly the motors follow.
 
     Raises:
-        ConfigError: a set point that the leg cannot reach, or a threshold that its own
-            deflection cannot pass.
+        ConfigError: a set point that the leg cannot reach, a threshold that its own deflection
+            cannot pass, or a delay or sign that makes no sense.
     """
 
     def __init__(self, config: BangBangConfig, targets: LegTargets) -> None:
@@ -53,12 +54,14 @@ class BangBang(AbstractController):
                 f"threshold is {config.threshold:g} N m; it must be positive and stay below "
                 f"k dz2 = {limit:.3g} N m, or the oscillation dies: lower it or raise dz2"
             )
+        check_delay(config.delay)
         self._config, self._targets = config, targets
         self._middle = targets.motor_at(config.z2, "z2")
         self._folded = targets.motor_at(config.z2 + config.dz2, "z2 + dz2")
         self._stretched = targets.motor_at(config.z2 - config.dz2, "z2 - dz2")
         self._rest_torque = np.zeros(self._middle.shape[:-1])
         self._level = np.full(self._middle.shape[:-1], Phase.STRETCHED, dtype=np.int64)
+        self._going = np.zeros(self._middle.shape[:-1], dtype=np.bool_)
 
     @property
     def start_motor_pos(self) -> Floats:
@@ -69,6 +72,7 @@ class BangBang(AbstractController):
         """Take the spring torque of the leg at rest as zero."""
         self._rest_torque = self._targets.radial(observation.spring_torque)
         self._level = np.full(self._rest_torque.shape, Phase.STRETCHED, dtype=np.int64)
+        self._going = np.zeros(self._rest_torque.shape, dtype=np.bool_)
 
     def step(self, observation: Observation) -> Command:
         """Switch on the zero-based modal torque."""
@@ -76,18 +80,18 @@ class BangBang(AbstractController):
             return Command.holding(self._middle)
         torque = self._targets.radial(observation.spring_torque) - self._rest_torque
         torque = self._config.sign * torque
-        between = Phase.MIDDLE if self._config.three_levels else self._level
+        self._going = self._going | (np.abs(torque) > self._config.threshold)
+        back = self._going & self._config.three_levels
+        between = np.where(back, Phase.MIDDLE, self._level)
         level = np.where(
             torque > self._config.threshold,
             Phase.FOLDED,
             np.where(torque < -self._config.threshold, Phase.STRETCHED, between),
         )
-        if observation.time < self._config.delay + 0.5 * 0.001:
-            level = np.full(level.shape, Phase.STRETCHED)
         self._level = level.astype(np.int64)
         return Command(motor_pos=self._motor(self._level), phase=self._level)
 
-    def _motor(self, level: Floats) -> Floats:
+    def _motor(self, level: Ints) -> Floats:
         chosen = level[..., np.newaxis]
         return np.where(
             chosen == Phase.FOLDED,

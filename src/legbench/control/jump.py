@@ -13,13 +13,15 @@ The springs' torque is the load, `-tau_z`; motor position less torque over stiff
 the leg is folded, whose maximum is the lower apex and whose minimum is the upper one.
 """
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar, final
 
 import numpy as np
 
 from legbench.control.abstract import AbstractController
-from legbench.control.setpoint import LegTargets
+from legbench.control.setpoint import LegTargets, check_delay
+from legbench.design.statics import Support
 from legbench.errors import ConfigError
 from legbench.signals import Command, Floats, Ints, Observation, Phase
 
@@ -45,6 +47,8 @@ class JumpConfig:
     """Shortest time from release to the next touchdown [s]."""
 
 
+STANDING_ONLY = "the leg does not load its springs at rest; jumping needs setup 'jump' or 'ffs'"
+
 NEXT = np.zeros(len(Phase), dtype=np.int64)
 NEXT[Phase.REST] = NEXT[Phase.COMPRESS] = Phase.PUSH
 NEXT[Phase.PUSH], NEXT[Phase.RELEASE] = Phase.RELEASE, Phase.FLIGHT
@@ -64,7 +68,8 @@ class Jump(AbstractController):
     """Pumps the radial mode until the leg hops, and keeps it hopping.
 
     Raises:
-        ConfigError: a set point that the leg cannot reach, or thresholds out of order.
+        ConfigError: a set point that the leg cannot reach, thresholds out of order, a time that
+            makes no sense, or a leg that does not stand.
     """
 
     def __init__(self, config: JumpConfig, targets: LegTargets) -> None:
@@ -76,6 +81,13 @@ class Jump(AbstractController):
                 f"{config.touchdown_load:g} must satisfy 0 < release < touchdown < 1 (shares of "
                 "the load of standing)"
             )
+        if not 0.0 < config.apex_turn < math.inf:
+            raise ConfigError(f"apex_turn is {config.apex_turn:g} rad; it must be positive")
+        if not 0.0 <= config.release_time < math.inf:
+            raise ConfigError(f"release_time is {config.release_time:g} s; it must be 0 or more")
+        check_delay(config.delay)
+        if targets.support is not Support.FOOT:
+            raise ConfigError(STANDING_ONLY)
         self._targets, self._apex_turn = targets, config.apex_turn
         self._folded = targets.motor_at(config.z2 + config.dz2, "z2 + dz2")
         self._stretched = targets.motor_at(config.z2 - config.dz2, "z2 - dz2")
@@ -102,9 +114,7 @@ class Jump(AbstractController):
         """Take the load of the standing leg as the unit of load."""
         self._standing = -self._targets.radial(observation.spring_torque)
         if not np.all(self._standing > 0.0):
-            raise ConfigError(
-                "the leg does not load its springs at rest; jumping needs setup 'jump' or 'ffs'"
-            )
+            raise ConfigError(STANDING_ONLY)
         self._since = np.zeros(self._standing.shape)
         self._extreme = np.zeros(self._standing.shape)
         self._enter(np.full(self._standing.shape, Phase.REST, dtype=np.int64))

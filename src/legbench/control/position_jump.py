@@ -6,7 +6,7 @@ from typing import ClassVar, final
 import numpy as np
 
 from legbench.control.abstract import AbstractController
-from legbench.control.setpoint import LegTargets
+from legbench.control.setpoint import LegTargets, check_delay
 from legbench.signals import Command, Floats, Observation, Phase
 
 
@@ -28,12 +28,13 @@ class PositionJump(AbstractController):
     """Holds z2 + dz2, then z2 for good.
 
     Raises:
-        ConfigError: a set point that the leg cannot reach.
+        ConfigError: a set point that the leg cannot reach, or a delay that makes no sense.
     """
 
     def __init__(self, config: PositionJumpConfig, targets: LegTargets) -> None:
         self._before = targets.motor_at(config.z2 + config.dz2, "z2 + dz2")
         self._after = targets.motor_at(config.z2, "z2")
+        check_delay(config.delay)
         self._delay = config.delay
         shape = self._before.shape[:-1]
         self._rest = Command.holding(self._before)

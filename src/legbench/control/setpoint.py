@@ -1,5 +1,6 @@
 """From a radial set point z2 to motor positions, within what the leg can do."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -21,6 +22,16 @@ class SetpointMeaning(StrEnum):
     """The link's equilibrium: the motor is placed so that the leg rests there under gravity."""
     MOTOR = "motor"
     """The motor: the leg sags from it."""
+
+
+def check_delay(delay: float) -> None:
+    """Refuse a time at rest [s] that never ends or has no meaning.
+
+    Raises:
+        ConfigError: it is negative or not finite.
+    """
+    if not 0.0 <= delay < math.inf:
+        raise ConfigError(f"delay is {delay:g} s; it must be zero or more, and finite")
 
 
 @final
@@ -64,6 +75,8 @@ class LegTargets:
         return self.convention.scale * (joint[..., 1] - joint[..., 0])
 
     def _motor_of(self, design: LegDesign, z2: float, name: str) -> Floats:
+        if not math.isfinite(z2):
+            raise ConfigError(f"set point {name} is {z2:g} rad; it must be a finite number")
         target = modal_to_joint(np.array([0.0, z2]), self.convention)
         try:
             if self.meaning is SetpointMeaning.LINK:

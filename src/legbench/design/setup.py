@@ -1,5 +1,6 @@
 """The paper's four ways of holding a leg (section VI-B, VI-C)."""
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -45,8 +46,10 @@ class Setup:
             return
         if self.kind is not SetupKind.FFS:
             raise ConfigError(f"setup {self.kind} has no boom; boom_radius belongs to ffs")
-        if not self.boom_radius > 0.0:
-            raise ConfigError(f"boom_radius is {self.boom_radius:g} m; it must be positive")
+        if not 0.0 < self.boom_radius < math.inf:
+            raise ConfigError(
+                f"boom_radius is {self.boom_radius:g} m; it must be positive and finite"
+            )
 
     @property
     def support(self) -> Support:

@@ -1,5 +1,6 @@
 """Design files: TOML in the units that its `[units]` table declares, SI when written."""
 
+import json
 import math
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
@@ -72,7 +73,10 @@ class Table:
     def _si(self, key: str, value: object, quantity: str) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise DesignError(f"[{self.name}] '{key}' is {value!r}; it must be a number")
-        return float(value) / self.per_si[quantity]
+        try:
+            return float(value) / self.per_si[quantity]
+        except OverflowError:
+            raise DesignError(f"[{self.name}] '{key}' is too large for a number") from None
 
     def finish(self) -> None:
         """Refuse the keys that nobody asked for.
@@ -93,10 +97,12 @@ def units_per_si(
         DesignError: an unknown quantity, or a unit that the quantity is not known in.
     """
     per_si = {quantity: 1.0 for quantity in units}
+    if not isinstance(declared, Mapping):
+        raise DesignError(f"[units] must be a table, not {declared!r}")
     for quantity, unit in declared.items():
         if quantity not in units:
             raise DesignError(f"[units] knows no '{quantity}'; it knows {', '.join(units)}")
-        if unit not in units[quantity]:
+        if not isinstance(unit, str) or unit not in units[quantity]:
             known = ", ".join(f"'{name}'" for name in units[quantity])
             raise DesignError(f"[units] {quantity} is '{unit}'; known are {known}")
         per_si[quantity] = units[quantity][unit]
@@ -169,10 +175,10 @@ def load_tables(path: Path, build: Callable[[Mapping[str, Any]], Built], hint: s
         raise DesignError(f"{path}: {hint}") from None
     except (OSError, UnicodeDecodeError) as error:
         raise DesignError(f"{path}: cannot be read: {error}") from None
-    except tomllib.TOMLDecodeError as error:
-        raise DesignError(f"{path}: not valid TOML: {error}") from None
     except DesignError as error:
         raise DesignError(f"{path}: {error}") from None
+    except ValueError as error:  # TOMLDecodeError, or a whole number of thousands of digits
+        raise DesignError(f"{path}: not valid TOML: {error}") from None
 
 
 def design_to_mapping(design: LegDesign) -> dict[str, Any]:
@@ -212,8 +218,7 @@ def tables_to_toml(tables: Mapping[str, Any]) -> str:
 
 def _toml(value: object) -> str:
     if isinstance(value, str):
-        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
-        return f'"{escaped}"'
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, list):
         return "[" + ", ".join(_toml(entry) for entry in value) + "]"
     return repr(value)

@@ -8,6 +8,7 @@ import numpy as np
 from legbench.design import LegDesign, Segment
 from legbench.design.setup import Setup, SetupKind
 from legbench.design.statics import GRAVITY
+from legbench.errors import ConfigError
 from legbench.mjcf import look, sensors
 from legbench.mjcf.ground import Ground, add_world
 from legbench.mjcf.linkage import (
@@ -38,6 +39,9 @@ def build_spec(design: LegDesign, options: BuildOptions) -> mujoco.MjSpec:
     Coordinates: x forward, y to the left, z up, motion in the x-z plane. Joints `hip` = q1,
     `knee` = q2 - q1, `ankle` = q1 - q2; `trunk_x`, `trunk_z` where the trunk moves. Actuators
     `motor_1`, `motor_2` take motor positions [rad] and act through the series springs.
+
+    Raises:
+        ConfigError: the bars outweigh the trunk, or MuJoCo refuses a mass or an inertia.
     """
     setup, numerics = options.setup, options.numerics
     spec = mujoco.MjSpec()
@@ -51,7 +55,7 @@ def build_spec(design: LegDesign, options: BuildOptions) -> mujoco.MjSpec:
 
     height = hip_height(design, BENT)
     _add_trunk(spec, design, options, height)
-    _add_segments(spec, design)
+    _add_segments(spec, design, numerics)
     if options.linkage.kind is LinkageKind.BARS:
         add_bars(spec, design, options.linkage, numerics)
     else:
@@ -71,7 +75,7 @@ def _add_trunk(
     base = [0.0, 0.0, height] if not setup.trunk_moves or setup.boom_radius else [0.0, 0.0, 0.0]
     trunk = spec.worldbody.add_body(name="trunk", pos=base)
     trunk.explicitinertial = True
-    trunk.mass = design.trunk_mass - options.linkage.mass(design)
+    trunk.mass = _trunk_mass(design, options.linkage)
     trunk.ipos = np.array([0.0, 0.0, 0.03])
     trunk.inertia = np.array([5e-4, 7e-4, 7e-4])
     trunk.add_site(name="hip", size=[0.004] * 3, group=3)
@@ -87,7 +91,18 @@ def _add_trunk(
         trunk.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
 
 
-def _add_segments(spec: mujoco.MjSpec, design: LegDesign) -> None:
+def _trunk_mass(design: LegDesign, linkage: Linkage) -> float:
+    """What is left for the trunk, so that trunk, leg and bars weigh what the design says [kg]."""
+    bars = linkage.mass(design)
+    if bars >= design.trunk_mass:
+        raise ConfigError(
+            f"the bars weigh {bars:g} kg, which the trunk of {design.trunk_mass:g} kg is lightened "
+            "by: take lighter bars, a heavier trunk, or linkage 'reduced'"
+        )
+    return design.trunk_mass - bars
+
+
+def _add_segments(spec: mujoco.MjSpec, design: LegDesign, numerics: Numerics) -> None:
     parent, down = spec.body("trunk"), 0.0
     limits = {"hip": design.limits.hip, "knee": design.limits.knee, "ankle": None}
     names = ("thigh", "shank", "foot")
@@ -98,6 +113,8 @@ def _add_segments(spec: mujoco.MjSpec, design: LegDesign) -> None:
             hinge.damping = np.array(linear_damping(design.damping[0]))
         if (span := limits[joint]) is not None:
             hinge.limited, hinge.range = mujoco.mjtLimited.mjLIMITED_TRUE, span
+            hinge.solref_limit = np.array(numerics.stop_solref)
+            hinge.solimp_limit = np.array(numerics.stop_solimp)
         _set_inertia(body, segment)
         look.add_capsule(body, name, segment.length, 0.006, look.GREY)
         parent, down = body, segment.length
@@ -135,5 +152,9 @@ def _add_springs(spec: mujoco.MjSpec, design: LegDesign, kind: LinkageKind) -> N
 
 
 def _add_keyframe(spec: mujoco.MjSpec, design: LegDesign) -> None:
-    model = spec.compile()
+    try:
+        model = spec.compile()
+    except ValueError as error:
+        why = " ".join(str(error).split())
+        raise ConfigError(f"MuJoCo refuses the leg of design '{design.name}': {why}") from error
     spec.add_key(name="bent", qpos=rest_qpos(model, design, BENT).tolist(), ctrl=BENT.tolist())

@@ -1,5 +1,6 @@
 """What a leg stands on, hangs over or lies on."""
 
+import math
 from dataclasses import dataclass
 
 import mujoco
@@ -32,10 +33,12 @@ class Ground:
     """Of the foot tip that touches the ground [m]; by default a point, near enough."""
 
     def __post_init__(self) -> None:
-        if not self.friction >= 0.0:
-            raise ConfigError(f"friction is {self.friction:g}; it must be zero or more")
-        if not self.tip_radius > 0.0:
-            raise ConfigError(f"tip_radius is {self.tip_radius:g} m; it must be positive")
+        if not 0.0 <= self.friction < math.inf:
+            raise ConfigError(f"friction is {self.friction:g}; it must be finite, zero or more")
+        if not 0.0 < self.tip_radius < math.inf:
+            raise ConfigError(
+                f"tip_radius is {self.tip_radius:g} m; it must be positive and finite"
+            )
 
 
 def add_world(spec: mujoco.MjSpec, setup: Setup, ground: Ground, numerics: Numerics) -> None:

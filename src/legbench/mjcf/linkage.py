@@ -6,6 +6,7 @@ the shank hold the foot parallel to the thigh (black in Fig. 1). Cranks lie alon
 so the angle of both parallelograms is the knee angle q2 - q1.
 """
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -51,13 +52,15 @@ class Linkage:
     """Of hip crank and thigh extension [m]."""
 
     def __post_init__(self) -> None:
-        if not self.bar_density >= MIN_BAR_DENSITY:
+        if not MIN_BAR_DENSITY <= self.bar_density < math.inf:
             raise ConfigError(
                 f"bar_density is {self.bar_density:g} kg/m; from {MIN_BAR_DENSITY:g} kg/m on the "
                 "loops can be integrated, for massless bars use linkage 'reduced'"
             )
-        if not self.crank_length > 0.0:
-            raise ConfigError(f"crank_length is {self.crank_length:g} m; it must be positive")
+        if not 0.0 < self.crank_length < math.inf:
+            raise ConfigError(
+                f"crank_length is {self.crank_length:g} m; it must be positive and finite"
+            )
 
     def mass(self, design: LegDesign) -> float:
         """Of everything that the linkage adds to a leg [kg]."""

@@ -4,11 +4,16 @@ Ordinary settings dissipate: with the default solref a released undamped leg los
 energy within a second through the closed loops. RK4 and a time constant of two steps keep it.
 """
 
+import math
 from dataclasses import dataclass
 
 import mujoco
 
 from legbench.errors import ConfigError
+
+
+def _whole(value: float) -> bool:
+    return value > 0.5 and abs(value - round(value)) < 1e-9 * value
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,13 +31,14 @@ class Numerics:
     loop_solimp: tuple[float, float, float, float, float] = (0.9999, 0.9999, 0.001, 0.5, 2.0)
     contact_solref: tuple[float, float] = (0.001, 1.0)
     contact_solimp: tuple[float, float, float, float, float] = (0.9, 0.95, 0.001, 0.5, 2.0)
-    stop_solref: tuple[float, float] = (0.002, 1.0)
-    """Joint stops: rubber."""
+    stop_solref: tuple[float, float] = (0.02, 1.0)
+    """Joint stops: soft rubber."""
+    stop_solimp: tuple[float, float, float, float, float] = (0.9, 0.95, 0.001, 0.5, 2.0)
     iterations: int = 50
     tolerance: float = 1e-12
 
     def __post_init__(self) -> None:
-        if not self.timestep > 0.0 or abs(0.001 / self.timestep % 1.0) > 1e-9:
+        if not (0.0 < self.timestep < math.inf and _whole(0.001 / self.timestep)):
             raise ConfigError(
                 f"timestep is {self.timestep:g} s; it must divide the control period of 0.001 s"
             )
@@ -47,3 +53,4 @@ class Numerics:
         option.iterations = self.iterations
         option.tolerance = self.tolerance
         option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_REFSAFE)
+        option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)

@@ -22,7 +22,11 @@ LOOPS = {
 
 
 def add_sensors(spec: mujoco.MjSpec, kind: SetupKind, *, bars: bool) -> None:
-    """Add the sensors; position and velocity ones describe the state, forces the last step."""
+    """Add the sensors; position and velocity ones describe the state, forces the last step.
+
+    None of them is for energy: after RK4 the sensor of the kinetic energy still shows the last
+    intermediate stage. The plants read the energy of the state, which the model computes too.
+    """
 
     def add(name: str, kind: mujoco.mjtSensor, **target: Any) -> None:
         spec.add_sensor(name=name, type=kind, **target)
@@ -30,13 +34,11 @@ def add_sensors(spec: mujoco.MjSpec, kind: SetupKind, *, bars: bool) -> None:
     add("trunk_pos", mujoco.mjtSensor.mjSENS_FRAMEPOS, objtype=SITE, objname="hip")
     add("foot_pos", mujoco.mjtSensor.mjSENS_FRAMEPOS, objtype=SITE, objname="tip")
     add("trunk_vel", mujoco.mjtSensor.mjSENS_FRAMELINVEL, objtype=SITE, objname="hip")
-    add("energy_potential", mujoco.mjtSensor.mjSENS_E_POTENTIAL)
-    add("energy_kinetic", mujoco.mjtSensor.mjSENS_E_KINETIC)
     for name, (segment, bar) in LOOPS.items() if bars else ():
         frame = {"objtype": SITE, "objname": segment, "reftype": SITE, "refname": bar}
         add(name, mujoco.mjtSensor.mjSENS_FRAMEPOS, **frame)
     if kind is SetupKind.JUMP:
-        pair = {"objtype": GEOM, "objname": "tip", "reftype": GEOM, "refname": "ground"}
+        pair = {"objtype": GEOM, "objname": "ground", "reftype": GEOM, "refname": "tip"}
         reading = [FOUND_AND_FORCE, NET_FORCE, 1]
         add("contact", mujoco.mjtSensor.mjSENS_CONTACT, **pair, intprm=reading)
     if kind is SetupKind.FFS:
@@ -50,7 +52,6 @@ class SensorLayout:
     trunk_pos: slice
     trunk_vel: slice
     foot_pos: slice
-    energy: slice
     force: slice
     """Ground on foot; an empty-handed slice of zeros where nothing touches."""
     found: int | None
@@ -77,12 +78,10 @@ class SensorLayout:
         else:
             force = slice(0, 0)
         gaps = address.get("gap_thigh")
-        energy = address["energy_potential"]
         return cls(
             trunk_pos=plane(address["trunk_pos"]),
             trunk_vel=plane(address["trunk_vel"]),
             foot_pos=plane(address["foot_pos"]),
-            energy=slice(energy, energy + 2),
             force=force,
             found=found,
             always_contact=pinned,

@@ -9,12 +9,20 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 
 import mujoco
+import numpy as np
 
 EXACT: dict[str, dict[str, str]] = {
     "inertial": {"pos": "ipos", "mass": "mass", "diaginertia": "inertia"},
     "body": {"pos": "pos"},
-    "joint": {"range": "range", "damping": "damping", "pos": "pos"},
+    "joint": {
+        "range": "range",
+        "damping": "damping",
+        "pos": "pos",
+        "solreflimit": "solref_limit",
+        "solimplimit": "solimp_limit",
+    },
     "site": {"pos": "pos"},
+    "geom": {"pos": "pos", "size": "size"},
     "fixed": {"damping": "damping"},
     "connect": {"solref": "solref", "solimp": "solimp"},
     "pair": {"solref": "solref", "solimp": "solimp", "friction": "friction"},
@@ -57,10 +65,12 @@ def _child(root: ET.Element, tag: str) -> ET.Element:
 
 
 def _objects(spec: mujoco.MjSpec) -> dict[tuple[str, str], object]:
+    """By tag and name; geoms that are given by their two ends are looks alone and left out."""
     lists: dict[str, Iterable[object]] = {
         "body": spec.bodies,
         "joint": spec.joints,
         "site": spec.sites,
+        "geom": [geom for geom in spec.geoms if np.isnan(geom.fromto[0])],
         "fixed": spec.tendons,
         "connect": spec.equalities,
         "equality": spec.equalities,
@@ -79,6 +89,7 @@ def _write_fields(element: ET.Element, held: object, fields: dict[str, str]) -> 
     """Replace the attributes that are there; constraint settings are written in any case."""
     for attribute, field in fields.items():
         always = attribute in ("solref", "solimp")
+        always |= attribute in ("solreflimit", "solimplimit") and "range" in element.attrib
         if not always and attribute not in element.attrib:
             continue
         value = getattr(held, field)

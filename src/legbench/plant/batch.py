@@ -29,7 +29,8 @@ class BatchPlant(AbstractPlant):
     Attributes:
         model: the first leg's compiled model.
         threads: how many threads step the legs.
-        faulted: which legs have left their branch or diverged (n,).
+        faulted: which legs have left their branch, diverged or had a command that was no
+            number (n,).
 
     Raises:
         ConfigError: no design, or a start that is not one row a leg.
@@ -45,11 +46,12 @@ class BatchPlant(AbstractPlant):
     ) -> None:
         if not designs:
             raise ConfigError("a batch needs at least one design")
-        if start.joint_pos.shape != (len(designs), 2):
-            raise ConfigError(
-                f"start posture has shape {start.joint_pos.shape}; {len(designs)} designs need "
-                f"({len(designs)}, 2)"
-            )
+        for what, array in (("posture", start.joint_pos), ("motors", start.motor_pos)):
+            if array.shape != (len(designs), 2):
+                raise ConfigError(
+                    f"start {what} has shape {array.shape}; {len(designs)} designs need "
+                    f"({len(designs)}, 2)"
+                )
         self.period = PERIOD
         models = _models(designs, options)
         self.model = models[0]
@@ -70,7 +72,7 @@ class BatchPlant(AbstractPlant):
         self._sensors = SensorLayout.of(models[0])
         self._qpos, self._qvel = self._batch.bind("qpos"), self._batch.bind("qvel")
         self._ctrl = self._batch.bind("ctrl")
-        self._sensordata = self._batch.bind("sensordata")
+        self._sensordata, self._energy = self._batch.bind("sensordata"), self._batch.bind("energy")
         self.faulted: Bools = np.zeros(len(designs), dtype=np.bool_)
         self._cycle = 0
 
@@ -87,6 +89,7 @@ class BatchPlant(AbstractPlant):
 
     def step(self, command: Command) -> Observation:
         """Apply each leg's command over one period of substeps."""
+        self.faulted = self.faulted | ~np.isfinite(command.motor_pos).all(axis=-1)
         self._ctrl[:] = self._servo.follow(command.motor_pos)
         try:
             self._batch.step(nstep=self._substeps, stage=int(mujoco.mjtStage.mjSTAGE_VEL))
@@ -105,6 +108,7 @@ class BatchPlant(AbstractPlant):
             qpos=self._qpos,
             qvel=self._qvel,
             sensordata=self._sensordata,
+            energy=self._energy,
             joints=self._joints,
             sensors=self._sensors,
             stiffness=self._stiffness,

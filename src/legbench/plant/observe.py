@@ -14,6 +14,8 @@ CROSSED_TOLERANCE = 0.05
 of a healthy leg stay within 1e-4."""
 STRAIGHT_MARGIN = 0.02
 """A knee this close to 0 or pi has gone through its stop [rad]."""
+DIVERGED = 1e3
+"""No coordinate of a leg ever gets this far [rad or m]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,6 +51,8 @@ def absolute(layout: JointLayout, coordinates: Floats) -> Floats:
 def branch_fault(layout: JointLayout, qpos: Floats) -> str | None:
     """Name what happened to a leg (nq,) that is no longer the pantograph it was built as."""
     angles = qpos.tolist()
+    if not all(-DIVERGED < angle < DIVERGED for angle in angles):
+        return "simulation diverged"
     knee = angles[layout.knee]
     if knee < STRAIGHT_MARGIN:
         return "leg straightened through"
@@ -66,7 +70,8 @@ def branch_fault(layout: JointLayout, qpos: Floats) -> str | None:
 def branch_fault_mask(layout: JointLayout, qpos: Floats) -> Bools:
     """Which legs of a batch (n, nq) `branch_fault` would name; (n,)."""
     knee = qpos[:, layout.knee]
-    fault = (knee < STRAIGHT_MARGIN) | (knee > np.pi - STRAIGHT_MARGIN)
+    fault = ~np.all(np.abs(qpos) < DIVERGED, axis=-1)
+    fault |= (knee < STRAIGHT_MARGIN) | (knee > np.pi - STRAIGHT_MARGIN)
     fault |= np.abs(qpos[:, layout.ankle] + knee) > CROSSED_TOLERANCE
     if layout.crank is not None:
         lag = qpos[:, layout.crank] - qpos[:, layout.hip] - knee
@@ -80,6 +85,7 @@ def observe(
     qpos: Floats,
     qvel: Floats,
     sensordata: Floats,
+    energy: Floats,
     joints: JointLayout,
     sensors: SensorLayout,
     stiffness: Floats,
@@ -87,7 +93,7 @@ def observe(
     motor_pos: Floats,
     applied_pos: Floats,
 ) -> Observation:
-    """Build the observation of the current state; nothing in it aliases the simulation."""
+    """Build the observation of the current state; nothing in it aliases simulation or command."""
     joint_pos = servo.encode(absolute(joints, qpos))
     motor_pos = servo.encode(motor_pos)
     values = sensordata.copy()
@@ -97,7 +103,7 @@ def observe(
         foot_pos=values[..., sensors.foot_pos],
         contact_force=sensors.force_of(values),
         contact=sensors.contact_of(values),
-        energy=values[..., sensors.energy],
+        energy=energy.copy(),
         loop_gap=sensors.gap_of(values),
     )
     return Observation(
@@ -106,6 +112,6 @@ def observe(
         joint_pos=joint_pos,
         joint_vel=absolute(joints, qvel),
         spring_torque=stiffness * (motor_pos - joint_pos),
-        applied_pos=applied_pos,
+        applied_pos=applied_pos.copy(),
         truth=truth,
     )

@@ -1,5 +1,6 @@
 """One leg in MuJoCo."""
 
+import math
 from typing import final
 
 import mujoco
@@ -46,6 +47,7 @@ class SimPlant(AbstractPlant):
         self._sensors = SensorLayout.of(self.model)
         self._qpos, self._qvel = self.data.qpos, self.data.qvel
         self._ctrl, self._sensordata = self.data.ctrl, self.data.sensordata
+        self._energy = self.data.energy
         self._cycle = 0
 
     def reset(self) -> Observation:
@@ -62,9 +64,15 @@ class SimPlant(AbstractPlant):
         """Apply a command over one period of substeps.
 
         Raises:
-            PlantFault: the simulation diverged, or the leg left its branch: it straightened or
-                folded through, or a bar loop crossed.
+            PlantFault: the command is not finite, the simulation diverged, or the leg left its
+                branch: it straightened or folded through, or a bar loop crossed.
         """
+        if not all(map(math.isfinite, command.motor_pos.tolist())):
+            raise PlantFault(
+                "command not finite",
+                f"commanded motor positions are {command.motor_pos} rad at t = "
+                f"{self._cycle * PERIOD:.3f} s; the controller must give finite numbers",
+            )
         self._ctrl[:] = self._servo.follow(command.motor_pos)
         try:
             mujoco.mj_step(self.model, self.data, self._substeps)
@@ -89,6 +97,7 @@ class SimPlant(AbstractPlant):
             qpos=self._qpos,
             qvel=self._qvel,
             sensordata=self._sensordata,
+            energy=self._energy,
             joints=self._joints,
             sensors=self._sensors,
             stiffness=self._stiffness,

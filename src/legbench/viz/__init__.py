@@ -1,0 +1,1 @@
+"""From a recording to pictures: rerun, print figures, rendered video. Reads recordings only."""

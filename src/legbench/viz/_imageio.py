@@ -1,0 +1,16 @@
+"""The one door to video and image files."""
+
+from legbench.errors import MissingExtraError
+
+try:
+    import av as _av  # noqa: F401
+    import imageio.v3 as iio
+    from imageio.plugins.pyav import PyAVPlugin
+    from PIL import Image
+except ImportError as error:
+    raise MissingExtraError(
+        "imageio, PyAV or Pillow is not installed; rendering needs them: "
+        "pip install 'legbench[render]'"
+    ) from error
+
+__all__ = ["Image", "PyAVPlugin", "iio"]

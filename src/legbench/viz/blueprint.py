@@ -1,0 +1,74 @@
+"""How the viewer lays out what `publish` logs."""
+
+from legbench.viz._rerun import rr, rrb
+from legbench.viz.facts import Facts
+from legbench.viz.leg2d import leg_view
+from legbench.viz.plots import plot_specs
+from legbench.viz.scene import scene_view
+from legbench.viz.states import states_view
+from legbench.viz.xyplot import plot_view
+
+WINDOW = 4.0
+"""Time that series show while a run is going on [s]."""
+
+
+def blueprint(facts: Facts, *, room: tuple[float, float], live: bool = False) -> rrb.Blueprint:
+    """The layout: leg and facts, the four planes, the signals over time.
+
+    Args:
+        facts: of the run.
+        room: lowest and highest point that the pictures of the leg show [m].
+        live: follow the newest rows and let the series slide.
+    """
+    plots = {name: plot_view(spec) for name, spec in plot_specs(facts).items()}
+    pictures = [leg_view(room), *([scene_view(room)] if facts.model else [])]
+    left = rrb.Vertical(
+        rrb.Tabs(*pictures),
+        states_view(),
+        rrb.TextDocumentView(origin="/run", name="run"),
+        row_shares=[5, 1.5, 2.6],
+    )
+    middle = rrb.Vertical(
+        rrb.Horizontal(plots["polar"], plots["joint"]),
+        rrb.Horizontal(plots["periods"], plots["phases"]),
+    )
+    panels = rrb.TimePanel(
+        state="collapsed", timeline="t", play_state="following" if live else None
+    )
+    return rrb.Blueprint(
+        rrb.Horizontal(left, middle, _series(live), column_shares=[2, 5, 3.2]),
+        panels,
+        collapse_panels=True,
+        auto_views=False,
+    )
+
+
+def _series(live: bool) -> rrb.Vertical:
+    axis = rrb.TimeAxis(view_range=_window()) if live else None
+
+    def view(path: str, name: str) -> rrb.TimeSeriesView:
+        return rrb.TimeSeriesView(
+            origin=f"/series/{path}",
+            name=name,
+            axis_x=axis,
+            plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop),
+        )
+
+    return rrb.Vertical(
+        view("joint", "joints and motor targets [rad]"),
+        view("torque", "spring torque [N m]"),
+        rrb.Tabs(
+            view("force", "contact force [N]"),
+            view("height", "height [m]"),
+            view("energy", "energy [J]"),
+        ),
+        view("rating", "P^r [-]"),
+        view("cycle", "control cycle [us]"),
+    )
+
+
+def _window() -> rr.TimeRange:
+    return rr.TimeRange(
+        start=rr.TimeRangeBoundary.cursor_relative(seconds=-WINDOW),
+        end=rr.TimeRangeBoundary.cursor_relative(),
+    )

@@ -1,0 +1,98 @@
+"""Which rows of a run a figure shows, in which colour: by period, or by stance and flight."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from legbench.metrics.periods import find_periods
+from legbench.metrics.phases import find_gait
+from legbench.metrics.ratings import rate_run
+from legbench.metrics.source import Recorded, terms_of
+from legbench.metrics.stance import STANCE, states_of
+from legbench.signals import Floats
+from legbench.viz import style
+
+LAST_JUMPS = 3
+"""Jumps in full colour, as in Fig. 6; earlier ones are drawn faintly."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stretch:
+    """Rows [first, stop) in one colour."""
+
+    first: int
+    stop: int
+    colour: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Colouring:
+    """What a figure's lines show."""
+
+    stretches: tuple[Stretch, ...]
+    """Highlighted rows in order."""
+    periods: int = 0
+    """How many periods the colours count; zero for stance and flight."""
+    ratings: str = ""
+    """P^r in words."""
+
+
+def colouring_of(recording: Recorded) -> Colouring:
+    """Colour a jump's last jumps by stance and flight, any other run by period."""
+    gait = find_gait(recording)
+    ratings = rate_run(recording, terms_of(recording.manifest), gait)
+    if len(gait.jumps):
+        begin, end = gait.jumps.start[-LAST_JUMPS:][0], gait.jumps.end[-1]
+        first, stop = np.searchsorted(recording.time, [begin, end])
+        return Colouring(
+            stretches=_by_stance(recording, int(first), int(stop)),
+            ratings=_jump_ratings(ratings["rating_stance"], ratings["rating_flight"]),
+        )
+    periods = find_periods(recording)
+    count = len(periods)
+    colours = style.viridis(np.linspace(0.0, 0.95, max(count, 2)))[:count] / 255.0
+    return Colouring(
+        stretches=tuple(
+            Stretch(first=int(first), stop=int(stop), colour=(r, g, b))
+            for first, stop, (r, g, b) in zip(
+                periods.first, periods.stop, colours.tolist(), strict=True
+            )
+        ),
+        periods=count,
+        ratings=_period_ratings(ratings["rating_periods"]),
+    )
+
+
+def _by_stance(recording: Recorded, first: int, stop: int) -> tuple[Stretch, ...]:
+    stands = states_of(recording)[first:stop] == STANCE
+    edges = [0, *(np.flatnonzero(np.diff(stands)) + 1).tolist(), stop - first]
+    return tuple(
+        Stretch(
+            first=first + low,
+            stop=first + high,
+            colour=style.unit(style.STANCE if stands[low] else style.FLIGHT),
+        )
+        for low, high in pairwise(edges)
+    )
+
+
+def _jump_ratings(stance: list[float], flight: list[float]) -> str:
+    parts = [
+        f"$P^r_{{{name}}}$ = {np.nanmean(values[-LAST_JUMPS:]):.3f}"
+        for name, values in (("st", stance), ("fl", flight))
+        if _any_finite(values)
+    ]
+    return ", ".join(parts) + f" (last {LAST_JUMPS} jumps)" if parts else ""
+
+
+def _period_ratings(values: list[float]) -> str:
+    if not _any_finite(values):
+        return ""
+    last = len(values)
+    ends = f"$P^r_1$ = {values[0]:.3f}, $P^r_{{{last}}}$ = {values[-1]:.3f}"
+    return f"{ends}, mean {np.nanmean(values):.3f}"
+
+
+def _any_finite(values: list[float] | Floats) -> bool:
+    return bool(np.isfinite(values).any())

@@ -1,0 +1,38 @@
+"""Files that appear whole or not at all."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from legbench.errors import RecordingError
+from legbench.recording.reader import Recording
+
+
+@contextmanager
+def draft_of(path: Path) -> Iterator[Path]:
+    """Give a file to write in `path`'s place, with its suffix; put it there when all went well.
+
+    Raises:
+        RecordingError: nothing can be written there.
+    """
+    draft = path.with_name(f".{path.stem}.draft{path.suffix}")
+    try:
+        draft.touch()
+    except OSError as error:
+        raise RecordingError(f"cannot write {path}: {error.strerror}") from error
+    try:
+        yield draft
+        os.replace(draft, path)
+    finally:
+        draft.unlink(missing_ok=True)
+
+
+def require_rows(recording: Recording) -> None:
+    """Check that there is something to draw.
+
+    Raises:
+        RecordingError: the run ended before its first row.
+    """
+    if len(recording.time) == 0:
+        raise RecordingError(f"{recording.path} has no rows: there is nothing to draw")

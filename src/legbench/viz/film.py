@@ -1,0 +1,101 @@
+"""Pictures of a run's model at given rows."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import final
+
+import mujoco
+import numpy as np
+
+from legbench.errors import RecordingError
+from legbench.kinematics import leg_points
+from legbench.recording.reader import Recording
+from legbench.signals import Floats, Ints
+from legbench.viz.drafts import require_rows
+from legbench.viz.facts import MODEL, facts_of
+from legbench.viz.leg2d import hip_of
+from legbench.viz.offscreen import Image, OffScreen
+from legbench.viz.pose import Puppet
+
+CAMERA = "side"
+CALM = 0.5
+"""The camera follows the mean of the hip over this time, not each sway [s]."""
+
+
+ABOVE, BELOW = 0.10, 0.06
+"""Room over the highest hip, for the trunk, and under the lowest foot [m]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Size:
+    """Of an image [pixels]; even, as video encoders ask."""
+
+    width: int
+    height: int
+
+
+@final
+class Film:
+    """A run's model, ready to be photographed from the side.
+
+    Raises:
+        RecordingError: the run has no rows, or no model with a camera.
+    """
+
+    def __init__(self, recording: Recording) -> None:
+        require_rows(recording)
+        facts = facts_of(recording.manifest, recording.path)
+        self._puppet = Puppet(recording.path / MODEL)
+        model = self._puppet.model
+        self._camera = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_CAMERA, CAMERA)
+        if self._camera < 0:
+            raise RecordingError(f"{recording.path / MODEL} has no camera {CAMERA!r}")
+        self._hip = self._puppet.hip(hip_of(recording, facts))
+        self._joint = recording["joint_pos"]
+        self._time = recording.time
+        self._start = self._frame(leg_points(self._joint, facts.design.lengths))
+
+    def shoot(self, rows: Ints, size: Size, *, follow: bool = True) -> Iterator[Image]:
+        """Images of the rows, one after the other; the camera moves along, or stays amid them.
+
+        Raises:
+            MissingExtraError: the machine has no OpenGL that works.
+        """
+        model, data = self._puppet.model, self._puppet.data
+        path = self._start + self._ahead(rows, follow)[:, None] * [1.0, 0.0, 0.0]
+        scene = mujoco.MjvScene(model, maxgeom=200)
+        option, perturb, camera = mujoco.MjvOption(), mujoco.MjvPerturb(), mujoco.MjvCamera()
+        camera.type, camera.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, self._camera
+        with OffScreen(model, size.width, size.height) as screen:
+            qpos = self._puppet.positions(self._hip[rows], self._joint[rows])
+            for place, eye in zip(qpos, path, strict=True):
+                model.cam_pos[self._camera] = eye
+                self._puppet.pose(place)
+                mujoco.mj_camlight(model, data)
+                everything = mujoco.mjtCatBit.mjCAT_ALL.value
+                mujoco.mjv_updateScene(model, data, option, perturb, camera, everything, scene)
+                scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = False
+                yield screen.draw(scene)
+
+    def _frame(self, points: Floats) -> Floats:
+        """Where the camera must stand (3,) to see every height that trunk and leg reach [m]."""
+        model, data = self._puppet.model, self._puppet.data
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_camlight(model, data)
+        heights = self._hip[:, 1:] + points[..., 1]
+        low, high = heights.min() - BELOW, heights.max() + ABOVE
+        half_angle = 0.5 * np.radians(model.cam_fovy[self._camera])
+        distance = 0.5 * (high - low) / np.tan(half_angle)
+        backwards = data.cam_xmat[self._camera].reshape(3, 3)[:, 2]
+        return np.array([0.0, 0.0, 0.5 * (low + high)]) + distance * backwards
+
+    def _ahead(self, rows: Ints, follow: bool) -> Floats:
+        """How far the camera has gone with the hip (m,) [m]."""
+        forward = self._hip[:, 0]
+        if not follow:
+            return np.full(len(rows), forward[rows].mean())
+        sums = np.concatenate([[0.0], np.cumsum(forward)])
+        half = 0.5 * CALM
+        first = np.searchsorted(self._time, self._time[rows] - half)
+        stop = np.searchsorted(self._time, self._time[rows] + half, side="right")
+        return (sums[stop] - sums[first]) / (stop - first)

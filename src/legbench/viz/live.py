@@ -1,0 +1,75 @@
+"""Watching a run while it goes on, in a process that the control loop never waits for.
+
+The process runs `legbench.viz.watch`, which reads the run folder and never the loop: frozen or
+killed, it costs the run nothing. Importing this module does not import rerun.
+"""
+
+import os
+import subprocess
+import sys
+from contextlib import suppress
+from pathlib import Path
+from typing import final
+
+from legbench.viz import viewer
+
+
+@final
+class LiveView:
+    """A live view that has been started.
+
+    Attributes:
+        url: of the page to open in a browser; None for a window.
+    """
+
+    def __init__(self, process: "subprocess.Popen[bytes]", url: str | None) -> None:
+        self._process = process
+        self.url = url
+
+    @property
+    def pid(self) -> int:
+        """Of the program that follows the run."""
+        return self._process.pid
+
+    @property
+    def alive(self) -> bool:
+        """Whether the program still follows the run."""
+        return self._process.poll() is None
+
+    def stop(self) -> None:
+        """Have the last rows shown, and no more; returns at once whatever state the view is in.
+
+        A window stays open, a page is no longer served.
+        """
+        with suppress(OSError):
+            self._process.terminate()
+        viewer.forget(self._process)
+
+
+def start_live(
+    run_folder: Path,
+    *,
+    serve: bool = False,
+    port: int = viewer.PORT,
+    save: Path | None = None,
+) -> LiveView:
+    """Start watching a run that is about to write its first row.
+
+    Args:
+        run_folder: of the run; its manifest is there.
+        serve: to a browser on this machine rather than in a window.
+        port: of the viewer; one that already listens is used.
+        save: write an `.rrd` file instead of opening a viewer.
+
+    Raises:
+        MissingExtraError: rerun is not installed, or there is no display for a window; a run
+            goes on without.
+    """
+    if save is None:
+        way_out = "the run goes on unseen; look at it afterwards, or serve it to a browser"
+        viewer.require_viewer(serve=serve, way_out=way_out)
+    command = [sys.executable, "-m", "legbench.viz.watch", str(run_folder), "--port", str(port)]
+    command += ["--parent", str(os.getpid())]
+    command += ["--serve"] if serve else []
+    command += [] if save is None else ["--save", str(save)]
+    return LiveView(viewer.spawn(command), viewer.web_url(port) if serve else None)

@@ -1,0 +1,103 @@
+"""The four XY plots of a run: polar, joint space, modal phase twice."""
+
+from typing import final
+
+import numpy as np
+
+from legbench.signals import Floats
+from legbench.viz import style
+from legbench.viz._rerun import rr
+from legbench.viz.axes import PlotSpec
+from legbench.viz.facts import Facts
+from legbench.viz.trace import Thinner, Trace
+from legbench.viz.xyplot import XYPlot
+
+FREQ = 200.0
+"""Of the trajectories: a period has a hundred points [Hz]."""
+
+
+def plot_specs(facts: Facts) -> dict[str, PlotSpec]:
+    """The plots by name; jumps are coloured by stance and flight, the rest by period."""
+    coloured = "stance / flight" if facts.jumps else "periods"
+    return {
+        "polar": PlotSpec(
+            path="/plots/polar",
+            title=f"{style.POLAR}: {coloured}",
+            x=style.X1,
+            y=style.X2,
+            least=(style.POLAR_LEAST, 0.0),
+        ),
+        "joint": PlotSpec(
+            path="/plots/joint",
+            title=f"{style.JOINT}: {coloured}",
+            x=style.Q1,
+            y=style.Q2,
+            equal=True,
+            margin=0.12,
+            through=facts.rest,
+        ),
+        "periods": PlotSpec(
+            path="/plots/periods",
+            title=f"{style.MODAL}: {'jumps' if facts.jumps else 'periods'}",
+            x=style.Z2,
+            y=style.DZ2,
+        ),
+        "phases": PlotSpec(
+            path="/plots/phases", title=f"{style.MODAL}: {_phases(facts)}", x=style.Z2, y=style.DZ2
+        ),
+    }
+
+
+def _phases(facts: Facts) -> str:
+    return "stance / flight" if facts.jumps else "controller"
+
+
+@final
+class Plots:
+    """Publishes trajectories in the four planes."""
+
+    def __init__(self, stream: rr.RecordingStream, facts: Facts) -> None:
+        self._jumps = facts.jumps
+        self._plots = {name: XYPlot(stream, spec) for name, spec in plot_specs(facts).items()}
+        self._thinner = Thinner(FREQ)
+        self._seen: dict[str, list[Floats]] = {name: [] for name in self._plots}
+
+    def push(self, trace: Trace) -> None:
+        """Add rows to the trails."""
+        kept = self._thinner.pick(trace.time)
+        if len(kept) == 0:
+            return
+        periods = style.period_colours(trace.period[kept])
+        phases = _phase_colours(trace, self._jumps)[kept]
+        for name, plot in self._plots.items():
+            points = _points(trace, name)[kept]
+            seen = self._seen[name]
+            before = seen[-1][-1:] if seen else points[:1]
+            seen.append(points)
+            plot.cover(points)
+            by_phase = name == "phases" or (self._jumps and name != "periods")
+            plot.push(
+                trace.time[kept],
+                np.concatenate([before, points]),
+                phases if by_phase else periods,
+            )
+
+    def finish(self) -> None:
+        """Draw the whole run behind the trails."""
+        for name, plot in self._plots.items():
+            if seen := self._seen[name]:
+                plot.ghost(np.concatenate(seen))
+
+
+def _points(trace: Trace, name: str) -> Floats:
+    planes = {"polar": trace.polar, "joint": trace.joint}
+    return planes.get(name, trace.modal)
+
+
+def _phase_colours(trace: Trace, jumps: bool) -> style.Colours:
+    if jumps:
+        return style.stance_colours(trace.stance)
+    palette = np.zeros((max(style.PHASES) + 1, 3), dtype=np.uint8)
+    for phase, colour in style.PHASES.items():
+        palette[phase] = colour
+    return palette[trace.rows["phase"]]

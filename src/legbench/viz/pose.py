@@ -1,0 +1,73 @@
+"""From joint angles to poses of a run's own MuJoCo model."""
+
+from pathlib import Path
+from typing import final
+
+import mujoco
+import numpy as np
+
+from legbench.errors import RecordingError
+from legbench.signals import Floats
+
+
+@final
+class Puppet:
+    """A run's model, moved by its recorded angles; no physics runs.
+
+    Raises:
+        RecordingError: there is no model, or MuJoCo refuses it.
+    """
+
+    def __init__(self, path: Path) -> None:
+        if not path.is_file():
+            raise RecordingError(
+                f"{path} does not exist: the run keeps no model to draw; "
+                "write the run again with this version"
+            )
+        try:
+            self.model = mujoco.MjModel.from_xml_path(str(path))
+        except ValueError as error:
+            raise RecordingError(f"{path}: MuJoCo refuses the model: {error}") from error
+        self.data = mujoco.MjData(self.model)
+        self._places = {
+            self.model.joint(index).name: int(self.model.jnt_qposadr[index])
+            for index in range(self.model.njnt)
+        }
+
+    def hip(self, recorded: Floats) -> Floats:
+        """Where the model's hip will be (n, 2) [m]: where a trunk that cannot move is fixed."""
+        if any(name in self._places for name in ("trunk_x", "boom_yaw")):
+            return recorded
+        return np.tile(self.model.body("trunk").pos[[0, 2]], (len(recorded), 1))
+
+    def positions(self, hip: Floats, joint: Floats) -> Floats:
+        """MuJoCo's qpos (n, nq) of a hip path and joint angles, each (n, 2) [m], [rad]."""
+        knee = joint[:, 1] - joint[:, 0]
+        angles = {
+            "hip": joint[:, 0],
+            "knee": knee,
+            "ankle": -knee,
+            "crank": joint[:, 1],
+            "bar_thigh": -knee,
+            "bar_shank": knee,
+            **self._trunk(hip),
+        }
+        qpos = np.tile(self.model.qpos0, (len(joint), 1))
+        for name, values in angles.items():
+            if name in self._places:
+                qpos[:, self._places[name]] = values
+        return qpos
+
+    def pose(self, qpos: Floats) -> None:
+        """Put the model into one posture (nq,): `data.xpos`, `data.geom_xpos` and so on."""
+        self.data.qpos[:] = qpos
+        mujoco.mj_kinematics(self.model, self.data)
+
+    def _trunk(self, hip: Floats) -> dict[str, Floats]:
+        """The trunk's joints that put the hip there, on slides or on a boom."""
+        shift = hip - self.model.body("trunk").pos[[0, 2]]
+        if "boom_yaw" not in self._places:
+            return {"trunk_x": shift[:, 0], "trunk_z": shift[:, 1]}
+        radius = float(np.linalg.norm(self.model.joint("boom_yaw").pos))
+        roll = np.arcsin(shift[:, 1] / radius)
+        return {"boom_roll": roll, "boom_yaw": -np.arcsin(shift[:, 0] / (radius * np.cos(roll)))}

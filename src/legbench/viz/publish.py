@@ -1,0 +1,69 @@
+"""What a run shows in rerun: the only code that knows which entity carries what.
+
+A run is published whole, or in slices while it is still going on; both give the same entities
+with the same rows.
+"""
+
+from typing import final
+
+from legbench.metrics.source import Recorded
+from legbench.metrics.summary import Summary
+from legbench.viz._rerun import rr
+from legbench.viz.blueprint import blueprint
+from legbench.viz.facts import Facts, as_markdown
+from legbench.viz.leg2d import Leg2D, hip_of, leg_room
+from legbench.viz.plots import Plots
+from legbench.viz.rating import Rating
+from legbench.viz.scene import Scene
+from legbench.viz.series import Series
+from legbench.viz.states import States
+from legbench.viz.trace import Tracer
+
+APPLICATION = "legbench"
+"""Under which the viewer keeps the layout that a user arranged."""
+
+
+@final
+class Publisher:
+    """Publishes consecutive rows of one run into a recording stream."""
+
+    def __init__(self, stream: rr.RecordingStream, facts: Facts, *, live: bool = False) -> None:
+        self._stream = stream
+        self._facts = facts
+        self._live = live
+        self._tracer = Tracer(facts)
+        self._laid_out = False
+        self._plots = Plots(stream, facts)
+        self._sections = (
+            self._plots,
+            Leg2D(stream, facts),
+            Scene(stream, facts),
+            States(stream, facts),
+            Series(stream),
+            Rating(stream, facts),
+        )
+        self.describe(facts)
+
+    def describe(self, facts: Facts, summary: Summary | None = None) -> None:
+        """Show a run's facts; again once it has ended and is rated."""
+        text = as_markdown(facts, summary)
+        document = rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
+        self._stream.log("/run", document, static=True)
+
+    def push(self, rows: Recorded) -> None:
+        """Add the rows that follow those pushed before."""
+        if len(rows.time) == 0:
+            return
+        trace = self._tracer.extend(rows)
+        if not self._laid_out:
+            hip = hip_of(rows, self._facts)
+            room = leg_room(self._facts, hip, live=self._live)
+            layout = blueprint(self._facts, room=room, live=self._live)
+            self._stream.send_blueprint(layout)
+            self._laid_out = True
+        for section in self._sections:
+            section.push(trace)
+
+    def finish(self) -> None:
+        """Add what only a finished run has."""
+        self._plots.finish()

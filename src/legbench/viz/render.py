@@ -1,0 +1,137 @@
+"""A run as a video, an animation or a series of stills, drawn from its own MuJoCo model."""
+
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+
+from legbench.errors import ConfigError
+from legbench.metrics.periods import find_periods
+from legbench.metrics.phases import find_gait
+from legbench.recording.reader import Recording
+from legbench.signals import Ints
+from legbench.viz._imageio import Image as Picture
+from legbench.viz._imageio import PyAVPlugin, iio
+from legbench.viz.drafts import draft_of
+from legbench.viz.film import Film, Size
+from legbench.viz.offscreen import Image
+
+SUFFIXES = (".mp4", ".gif", ".png")
+VIDEO, ANIMATION = Size(width=800, height=600), Size(width=480, height=360)
+FRAME, STILL = Size(width=960, height=720), Size(width=240, height=420)
+VIDEO_FPS, ANIMATION_FPS = 30, 20
+"""GIF counts in hundredths of a second, so 20 a second is exact and 30 is not."""
+GAP = 3
+"""Between stills [pixels]."""
+STILLS = 7
+"""From one lower apex to the next, as in Fig. 7."""
+
+Progress = Callable[[int, int], None]
+"""Called with the frames done and the frames in all."""
+
+
+def render(
+    recording: Recording,
+    path: Path,
+    *,
+    time: float | None = None,
+    progress: Progress | None = None,
+) -> Path:
+    """Draw a run: .mp4 and .gif in real time, .png as stills of one jump or period.
+
+    Args:
+        recording: the run, whose folder holds its model.
+        path: where to; an older file is replaced when the new one is whole.
+        time: for a .png, the one instant to draw [s].
+        progress: told after each frame.
+
+    Raises:
+        ConfigError: another suffix, or a `time` that is outside the run or not for a .png.
+        RecordingError: the run has no rows or no model, or nothing can be written there.
+        MissingExtraError: the machine has no OpenGL that works.
+    """
+    kind = path.suffix.lower()
+    if kind not in SUFFIXES:
+        known = ", ".join(SUFFIXES)
+        raise ConfigError(f"a run cannot be rendered as {path.name!r}; choose from {known}")
+    if time is not None and kind != ".png":
+        raise ConfigError(f"time = {time:g} s draws one frame; write it to a .png, not a {kind}")
+    film = Film(recording)
+    with draft_of(path) as draft:
+        if kind == ".png":
+            _write_stills(draft, film, recording, time, progress)
+        else:
+            fps, size = (VIDEO_FPS, VIDEO) if kind == ".mp4" else (ANIMATION_FPS, ANIMATION)
+            rows = _frames(recording, fps)
+            write = _write_video if kind == ".mp4" else _write_animation
+            write(draft, _told(film.shoot(rows, size), len(rows), progress))
+    return path
+
+
+def _frames(recording: Recording, fps: int) -> Ints:
+    """Rows that a video in real time shows."""
+    time = recording.time
+    instants = np.arange(time[0], time[-1] + 0.5 / fps, 1.0 / fps)
+    return np.minimum(np.searchsorted(time, instants), len(time) - 1)
+
+
+def _told(images: Iterable[Image], count: int, progress: Progress | None) -> Iterator[Image]:
+    for done, image in enumerate(images, start=1):
+        yield image
+        if progress is not None:
+            progress(done, count)
+
+
+def _write_video(path: Path, images: Iterator[Image]) -> None:
+    with iio.imopen(path, "w", plugin="pyav") as file:
+        video = cast(PyAVPlugin, file)
+        video.init_video_stream("libx264", fps=VIDEO_FPS, pixel_format="yuv420p")
+        for image in images:
+            video.write_frame(image)
+
+
+def _write_animation(path: Path, images: Iterator[Image]) -> None:
+    pictures = (Picture.fromarray(image).quantize(128) for image in images)
+    first = next(pictures)
+    first.save(
+        path,
+        format="GIF",
+        save_all=True,
+        append_images=pictures,
+        duration=1000 // ANIMATION_FPS,
+        loop=0,
+    )
+
+
+def _write_stills(
+    path: Path,
+    film: Film,
+    recording: Recording,
+    time: float | None,
+    progress: Progress | None,
+) -> None:
+    rows = _still_rows(recording) if time is None else _row_at(recording, time)
+    size = STILL if time is None else FRAME
+    images = list(_told(film.shoot(rows, size, follow=False), len(rows), progress))
+    white = np.full((size.height, GAP, 3), 255, dtype=np.uint8)
+    strip = np.concatenate([part for image in images for part in (white, image)][1:], axis=1)
+    Picture.fromarray(strip).save(path, format="PNG")
+
+
+def _row_at(recording: Recording, time: float) -> Ints:
+    first, last = recording.time[0], recording.time[-1]
+    if not first <= time <= last:
+        raise ConfigError(f"time is {time:g} s; the run lasts from {first:g} to {last:g} s")
+    return np.atleast_1d(np.searchsorted(recording.time, time))
+
+
+def _still_rows(recording: Recording) -> Ints:
+    """Evenly spread over the last jump, lower apex to lower apex; else the last period."""
+    jumps, begin, end = find_gait(recording).jumps, recording.time[0], recording.time[-1]
+    if len(jumps):
+        begin, end = jumps.start[-1], jumps.end[-1]
+    elif len(periods := find_periods(recording)):
+        begin, end = periods.start[-1], periods.end[-1]
+    instants = np.linspace(begin, end, STILLS)
+    return np.minimum(np.searchsorted(recording.time, instants), len(recording.time) - 1)

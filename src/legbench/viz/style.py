@@ -1,0 +1,125 @@
+"""Colours and words of every picture, shared by the viewer and the print figures."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from legbench.signals import Floats, Phase
+
+Rgb = tuple[int, int, int]
+Colours = NDArray[np.uint8]
+
+STANCE: Rgb = (226, 88, 60)
+FLIGHT: Rgb = (66, 133, 244)
+MODE_1: Rgb = (230, 159, 0)
+"""Polar mode w1."""
+MODE_2: Rgb = (0, 172, 193)
+"""Radial mode w2."""
+FIRST: Rgb = (232, 110, 80)
+"""Component 1 of a series: q1, tau1."""
+SECOND: Rgb = (74, 144, 226)
+FIRST_FAINT: Rgb = (150, 92, 78)
+"""What component 1 was asked to be."""
+SECOND_FAINT: Rgb = (74, 104, 142)
+ACCENT: Rgb = (124, 179, 66)
+FORCE: Rgb = (240, 180, 40)
+GREY: Rgb = (128, 128, 128)
+"""Readable on the viewer's dark and light themes alike."""
+SEGMENT: Rgb = (150, 152, 160)
+TRUNK: Rgb = (52, 104, 172)
+BAR_GREEN: Rgb = (67, 160, 88)
+BAR_BLACK: Rgb = (96, 98, 104)
+
+PHASES: dict[Phase, Rgb] = {
+    Phase.REST: (120, 120, 128),
+    Phase.STEPPED: (142, 108, 190),
+    Phase.MIDDLE: (158, 158, 120),
+    Phase.FOLDED: (0, 150, 136),
+    Phase.STRETCHED: (214, 130, 40),
+    Phase.FLIGHT: FLIGHT,
+    Phase.COMPRESS: (0, 150, 136),
+    Phase.PUSH: STANCE,
+    Phase.RELEASE: (142, 108, 190),
+}
+"""Colour of what the controller does."""
+
+PERIODS_SHOWN = 20
+"""Periods over which the colours run; later ones keep the last colour (the paper rates 20)."""
+
+# Viridis at 17 equal steps: the colour map without matplotlib.
+_VIRIDIS = np.array(
+    [
+        [68, 1, 84],
+        [72, 24, 106],
+        [71, 45, 123],
+        [66, 64, 134],
+        [59, 82, 139],
+        [51, 99, 141],
+        [44, 114, 142],
+        [38, 130, 142],
+        [33, 145, 140],
+        [31, 160, 136],
+        [40, 174, 128],
+        [63, 188, 115],
+        [94, 201, 98],
+        [132, 212, 75],
+        [173, 220, 48],
+        [216, 226, 25],
+        [253, 231, 37],
+    ],
+    dtype=np.float64,
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Axis:
+    """What one axis shows: plain text for the viewer, mathematics for print."""
+
+    text: str
+    math: str
+
+
+X1 = Axis(text="x1 [rad]", math=r"$x_1$ [rad]")
+X2 = Axis(text="x2 [m]", math=r"$x_2$ [m]")
+Q1 = Axis(text="q1 [rad]", math=r"$q_1$ [rad]")
+Q2 = Axis(text="q2 [rad]", math=r"$q_2$ [rad]")
+Z2 = Axis(text="z2 [rad]", math=r"$z_2$ [rad]")
+DZ2 = Axis(text="dz2/dt [rad/s]", math=r"$\dot z_2$ [rad/s]")
+
+POLAR_LEAST = 0.01
+"""Shortest range of x1 that a plot shows [rad]: purely radial motion looks like a line."""
+
+POLAR, JOINT, MODAL = "foot tip, polar", "joint space", "modal phase"
+"""Titles of the three panels of Figs. 4 and 6."""
+
+
+def viridis(fraction: Floats) -> Colours:
+    """Colours (n, 3) of numbers (n,) in [0, 1]: dark violet, green, yellow."""
+    knots = np.linspace(0.0, 1.0, len(_VIRIDIS))
+    channels = [np.interp(fraction, knots, _VIRIDIS[:, channel]) for channel in range(3)]
+    return np.round(np.stack(channels, axis=-1)).astype(np.uint8)
+
+
+def period_colours(periods: NDArray[np.int64]) -> Colours:
+    """Colours (n, 3) of period numbers (n,) on the viewer's dark or light ground."""
+    share = np.minimum(periods, PERIODS_SHOWN - 1) / (PERIODS_SHOWN - 1)
+    return viridis(0.25 + 0.70 * share)
+
+
+def stance_colours(stance: NDArray[np.bool_]) -> Colours:
+    """Colours (n, 3) of stance and flight."""
+    palette = np.array([FLIGHT, STANCE], dtype=np.uint8)
+    return palette[stance.astype(np.intp)]
+
+
+def packed(colour: Rgb) -> int:
+    """0xRRGGBBAA, as rerun's state configuration wants it."""
+    red, green, blue = colour
+    return red << 24 | green << 16 | blue << 8 | 0xFF
+
+
+def unit(colour: Rgb) -> tuple[float, float, float]:
+    """The colour as matplotlib wants it."""
+    red, green, blue = colour
+    return (red / 255.0, green / 255.0, blue / 255.0)

@@ -1,0 +1,124 @@
+"""Rows as a picture needs them: coordinates, period numbers, stance or flight.
+
+Everything here is causal: a run taken in slices gives what the whole run gives, so that the
+viewer shows the same live and afterwards.
+"""
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from legbench.design.setup import SetupKind
+from legbench.kinematics import joint_to_modal, joint_to_polar
+from legbench.metrics.source import Recorded
+from legbench.metrics.stance import MINIMUM_PHASE, STANCE, states_by_controller
+from legbench.signals import Bools, Floats, Ints
+from legbench.viz.facts import Facts
+
+RATE_FLOOR = 0.05
+"""Slower radial motion is rest, no period [rad/s]."""
+RATE_SHARE = 0.05
+"""Hysteresis of a period's start, as a share of the fastest radial motion so far."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trace:
+    """Some rows with what pictures derive from them."""
+
+    rows: Recorded
+    time: Floats
+    """(n,) [s]"""
+    joint: Floats
+    """q1, q2 (n, 2) [rad]."""
+    polar: Floats
+    """x1 [rad], x2 [m] (n, 2)."""
+    modal: Floats
+    """z2 [rad] and its rate [rad/s] (n, 2)."""
+    period: Ints
+    """Number of the oscillation period, or of the jump (n,)."""
+    stance: Bools
+    """Whether the foot carries (n,)."""
+
+
+@final
+class Tracer:
+    """Turns consecutive slices of a run into traces."""
+
+    def __init__(self, facts: Facts) -> None:
+        self._facts = facts
+        self._period, self._between = 0, False
+        self._fastest = 0.0
+        self._grounded = -np.inf
+
+    def extend(self, rows: Recorded) -> Trace:
+        """The trace of the next rows."""
+        joint = rows["joint_pos"]
+        convention = self._facts.terms.convention
+        z2 = joint_to_modal(joint, convention)[..., 1]
+        rate = joint_to_modal(rows["joint_vel"], convention)[..., 1]
+        stance = stance_of(rows, self._facts.terms.setup)
+        return Trace(
+            rows=rows,
+            time=rows.time,
+            joint=joint,
+            polar=joint_to_polar(joint, self._facts.design.shank.length),
+            modal=np.stack([z2, rate], axis=-1),
+            period=self._count_periods(*self._extremes(rows.time, stance, rate)),
+            stance=stance,
+        )
+
+    def _extremes(self, time: Floats, stance: Bools, rate: Floats) -> tuple[Bools, Bools]:
+        """Rows that may begin a period, and rows that must lie between two beginnings."""
+        if self._facts.jumps:
+            grounded = np.maximum.accumulate(
+                np.append(self._grounded, np.where(stance, time, -np.inf))
+            )
+            self._grounded = float(grounded[-1])
+            return stance, time - grounded[1:] >= MINIMUM_PHASE
+        fastest = np.maximum.accumulate(np.append(self._fastest, np.abs(rate)))
+        self._fastest = float(fastest[-1])
+        threshold = np.maximum(RATE_FLOOR, RATE_SHARE * fastest[1:])
+        return rate > threshold, rate < -threshold
+
+    def _count_periods(self, begins: Bools, between: Bools) -> Ints:
+        """Number of the period of each row: how often `begins` followed `between`."""
+        known = np.append(True, begins | between)
+        last = np.maximum.accumulate(np.where(known, np.arange(len(known)), 0))
+        held = np.append(self._between, between)[last]
+        periods = self._period + np.cumsum(held[:-1] & ~held[1:])
+        self._between, self._period = bool(held[-1]), int(np.append(self._period, periods)[-1])
+        return periods.astype(np.int64)
+
+
+def stance_of(rows: Recorded, kind: SetupKind) -> Bools:
+    """Whether the foot carries (n,): the contact, or what the controller took for it."""
+    if kind is SetupKind.FFS:
+        return np.ones(len(rows.time), dtype=np.bool_)
+    if kind is not SetupKind.JUMP:
+        return np.zeros(len(rows.time), dtype=np.bool_)
+    if rows.has_truth:
+        return np.asarray(rows["contact"], dtype=np.bool_)
+    return states_by_controller(rows["phase"]) == STANCE
+
+
+@final
+class Thinner:
+    """Picks rows at a lower rate, across slices as if they were one."""
+
+    def __init__(self, freq: float) -> None:
+        self._period = 1.0 / freq
+        self._step: int | None = None
+        self._count = 0
+        self._last = np.zeros(0)
+
+    def pick(self, time: Floats) -> NDArray[np.intp]:
+        """Indices of the rows to keep out of the next slice; `freq` is met from above."""
+        steps = np.diff(np.append(self._last, time))
+        if self._step is None and len(steps):
+            self._step = max(1, int(self._period / float(np.median(steps)) + 1e-6))
+        kept = np.arange(-self._count % (self._step or 1), len(time), self._step or 1)
+        self._count += len(time)
+        self._last = np.append(self._last, time)[-1:]
+        return kept

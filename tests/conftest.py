@@ -1,0 +1,23 @@
+from pathlib import Path
+
+import pytest
+
+from legbench.design import LegDesign, load_design
+
+MODELS = Path(__file__).parents[1] / "models"
+
+
+@pytest.fixture(scope="session")
+def models() -> Path:
+    """The folder of the designs that come with the project."""
+    return MODELS
+
+
+@pytest.fixture(scope="session")
+def optimal() -> LegDesign:
+    return load_design(MODELS / "optimal.toml")
+
+
+@pytest.fixture(scope="session")
+def prototype() -> LegDesign:
+    return load_design(MODELS / "prototype.toml")
