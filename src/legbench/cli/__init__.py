@@ -13,6 +13,8 @@ COMMANDS = {
     "recover": "repair a run that was cut off",
     "model": "write or view the MuJoCo model of a design",
     "render": "make a video or a picture of a recorded run",
+    "design": "find a leg that meets requirements and modal matching",
+    "check": "check a leg against the conditions of modal matching",
 }
 """Command -> one line of help; the module is `legbench.cli.<command>` with `main(arguments)`."""
 
@@ -35,7 +37,8 @@ def usage() -> str:
 def main(arguments: list[str] | None = None) -> int:
     """Run a command; 0 when all went well, 1 for a refusal or a fault, 2 for wrong usage.
 
-    Every `LegbenchError` becomes one line on stderr, never a traceback.
+    Every `LegbenchError` becomes one line on stderr, never a traceback; so does ^C outside of a
+    run, with 130.
     """
     arguments = sys.argv[1:] if arguments is None else arguments
     if not arguments or arguments[0] in ("-h", "--help", "help"):
@@ -53,3 +56,6 @@ def main(arguments: list[str] | None = None) -> int:
     except LegbenchError as error:
         report_error(str(error))
         return 1
+    except KeyboardInterrupt:
+        report_error("interrupted")
+        return 130

@@ -1,0 +1,211 @@
+"""What a person needs to build a leg, and what to add to a part that came out wrong."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from legbench.design import LegDesign, Segment
+from legbench.design.matching import Condition, Parameters, check_conditions
+from legbench.errors import ConfigError
+
+SEGMENTS = ("thigh", "shank", "foot")
+LENGTH_APART = 0.05
+"""Relative difference of lengths above which a measured segment is another one [-]."""
+SMALLEST_WEIGHT = 1e-5
+"""A difference of mass that nobody would add or file off [kg]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """One number of the manufacture table."""
+
+    part: str
+    quantity: str
+    symbol: str
+    value: float
+    """SI."""
+    unit: str
+    shown: str
+    """In workshop units."""
+
+
+def manufacture_table(design: LegDesign) -> tuple[Row, ...]:
+    """Every number that the leg is built by, in the units of a workshop."""
+    rows = [_row("trunk", "mass", "m_t", design.trunk_mass, "kg")]
+    for index, (name, segment) in enumerate(zip(SEGMENTS, design.segments, strict=True), start=1):
+        rows += [
+            _row(name, "mass", f"m_{index}", segment.mass, "kg"),
+            _row(name, "length", f"l_{index}", segment.length, "m"),
+            _row(name, "centre of mass", f"c_{index}", segment.com, "m"),
+            _row(name, "inertia", f"I_{index}", segment.inertia, "kg m^2"),
+        ]
+    for index in range(2):
+        number = index + 1
+        rows += [
+            _row(
+                f"spring {number}", "stiffness", f"k_{number}", design.stiffness[index], "N m/rad"
+            ),
+            _row(f"joint {number}", "damping", f"d_{number}", design.damping[index], "N m s/rad"),
+        ]
+    return tuple(rows)
+
+
+WORKSHOP = {
+    "kg": (("g", 1e3), ("kg", 1.0)),
+    "m": (("mm", 1e3),),
+    "kg m^2": (("kg mm^2", 1e6),),
+}
+"""SI unit -> units of a workshop and how many of them make one; the last for large numbers."""
+LARGE = 1e4
+"""From here on the larger unit is used."""
+
+
+def shown(value: float, unit: str) -> str:
+    """A value in workshop units with four digits, never with an exponent of ten above."""
+    units = WORKSHOP.get(unit, ((unit, 1.0),))
+    name, factor = units[0] if abs(value) * units[0][1] < LARGE else units[-1]
+    number = factor * value
+    if number == 0.0:
+        return f"0 {name}"
+    digits = max(0, 3 - math.floor(math.log10(abs(number))))
+    return f"{number:.{digits}f} {name}"
+
+
+def _row(part: str, quantity: str, symbol: str, value: float, unit: str) -> Row:
+    words = shown(value, unit)
+    return Row(part=part, quantity=quantity, symbol=symbol, value=value, unit=unit, shown=words)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Adjustment:
+    """The weight that moves a measured segment to its target."""
+
+    segment: str
+    mass: float
+    """To be added; negative: to be taken away [kg]."""
+    position: float
+    """Centre of the weight, from the proximal joint towards the distal one [m]; NaN if no single
+    weight does it."""
+    half_spread: float
+    """Two halves this far to either side of `position` bring the inertia to its target, or as near
+    as the segment is long [m]; zero where one lump already has as much as wanted or more."""
+    mass_after: float
+    """[kg]"""
+    com_after: float
+    """[m]"""
+    inertia_after: float
+    """[kg m^2]"""
+    inertia_missing: float
+    """Target less what is reached [kg m^2]; negative: a weight cannot take inertia away."""
+    note: str
+    """What to mind; empty if the weight fits on the segment."""
+
+
+def adjust(name: str, measured: Segment, target: Segment) -> Adjustment:
+    """The weight that gives `measured` the mass, the centre of mass and, if it can, the inertia of
+    `target`.
+
+    A point mass `w = m* - m` at `p = (m* c* - m c) / w` sets mass and centre of mass; two halves at
+    `p +- s` add `w s^2` to the inertia.
+    """
+    weight = target.mass - measured.mass
+    if abs(weight) < SMALLEST_WEIGHT:
+        aside = 1e3 * abs(measured.com - target.com)
+        note = f"centre of mass {aside:.2f} mm off: move a weight instead" if aside > 1e-3 else ""
+        return _none(name, measured, target, note)
+    position = (target.mass * target.com - measured.mass * measured.com) / weight
+    on_segment = 0.0 <= position <= target.length
+    if weight < 0.0 and not on_segment:
+        note = (
+            f"{-1e3 * weight:.2f} g too heavy, and taking that away anywhere on it would not put "
+            "its centre of mass right: lighten it further, then add a weight"
+        )
+        return _none(name, measured, target, note)
+    shifted = measured.inertia + measured.mass * (measured.com - target.com) ** 2
+    lump = shifted + weight * (position - target.com) ** 2
+    missing = target.inertia - lump
+    half_spread = 0.0
+    if weight > 0.0 and missing > 0.0 and on_segment:
+        widest = min(position, target.length - position)
+        half_spread = min(math.sqrt(missing / weight), widest)
+    reached = lump + weight * half_spread**2
+    if weight < 0.0:
+        note = "too heavy: take this much away there"
+    elif not on_segment:
+        note = "beyond the segment's ends: needs an outrigger"
+    else:
+        note = ""
+    return Adjustment(
+        segment=name,
+        mass=weight,
+        position=position,
+        half_spread=half_spread,
+        mass_after=target.mass,
+        com_after=target.com,
+        inertia_after=reached,
+        inertia_missing=target.inertia - reached,
+        note=note,
+    )
+
+
+def _none(name: str, measured: Segment, target: Segment, note: str) -> Adjustment:
+    """No weight: the segment stays as it was measured."""
+    return Adjustment(
+        segment=name,
+        mass=0.0,
+        position=math.nan,
+        half_spread=0.0,
+        mass_after=measured.mass,
+        com_after=measured.com,
+        inertia_after=measured.inertia,
+        inertia_missing=target.inertia - measured.inertia,
+        note=note,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Adjusted:
+    """A measured leg, its weights, and what is left of the conditions."""
+
+    adjustments: tuple[Adjustment, ...]
+    before: tuple[Condition, ...]
+    after: tuple[Condition, ...]
+
+
+def adjust_leg(measured: LegDesign, target: LegDesign) -> Adjusted:
+    """The weights for all segments of a measured leg; lengths, springs and dampers stay.
+
+    Raises:
+        ConfigError: a segment is not the target's at all, by its length.
+    """
+    for name, has, wants in zip(SEGMENTS, measured.segments, target.segments, strict=True):
+        if abs(has.length - wants.length) > LENGTH_APART * wants.length:
+            raise ConfigError(
+                f"measured {name} is {1e3 * has.length:.1f} mm long, the target's "
+                f"{1e3 * wants.length:.1f} mm: weights cannot make one the other"
+            )
+    adjustments = tuple(
+        adjust(name, has, wants)
+        for name, has, wants in zip(SEGMENTS, measured.segments, target.segments, strict=True)
+    )
+    parameters = Parameters.of(measured)
+    angle = 0.5 * measured.limits.knee[0]
+    weighted = replace(
+        parameters.leg,
+        mass=np.array([adjustment.mass_after for adjustment in adjustments]),
+        com=np.array([adjustment.com_after for adjustment in adjustments]),
+        inertia=np.array([adjustment.inertia_after for adjustment in adjustments]),
+    )
+    return Adjusted(
+        adjustments=adjustments,
+        before=check_conditions(parameters, angle),
+        after=check_conditions(replace(parameters, leg=weighted), angle),
+    )
+
+
+def table_to_json(rows: Sequence[Row]) -> list[dict[str, Any]]:
+    """The table as JSON."""
+    return [asdict(row) for row in rows]

@@ -1,0 +1,62 @@
+"""Calling the commands as a user would: what came out, what was complained of, what status."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from legbench.cli import main
+
+MODELS = Path(__file__).parents[2] / "models"
+DESIGN = ("--design", str(MODELS / "prototype.toml"))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Done:
+    status: int
+    out: str
+    err: str
+
+    def refused(self, *words: str) -> None:
+        """One clear message, no traceback, nothing on stdout, a status that says so."""
+        assert self.status == 1, self.err
+        assert self.out == ""
+        assert self.err.startswith("legbench: "), self.err
+        assert self.err.count("\n") == 1, self.err
+        for word in words:
+            assert word in self.err
+
+
+def called(capfd: pytest.CaptureFixture[str], *arguments: str | Path) -> Done:
+    """In this process."""
+    capfd.readouterr()
+    try:
+        status = main([str(argument) for argument in arguments])
+    except SystemExit as end:
+        status = end.code if isinstance(end.code, int) else 1
+    seen = capfd.readouterr()
+    return Done(status=status, out=seen.out, err=seen.err)
+
+
+CALL = "import sys\n{before}\nfrom legbench.cli import main\nsys.exit(main(sys.argv[1:]))"
+
+
+def started(
+    *arguments: str | Path, before: str = "pass", without: Sequence[str] = (), cwd: Path
+) -> Done:
+    """In a process of its own, some environment variables removed, some code run before."""
+    environment = {name: value for name, value in os.environ.items() if name not in without}
+    done = subprocess.run(
+        [sys.executable, "-c", CALL.format(before=before), *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+        env=environment,
+        cwd=cwd,
+    )
+    return Done(status=done.returncode, out=done.stdout, err=done.stderr)
