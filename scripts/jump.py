@@ -65,7 +65,11 @@ def main() -> int:
         report_error(f"{finished.outcome.message or finished.outcome.status}; see {finished.path}")
         return 1
     recording = load(finished.path)
-    print(table(summarise(recording)))
+    summary = summarise(recording)
+    if not summary.jumps:
+        report_error(f"the leg did not leave the ground; see {finished.path}")
+        return 1
+    print(table(summary))
     rrd = write_rrd(recording, finished.path / "view.rrd")
     figure = save_figure(phase_figure(recording), finished.path / "phase.png")
     run = os.path.relpath(finished.path)

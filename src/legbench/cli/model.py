@@ -9,6 +9,7 @@ from legbench.design import load_design
 from legbench.design.setup import Setup, SetupKind
 from legbench.errors import RecordingError
 from legbench.mjcf import BuildOptions, Linkage, LinkageKind, build_spec, to_xml, xml_hash
+from legbench.recording.files import write_whole
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,10 +41,7 @@ def main(arguments: list[str]) -> int:
     )
     xml = to_xml(build_spec(load_design(chosen.design), options))
     if chosen.out is not None:
-        try:
-            chosen.out.write_text(xml, encoding="utf-8")
-        except OSError as error:
-            raise RecordingError(f"cannot write {chosen.out}: {error.strerror}") from None
+        _write(chosen.out, xml)
         note(f"wrote {chosen.out}")
     if chosen.view:
         from legbench.viz.mujoco_viewer import view_model
@@ -54,3 +52,14 @@ def main(arguments: list[str]) -> int:
     elif chosen.out is None and not chosen.view:
         print(xml, end="")
     return 0
+
+
+def _write(path: Path, xml: str) -> None:
+    """Write a file that is whole or not there; a pipe or a device is written to as it is."""
+    try:
+        if path.is_file() or not path.exists():
+            write_whole(path.resolve(), xml.encode())
+        else:
+            path.write_text(xml, encoding="utf-8")
+    except OSError as error:
+        raise RecordingError(f"cannot write {path}: {error.strerror}") from None

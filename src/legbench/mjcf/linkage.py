@@ -46,8 +46,8 @@ class Linkage:
     """
 
     kind: LinkageKind = LinkageKind.BARS
-    bar_density: float = 0.007
-    """Mass per length of crank and bars [kg/m]: a square PA6 rod of 2.5 mm."""
+    bar_density: float = 0.006
+    """Mass per length of crank and bars [kg/m]: a square PA6 rod of 2.3 mm."""
     crank_length: float = 0.02
     """Of hip crank and thigh extension [m]."""
 

@@ -1,5 +1,6 @@
 """From MuJoCo's arrays to an observation, for one leg or a batch with the same code."""
 
+import math
 from dataclasses import dataclass
 
 import mujoco
@@ -15,7 +16,7 @@ of a healthy leg stay within 1e-4."""
 STRAIGHT_MARGIN = 0.02
 """A knee this close to 0 or pi has gone through its stop [rad]."""
 DIVERGED = 1e3
-"""No coordinate of a leg ever gets this far [rad or m]."""
+"""All coordinates of a leg together never get this far [rad and m]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,7 +52,7 @@ def absolute(layout: JointLayout, coordinates: Floats) -> Floats:
 def branch_fault(layout: JointLayout, qpos: Floats) -> str | None:
     """Name what happened to a leg (nq,) that is no longer the pantograph it was built as."""
     angles = qpos.tolist()
-    if not all(-DIVERGED < angle < DIVERGED for angle in angles):
+    if not math.hypot(*angles) < DIVERGED:
         return "simulation diverged"
     knee = angles[layout.knee]
     if knee < STRAIGHT_MARGIN:
@@ -70,7 +71,7 @@ def branch_fault(layout: JointLayout, qpos: Floats) -> str | None:
 def branch_fault_mask(layout: JointLayout, qpos: Floats) -> Bools:
     """Which legs of a batch (n, nq) `branch_fault` would name; (n,)."""
     knee = qpos[:, layout.knee]
-    fault = ~np.all(np.abs(qpos) < DIVERGED, axis=-1)
+    fault = ~(np.hypot.reduce(qpos, axis=-1) < DIVERGED)
     fault |= (knee < STRAIGHT_MARGIN) | (knee > np.pi - STRAIGHT_MARGIN)
     fault |= np.abs(qpos[:, layout.ankle] + knee) > CROSSED_TOLERANCE
     if layout.crank is not None:

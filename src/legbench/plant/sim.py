@@ -67,7 +67,7 @@ class SimPlant(AbstractPlant):
             PlantFault: the command is not finite, the simulation diverged, or the leg left its
                 branch: it straightened or folded through, or a bar loop crossed.
         """
-        if not all(map(math.isfinite, command.motor_pos.tolist())):
+        if not math.hypot(*command.motor_pos.tolist()) < math.inf:
             raise PlantFault(
                 "command not finite",
                 f"commanded motor positions are {command.motor_pos} rad at t = "

@@ -1,0 +1,69 @@
+"""The laws of the house that no other tool of `make check` keeps."""
+
+import ast
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+SOURCES = sorted((ROOT / "src").rglob("*.py"))
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+MACHINE_PATH = re.compile(r"(?<![\w./~-])/(?:home|root|work|tmp|Users|mnt|opt|srv)/")
+TEXTS = [
+    *SOURCES,
+    *sorted((ROOT / "tests").rglob("*.py")),
+    *sorted((ROOT / "scripts").glob("*.py")),
+    *sorted((ROOT / "models").iterdir()),
+    *[ROOT / name for name in ("README.md", "CHANGELOG.md", "Makefile", "pyproject.toml")],
+]
+
+
+def test_rooms_import_only_what_lies_below_them() -> None:
+    code = "from importlinter.cli import lint_imports; raise SystemExit(lint_imports())"
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_every_room_has_its_layer() -> None:
+    layers = PROJECT["tool"]["importlinter"]["contracts"][0]["layers"]
+    named = set(re.findall(r"legbench\.(\w+)", " ".join(layers)))
+    rooms = {path.stem for path in (ROOT / "src" / "legbench").glob("*.py")}
+    rooms |= {path.parent.name for path in (ROOT / "src" / "legbench").glob("*/__init__.py")}
+    assert rooms - {"__init__", "__main__"} <= named
+
+
+def test_no_file_knows_the_machine_that_it_was_written_on() -> None:
+    found = [
+        f"{path.relative_to(ROOT)}:{number}"
+        for path in TEXTS
+        if path.is_file() and path.suffix != ".pyc"
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1)
+        if MACHINE_PATH.search(line)
+    ]
+    assert found == []
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.stem)
+def test_no_error_is_caught_blindly(path: Path) -> None:
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ExceptHandler):
+            assert node.type is not None, f"{path.name}:{node.lineno}: bare except"
+            names = {name.id for name in ast.walk(node.type) if isinstance(name, ast.Name)}
+            assert not names & {"Exception", "BaseException"}, f"{path.name}:{node.lineno}"
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            assert node.func.id not in ("hasattr", "eval", "exec"), f"{path.name}:{node.lineno}"
+
+
+def test_every_command_is_documented_where_it_is_found() -> None:
+    scripts = PROJECT["project"]["scripts"]
+    assert scripts == {"legbench": "legbench.cli:main"}
+
+
+def test_the_package_is_typed_for_others() -> None:
+    assert (ROOT / "src" / "legbench" / "py.typed").is_file()

@@ -1,0 +1,183 @@
+import hashlib
+import json
+import signal
+import subprocess
+import sys
+import threading
+from dataclasses import replace
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from legbench.clock import AbstractClock
+from legbench.control import BangBangConfig, JumpConfig, PositionJumpConfig
+from legbench.design import LegDesign
+from legbench.design.setup import Setup, SetupKind
+from legbench.design.toml import design_from_mapping
+from legbench.errors import ConfigError, RecordingError
+from legbench.experiment import Experiment, record
+from legbench.loop import StopFlag
+from legbench.mjcf import Linkage, LinkageKind
+from legbench.recording.reader import load
+from legbench.servo import ServoConfig
+
+CONTROLLERS = (JumpConfig(), BangBangConfig(), PositionJumpConfig())
+
+
+def short(design: LegDesign, **choices: object) -> Experiment:
+    experiment = Experiment(design=design, controller=JumpConfig(), duration=0.12)
+    return replace(experiment, **choices)  # pyright: ignore[reportArgumentType]
+
+
+@pytest.mark.parametrize("linkage", LinkageKind)
+@pytest.mark.parametrize("config", CONTROLLERS, ids=lambda config: config.kind)
+@pytest.mark.parametrize("kind", SetupKind)
+def test_every_controller_runs_in_every_setup_that_it_knows(
+    tmp_path: Path,
+    prototype: LegDesign,
+    kind: SetupKind,
+    config: JumpConfig | BangBangConfig | PositionJumpConfig,
+    linkage: LinkageKind,
+) -> None:
+    experiment = short(
+        prototype, controller=config, setup=Setup(kind=kind), linkage=Linkage(kind=linkage)
+    )
+    if isinstance(config, JumpConfig) and kind in (SetupKind.HFTS, SetupKind.VFTS):
+        with pytest.raises(ConfigError, match="jumping needs setup 'jump' or 'ffs'"):
+            record(experiment, tmp_path)
+        assert list(tmp_path.iterdir()) == []
+        return
+    finished = record(experiment, tmp_path)
+    assert (finished.outcome.status, finished.outcome.cycles) == ("complete", 120)
+    recording = load(finished.path)
+    assert recording.complete
+    assert np.array_equal(recording.time, np.arange(120) / 1000.0)
+    assert recording["loop_gap"].max() < 2e-5
+    assert recording.manifest["setup"]["kind"] == kind
+
+
+def test_the_same_experiment_gives_the_same_samples(tmp_path: Path, optimal: LegDesign) -> None:
+    first, second = (load(record(short(optimal), tmp_path).path) for _ in range(2))
+    for signal_name in first.signals:
+        if signal_name != "cycle_us":
+            assert np.array_equal(first[signal_name], second[signal_name]), signal_name
+
+
+def test_the_manifest_tells_what_ran(tmp_path: Path, prototype: LegDesign) -> None:
+    experiment = short(prototype, servo=ServoConfig(slew_rate=5.0))
+    finished = record(experiment, tmp_path)
+    manifest = load(finished.path).manifest
+    assert design_from_mapping(manifest["design"]) == prototype
+    xml = (finished.path / "leg.xml").read_bytes()
+    assert manifest["mjcf_sha256"] == hashlib.sha256(xml).hexdigest()
+    mujoco.MjModel.from_xml_path(str(finished.path / "leg.xml"))
+    assert manifest["controller"]["kind"] == "jump"
+    assert manifest["controller"]["dz2"] == JumpConfig().dz2
+    assert manifest["servo"]["slew_rate"] == 5.0
+    assert manifest["conventions"] == {
+        "modal": "orthonormal",
+        "setpoint": "link",
+        "rating_reference": "motor",
+    }
+    assert {"python", "numpy", "pyarrow"} <= manifest["versions"].keys()
+    assert len(manifest["initial_state"]["joint_pos"]) == 2
+    assert manifest["period"] == 0.001
+    assert manifest["units"]["joint_pos_1"] == "rad"
+    assert {"plant", "setup", "linkage", "ground", "numerics", "seed"} <= manifest.keys()
+
+
+def test_the_applied_command_is_the_one_before(tmp_path: Path, prototype: LegDesign) -> None:
+    recording = load(record(short(prototype), tmp_path).path)
+    assert np.array_equal(recording["applied_pos"][1:], recording["command_pos"][:-1])
+
+
+def test_a_fault_is_kept_as_the_cause(tmp_path: Path, prototype: LegDesign) -> None:
+    violent = JumpConfig(z2=1.0, dz2=0.6, delay=0.01)
+    soft_stop = replace(prototype, stiffness=(20.0, 20.0))
+    finished = record(short(soft_stop, controller=violent, duration=4.0), tmp_path)
+    assert finished.outcome.status == "fault"
+    recording = load(finished.path)
+    assert recording.manifest["status"] == "fault"
+    assert recording.manifest["cause"] == finished.outcome.cause
+    assert finished.outcome.cause is not None
+    assert len(recording.time) == finished.outcome.cycles
+    assert recording.events[-1]["name"] == "end"
+    assert recording.events[-1]["cause"] == finished.outcome.cause
+
+
+def test_a_stopped_run_is_whole(tmp_path: Path, prototype: LegDesign) -> None:
+    stop = StopFlag()
+
+    class Impatient(AbstractClock):
+        def start(self) -> None:
+            """Nothing."""
+
+        def wait(self, cycle: int) -> float:
+            if cycle == 70:
+                stop.set()
+            return 0.0
+
+    finished = record(short(prototype), tmp_path, stop=stop, clock=Impatient())
+    assert finished.outcome.status == "interrupted"
+    recording = load(finished.path)
+    assert recording.manifest["status"] == "interrupted"
+    assert recording.torn is None
+    assert len(recording.time) == 71
+
+
+def test_an_error_on_the_way_closes_the_run(tmp_path: Path, prototype: LegDesign) -> None:
+    def burst(run: Path) -> None:
+        raise ZeroDivisionError(run)
+
+    with pytest.raises(ZeroDivisionError):
+        record(short(prototype), tmp_path, on_started=burst)
+    (run,) = tmp_path.iterdir()
+    manifest = load(run).manifest
+    assert (manifest["status"], manifest["cause"]) == ("fault", "ZeroDivisionError")
+    assert not [thread for thread in threading.enumerate() if thread.name == "recording"]
+
+
+def test_an_operating_system_error_names_the_run(tmp_path: Path, prototype: LegDesign) -> None:
+    def refuse(run: Path) -> None:
+        raise PermissionError(13, "no", str(run))
+
+    with pytest.raises(RecordingError, match=str(tmp_path)):
+        record(short(prototype), tmp_path, on_started=refuse)
+
+
+@pytest.mark.parametrize("duration", [0.0, -1.0, 0.0005, float("nan"), float("inf")])
+def test_a_duration_that_makes_no_run(prototype: LegDesign, duration: float) -> None:
+    with pytest.raises(ConfigError, match=r"duration is .* s; it must be at least one cycle of"):
+        short(prototype, duration=duration)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_command_leaves_a_whole_run(
+    tmp_path: Path, models: Path, number: signal.Signals
+) -> None:
+    """The signal comes after the first rows are on disk; the run is a minute of real time."""
+    runs = tmp_path / "runs"
+    design = str(models / "prototype.toml")
+    code = "import sys; from legbench.cli import main; sys.exit(main(sys.argv[1:]))"
+    command = [sys.executable, "-c", code, "run", "jump", "--design", design]
+    command += ["--out", str(runs), "--duration", "60", "--real-time", "--json"]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path
+    ) as process:
+        started = threading.Event()
+        while process.poll() is None and not started.wait(0.02):
+            if any(path.stat().st_size > 20_000 for path in runs.glob("*/samples.arrows")):
+                started.set()
+        process.send_signal(number)
+        out, err = process.communicate(timeout=60)
+    assert process.returncode == 0, err
+    assert "Traceback" not in err
+    summary = json.loads(out)
+    assert summary["status"] == "interrupted"
+    recording = load(Path(summary["run"]))
+    assert recording.manifest["status"] == "interrupted"
+    assert recording.torn is None
+    assert 50 <= len(recording.time) < 60_000
+    assert not (Path(summary["run"]) / "samples.arrows").exists()

@@ -1,0 +1,290 @@
+import os
+import signal
+import threading
+from collections.abc import Callable
+from typing import final
+
+import numpy as np
+import pytest
+
+from legbench.clock import AbstractClock, VirtualClock, WallClock
+from legbench.control import AbstractController
+from legbench.errors import PlantFault, RecordingError
+from legbench.loop import PROGRESS_EVERY, StopFlag, run, stop_on_interrupt
+from legbench.plant.abstract import AbstractPlant
+from legbench.signals import Command, Floats, Observation, Phase
+
+PERIOD = 0.001
+
+
+@final
+class Told:
+    """Plant, controller, clock and recording that write down who was asked what."""
+
+    def __init__(self, *, fault_at: int | None = None, disk_full_at: int | None = None) -> None:
+        self.calls: list[str] = []
+        self.rows: list[tuple[float, float, float, float]] = []
+        self.fault_at, self.disk_full_at = fault_at, disk_full_at
+        self.cycle = 0
+        self.late = 0.0
+
+    def seen(self, applied: float) -> Observation:
+        zero = np.zeros(2)
+        return Observation(
+            time=self.cycle * PERIOD,
+            motor_pos=zero,
+            joint_pos=zero,
+            joint_vel=zero,
+            spring_torque=zero,
+            applied_pos=np.full(2, applied),
+        )
+
+    def append(
+        self, command: Command, observation: Observation, cycle_us: float, late_us: float
+    ) -> None:
+        if self.disk_full_at == len(self.rows):
+            raise RecordingError("no room")
+        self.calls.append("append")
+        self.rows.append((observation.time, float(command.motor_pos[0]), cycle_us, late_us))
+
+
+@final
+class ToldPlant(AbstractPlant):
+    def __init__(self, told: Told) -> None:
+        self.period, self.told = PERIOD, told
+
+    def reset(self) -> Observation:
+        self.told.calls.append("plant.reset")
+        self.told.cycle = 0
+        return self.told.seen(0.0)
+
+    def step(self, command: Command) -> Observation:
+        self.told.calls.append("plant.step")
+        self.told.cycle += 1
+        if self.told.cycle == self.told.fault_at:
+            raise PlantFault("broken spring", "the spring broke; buy another one")
+        return self.told.seen(float(command.motor_pos[0]))
+
+    def close(self) -> None:
+        self.told.calls.append("plant.close")
+
+
+@final
+class ToldController(AbstractController):
+    def __init__(self, told: Told) -> None:
+        self.told = told
+
+    @property
+    def start_motor_pos(self) -> Floats:
+        return np.zeros(2)
+
+    def reset(self, observation: Observation) -> None:
+        self.told.calls.append("controller.reset")
+
+    def step(self, observation: Observation) -> Command:
+        self.told.calls.append("controller.step")
+        return Command.holding(np.full(2, observation.time + 1.0))
+
+
+@final
+class ToldClock(AbstractClock):
+    def __init__(self, told: Told) -> None:
+        self.told = told
+
+    def start(self) -> None:
+        self.told.calls.append("clock.start")
+
+    def wait(self, cycle: int) -> float:
+        self.told.calls.append(f"clock.wait {cycle}")
+        return self.told.late
+
+
+def test_who_is_asked_when() -> None:
+    told = Told()
+    outcome = run(ToldPlant(told), ToldController(told), 3, clock=ToldClock(told), sink=told)
+    cycle = ["controller.step", "append", "plant.step"]
+    assert told.calls == [
+        *("plant.reset", "controller.reset", "clock.start"),
+        *("clock.wait 0", *cycle, "clock.wait 1", *cycle, "clock.wait 2", *cycle),
+    ]
+    assert (outcome.status, outcome.cause, outcome.message) == ("complete", None, None)
+    assert outcome.cycles == 3
+
+
+def test_a_row_is_what_was_seen_and_what_was_commanded_from_it() -> None:
+    told = Told()
+    told.late = 0.000_25
+    run(ToldPlant(told), ToldController(told), 4, clock=ToldClock(told), sink=told)
+    assert [row[0] for row in told.rows] == [k * PERIOD for k in range(4)]
+    assert [row[1] for row in told.rows] == [1.0 + k * PERIOD for k in range(4)]
+    assert told.rows[0][2] == 0.0
+    assert all(row[2] > 0.0 for row in told.rows[1:])
+    assert [row[3] for row in told.rows] == pytest.approx([250.0] * 4)
+
+
+def test_the_first_fault_ends_the_run_and_keeps_every_row() -> None:
+    told = Told(fault_at=5)
+    outcome = run(ToldPlant(told), ToldController(told), 100, sink=told)
+    assert (outcome.status, outcome.cause) == ("fault", "broken spring")
+    assert outcome.message == "the spring broke; buy another one"
+    assert outcome.cycles == 5
+    assert [row[0] for row in told.rows] == [k * PERIOD for k in range(5)]
+
+
+def test_a_fault_of_the_recording_goes_through() -> None:
+    told = Told(disk_full_at=3)
+    with pytest.raises(RecordingError, match="no room"):
+        run(ToldPlant(told), ToldController(told), 100, sink=told)
+    assert told.cycle == 3
+
+
+def test_the_stop_flag_ends_the_run_before_the_next_cycle() -> None:
+    told, stop = Told(), StopFlag()
+
+    @final
+    class Impatient(AbstractClock):
+        def start(self) -> None:
+            """Nothing."""
+
+        def wait(self, cycle: int) -> float:
+            if cycle == 6:
+                stop.set()
+            return 0.0
+
+    plant, controller = ToldPlant(told), ToldController(told)
+    outcome = run(plant, controller, 100, clock=Impatient(), sink=told, stop=stop)
+    assert (outcome.status, outcome.cause) == ("interrupted", None)
+    assert outcome.cycles == len(told.rows) == 7
+    stopped = run(plant, controller, 100, sink=told, stop=stop)
+    assert (stopped.status, stopped.cycles) == ("interrupted", 0)
+
+
+@pytest.mark.parametrize("cycles", [PROGRESS_EVERY, 3 * PROGRESS_EVERY, 2 * PROGRESS_EVERY + 7, 3])
+def test_progress_is_told_now_and_then_and_at_the_end(cycles: int) -> None:
+    told, heard = Told(), []
+    run(
+        ToldPlant(told),
+        ToldController(told),
+        cycles,
+        progress=lambda done, total: heard.append((done, total)),
+    )
+    assert heard[-1] == (cycles, cycles)
+    assert len(heard) == len(set(heard)) == -(-cycles // PROGRESS_EVERY)
+    assert {total for _, total in heard} == {cycles}
+
+
+def test_virtual_time_never_waits_and_is_never_late() -> None:
+    clock = VirtualClock()
+    clock.start()
+    assert [clock.wait(cycle) for cycle in (0, 1, 1000)] == [0.0, 0.0, 0.0]
+
+
+@final
+class FakeTime:
+    """Time that only passes when somebody sleeps, or works."""
+
+    def __init__(self, oversleep: float = 0.0) -> None:
+        self.now, self.oversleep = 100.0, oversleep
+        self.slept: list[float] = []
+
+    def read(self) -> float:
+        return self.now
+
+    def sleep(self, duration: float) -> None:
+        self.slept.append(duration)
+        self.now += duration + self.oversleep
+
+
+def test_deadlines_are_absolute() -> None:
+    """A late cycle does not shift those after it."""
+    fake = FakeTime()
+    clock = WallClock(PERIOD, now=fake.read, sleep=fake.sleep)
+    clock.start()
+    assert clock.wait(0) == 0.0
+    fake.now += 0.0004
+    assert clock.wait(1) == pytest.approx(0.0, abs=1e-12)
+    assert fake.slept == [pytest.approx(0.0006)]
+    fake.now += 0.0025
+    assert clock.wait(2) == pytest.approx(0.0015)
+    assert clock.wait(3) == pytest.approx(0.0005)
+    assert len(fake.slept) == 1
+    assert clock.wait(4) == pytest.approx(0.0, abs=1e-12)
+    assert fake.now == pytest.approx(100.0 + 4 * PERIOD)
+
+
+def test_sleeping_too_long_is_being_late() -> None:
+    fake = FakeTime(oversleep=0.00007)
+    clock = WallClock(PERIOD, now=fake.read, sleep=fake.sleep)
+    clock.start()
+    assert clock.wait(3) == pytest.approx(0.00007)
+
+
+def test_starting_again_lays_a_new_grid() -> None:
+    fake = FakeTime()
+    clock = WallClock(PERIOD, now=fake.read, sleep=fake.sleep)
+    clock.start()
+    fake.now += 5.0
+    clock.start()
+    assert clock.wait(2) == pytest.approx(0.0, abs=1e-12)
+    assert fake.slept == [pytest.approx(2 * PERIOD)]
+
+
+def test_the_loop_keeps_to_the_wall_clock() -> None:
+    fake, told = FakeTime(), Told()
+    clock = WallClock(PERIOD, now=fake.read, sleep=fake.sleep)
+    run(ToldPlant(told), ToldController(told), 50, clock=clock, sink=told)
+    assert fake.now == pytest.approx(100.0 + 49 * PERIOD)
+    assert all(row[3] == pytest.approx(0.0, abs=1e-6) for row in told.rows)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_sets_the_flag_and_the_old_handler_comes_back(number: signal.Signals) -> None:
+    before = signal.getsignal(number)
+    with stop_on_interrupt() as stop:
+        assert not stop.is_set
+        os.kill(os.getpid(), number)
+        assert stop.is_set
+    assert signal.getsignal(number) is before
+
+
+def test_handlers_come_back_after_an_error() -> None:
+    before = signal.getsignal(signal.SIGINT)
+
+    def fail() -> None:
+        raise RecordingError("no room")
+
+    with pytest.raises(RecordingError), stop_on_interrupt():
+        fail()
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_a_thread_gets_a_flag_that_nothing_sets() -> None:
+    found: list[bool] = []
+
+    def work() -> None:
+        with stop_on_interrupt() as stop:
+            found.append(stop.is_set)
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert found == [False]
+
+
+def test_a_plant_is_closed_at_the_end_of_its_block() -> None:
+    told = Told()
+
+    def use(action: Callable[[], object]) -> None:
+        with ToldPlant(told):
+            action()
+
+    use(lambda: None)
+    assert told.calls == ["plant.close"]
+    with pytest.raises(ZeroDivisionError):
+        use(lambda: 1 // 0)
+    assert told.calls == ["plant.close"] * 2
+
+
+def test_holding_is_resting() -> None:
+    assert Command.holding(np.zeros(2)).phase == Phase.REST
+    assert Command.holding(np.zeros((4, 2))).phase.tolist() == [Phase.REST] * 4
