@@ -7,7 +7,8 @@ import pytest
 from legbench.design import LegDesign, load_design
 from legbench.design.dependent import design_of
 from legbench.design.requirements import PAPER
-from legbench.synthesis import model_check
+from legbench.mjcf import BuildOptions
+from legbench.synthesis import reduced_model
 from legbench.synthesis.model_check import ModelCheck, check_model
 
 MODELS = Path(__file__).parents[2] / "models"
@@ -55,14 +56,14 @@ def test_what_is_mistuned_shows_and_nothing_else(what: str) -> None:
 
 
 def test_a_generator_that_leaves_the_algebra_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
-    build = model_check.build_spec
+    build = reduced_model.build_spec
 
-    def heavier(design: LegDesign, options: model_check.BuildOptions) -> object:
+    def heavier(design: LegDesign, options: BuildOptions) -> object:
         spec = build(design, options)
         spec.body("foot").mass *= 1.001
         return spec
 
-    monkeypatch.setattr(model_check, "build_spec", heavier)
+    monkeypatch.setattr(reduced_model, "build_spec", heavier)
     check = check_model(MATCHED)
     assert not check.agrees
     assert check.coupling > 1e-6

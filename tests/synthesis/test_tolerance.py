@@ -11,17 +11,15 @@ from legbench.errors import ConfigError, DesignError
 from legbench.metrics import Reference, rate
 from legbench.plant.sim import SimPlant
 from legbench.plant.start import Start
+from legbench.synthesis.release import Release, rate_legs
+from legbench.synthesis.scatter import scatter
 from legbench.synthesis.tolerance import (
     TOLERANCES,
-    Release,
-    ScatterCost,
     Tolerances,
     load_tolerances,
-    measure_yield,
-    rate_legs,
-    scatter,
     tolerances_from_mapping,
 )
+from legbench.synthesis.yields import ScatterCost, measure_yield
 
 LEG = design_of(PAPER, np.array([0.95, 0.4837, 0.15, 0.5, 0.15, 1 / 16, 0.5]))
 SHORT = Release(duration=0.3)

@@ -126,7 +126,7 @@ def add_yield(
 ) -> None:
     """Report how many scattered legs keep their mode."""
     from legbench.synthesis.report import yield_lines
-    from legbench.synthesis.tolerance import measure_yield
+    from legbench.synthesis.yields import measure_yield
 
     note(f"simulating {legs} legs with all tolerances, then some with each alone")
     result = measure_yield(

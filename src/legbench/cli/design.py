@@ -136,7 +136,7 @@ def _solve(
     scatter_cost = None
     if chosen.tolerances is not None:
         from legbench.cli.check import tolerances_named
-        from legbench.synthesis.tolerance import ScatterCost
+        from legbench.synthesis.yields import ScatterCost
 
         scatter_cost = ScatterCost(tolerances=tolerances_named(chosen.tolerances))
     with stop_on_interrupt() as stop:

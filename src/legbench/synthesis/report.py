@@ -9,8 +9,9 @@ from legbench.design.mending import Mend, mends
 from legbench.design.requirements import VARIABLES
 from legbench.synthesis.manufacture import Adjusted, Row
 from legbench.synthesis.model_check import AGREES, TILT_AGREES, ModelCheck
+from legbench.synthesis.release import KEPT
 from legbench.synthesis.solve import Solution
-from legbench.synthesis.tolerance import KEPT, Yield
+from legbench.synthesis.yields import Yield
 
 EXACT = 1e-9
 """Ratio below which nothing is left to mend [-]."""

@@ -1,0 +1,106 @@
+"""What manufacture leaves of a design: the yield, what hurts it, and what a search pays for it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from legbench.design import LegDesign
+from legbench.errors import ConfigError
+from legbench.signals import Floats
+from legbench.synthesis.release import KEPT, Advance, Release, rate_legs, released
+from legbench.synthesis.scatter import scatter
+from legbench.synthesis.tolerance import TOLERANCES, Tolerances
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Yield:
+    """What scatter does to a design, and which tolerance does it."""
+
+    tolerances: Tolerances
+    release: Release
+    legs: int
+    kept: int
+    """Legs of `legs` that keep P^r above `KEPT`."""
+    nominal: float
+    """P^r of the design itself [-]."""
+    mean: float
+    """P^r of the scattered legs [-]."""
+    tenth: float
+    """P^r that nine legs of ten keep [-]."""
+    causes: dict[str, tuple[float, float]]
+    """Tolerance -> share of legs kept and mean P^r, when it scatters alone; the worst first."""
+
+
+def measure_yield(
+    design: LegDesign,
+    tolerances: Tolerances,
+    *,
+    legs: int = 1000,
+    legs_each: int | None = None,
+    seed: int = 0,
+    release: Release | None = None,
+    progress: Advance | None = None,
+) -> Yield:
+    """Make `legs` legs with all tolerances, and `legs_each` with each alone; rate all of them.
+
+    By default a tenth as many with each alone.
+
+    Raises:
+        ConfigError: fewer than one leg, or a design that cannot be released there.
+    """
+    release = release or Release()
+    legs_each = max(1, legs // 10) if legs_each is None else legs_each
+    if legs < 1 or legs_each < 1:
+        raise ConfigError(f"a yield needs legs; {legs} and {legs_each} were asked for")
+    made = [design, *scatter(design, tolerances, legs, seed)]
+    for name in TOLERANCES:
+        made += scatter(design, tolerances.only(name), legs_each, seed + 1)
+    values = rate_legs([design] * len(made), made, release, progress).values
+    together, alone = values[1 : legs + 1], values[legs + 1 :].reshape(len(TOLERANCES), legs_each)
+    causes = {
+        name: (float((row > KEPT).mean()), float(row.mean()))
+        for name, row in zip(TOLERANCES, alone, strict=True)
+    }
+    return Yield(
+        tolerances=tolerances,
+        release=release,
+        legs=legs,
+        kept=int((together > KEPT).sum()),
+        nominal=float(values[0]),
+        mean=float(together.mean()),
+        tenth=float(np.quantile(together, 0.1)),
+        causes=dict(sorted(causes.items(), key=lambda item: item[1][1])),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScatterCost:
+    """What candidates pay for the rating that scatter takes from them."""
+
+    tolerances: Tolerances
+    legs: int = 12
+    """Made of every candidate, with the same errors [-]."""
+    weight: float = 1.0
+    """Objective per unit of P^r lost [-]."""
+    seed: int = 0
+    release: Release = field(default_factory=lambda: Release(duration=0.5))
+
+    def __call__(self, designs: Sequence[LegDesign]) -> Floats:
+        """Cost (n,) of designs; one whose legs cannot be released loses all of its rating."""
+        values = np.zeros(len(designs))
+        made = [scatter(design, self.tolerances, self.legs, self.seed) for design in designs]
+        held = [index for index, legs in enumerate(made) if self._holds(designs[index], legs)]
+        if held:
+            nominal = [designs[index] for index in held for _ in range(self.legs)]
+            legs = [leg for index in held for leg in made[index]]
+            ratings = rate_legs(nominal, legs, self.release).values
+            values[held] = ratings.reshape(len(held), self.legs).mean(axis=1)
+        return self.weight * (1.0 - values)
+
+    def _holds(self, design: LegDesign, legs: Sequence[LegDesign]) -> bool:
+        try:
+            released([design] * len(legs), legs, self.release)
+        except ConfigError:
+            return False
+        return True
