@@ -11,9 +11,8 @@ from mujoco import batch
 from legbench.design import LegDesign
 from legbench.errors import ConfigError
 from legbench.mjcf import BuildOptions, build_spec, rest_qpos, to_xml
-from legbench.mjcf.sensors import SensorLayout
 from legbench.plant.abstract import AbstractPlant
-from legbench.plant.observe import JointLayout, branch_fault_mask, observe
+from legbench.plant.observe import LiveArrays, Observer, branch_fault_mask
 from legbench.plant.start import PERIOD, Start
 from legbench.servo import Servo, ServoConfig
 from legbench.signals import Bools, Command, Observation
@@ -67,55 +66,43 @@ class BatchPlant(AbstractPlant):
             ]
         )
         self._servo = Servo(servo or ServoConfig(), PERIOD)
-        self._stiffness = np.array([design.stiffness for design in designs])
-        self._joints = JointLayout.of(models[0])
-        self._sensors = SensorLayout.of(models[0])
-        self._qpos, self._qvel = self._batch.bind("qpos"), self._batch.bind("qvel")
-        self._ctrl = self._batch.bind("ctrl")
-        self._sensordata, self._energy = self._batch.bind("sensordata"), self._batch.bind("energy")
+        self._arrays = LiveArrays(
+            qpos=self._batch.bind("qpos"),
+            qvel=self._batch.bind("qvel"),
+            ctrl=self._batch.bind("ctrl"),
+            sensordata=self._batch.bind("sensordata"),
+            energy=self._batch.bind("energy"),
+        )
+        stiffness = np.array([design.stiffness for design in designs])
+        self._observer = Observer(models[0], self._arrays, stiffness, self._servo)
         self.faulted: Bools = np.zeros(len(designs), dtype=np.bool_)
         self._cycle = 0
 
     def reset(self) -> Observation:
         """Put every leg at rest in its start posture."""
         self._batch.reset(stage=int(mujoco.mjtStage.mjSTAGE_NONE))
-        self._qpos[:] = self._start_qpos
-        self._ctrl[:] = self._start.motor_pos
+        self._arrays.qpos[:] = self._start_qpos
+        self._arrays.ctrl[:] = self._start.motor_pos
         self._servo.reset(self._start.motor_pos)
         self._batch.forward()
         self.faulted = np.zeros(len(self._start_qpos), dtype=np.bool_)
         self._cycle = 0
-        return self._observe(Command.holding(self._start.motor_pos))
+        return self._observer.look(0.0, self._start.motor_pos)
 
     def step(self, command: Command) -> Observation:
         """Apply each leg's command over one period of substeps."""
         self.faulted = self.faulted | ~np.isfinite(command.motor_pos).all(axis=-1)
-        self._ctrl[:] = self._servo.follow(command.motor_pos)
+        self._arrays.ctrl[:] = self._servo.follow(command.motor_pos)
         try:
             self._batch.step(nstep=self._substeps, stage=int(mujoco.mjtStage.mjSTAGE_VEL))
         except batch.SimulationError:
             self.faulted |= np.asarray(self._batch.status) != 0
         self._cycle += 1
-        self.faulted |= branch_fault_mask(self._joints, self._qpos)
-        return self._observe(command)
+        self.faulted |= branch_fault_mask(self._observer.joints, self._arrays.qpos)
+        return self._observer.look(self._cycle * PERIOD, command.motor_pos)
 
     def close(self) -> None:
         """Nothing to release."""
-
-    def _observe(self, command: Command) -> Observation:
-        return observe(
-            time=self._cycle * PERIOD,
-            qpos=self._qpos,
-            qvel=self._qvel,
-            sensordata=self._sensordata,
-            energy=self._energy,
-            joints=self._joints,
-            sensors=self._sensors,
-            stiffness=self._stiffness,
-            servo=self._servo,
-            motor_pos=self._ctrl.copy(),
-            applied_pos=command.motor_pos,
-        )
 
 
 def _models(designs: Sequence[LegDesign], options: BuildOptions) -> list[mujoco.MjModel]:

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import final
 
 import mujoco
 import numpy as np
@@ -80,39 +81,50 @@ def branch_fault_mask(layout: JointLayout, qpos: Floats) -> Bools:
     return fault
 
 
-def observe(
-    *,
-    time: float,
-    qpos: Floats,
-    qvel: Floats,
-    sensordata: Floats,
-    energy: Floats,
-    joints: JointLayout,
-    sensors: SensorLayout,
-    stiffness: Floats,
-    servo: Servo,
-    motor_pos: Floats,
-    applied_pos: Floats,
-) -> Observation:
-    """Build the observation of the current state; nothing in it aliases simulation or command."""
-    joint_pos = servo.encode(absolute(joints, qpos))
-    motor_pos = servo.encode(motor_pos)
-    values = sensordata.copy()
-    truth = Truth(
-        trunk_pos=values[..., sensors.trunk_pos],
-        trunk_vel=values[..., sensors.trunk_vel],
-        foot_pos=values[..., sensors.foot_pos],
-        contact_force=sensors.force_of(values),
-        contact=sensors.contact_of(values),
-        energy=energy.copy(),
-        loop_gap=sensors.gap_of(values),
-    )
-    return Observation(
-        time=time,
-        motor_pos=motor_pos,
-        joint_pos=joint_pos,
-        joint_vel=absolute(joints, qvel),
-        spring_torque=stiffness * (motor_pos - joint_pos),
-        applied_pos=applied_pos.copy(),
-        truth=truth,
-    )
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LiveArrays:
+    """MuJoCo's arrays of one leg (...,) or a batch (n, ...), bound once; they change in place."""
+
+    qpos: Floats
+    qvel: Floats
+    ctrl: Floats
+    sensordata: Floats
+    energy: Floats
+
+
+@final
+class Observer:
+    """Makes observations of the current state; nothing in them aliases simulation or command."""
+
+    def __init__(
+        self, model: mujoco.MjModel, arrays: LiveArrays, stiffness: Floats, servo: Servo
+    ) -> None:
+        """Look the layout up once; `stiffness` is (..., 2) [N m/rad]."""
+        self.joints = JointLayout.of(model)
+        self._sensors = SensorLayout.of(model)
+        self._arrays, self._stiffness, self._servo = arrays, stiffness, servo
+
+    def look(self, time: float, applied_pos: Floats) -> Observation:
+        """What the plant shows at `time` [s], after the command `applied_pos` (..., 2) [rad]."""
+        arrays, sensors = self._arrays, self._sensors
+        joint_pos = self._servo.encode(absolute(self.joints, arrays.qpos))
+        motor_pos = self._servo.encode(arrays.ctrl.copy())
+        values = arrays.sensordata.copy()
+        truth = Truth(
+            trunk_pos=values[..., sensors.trunk_pos],
+            trunk_vel=values[..., sensors.trunk_vel],
+            foot_pos=values[..., sensors.foot_pos],
+            contact_force=sensors.force_of(values),
+            contact=sensors.contact_of(values),
+            energy=arrays.energy.copy(),
+            loop_gap=sensors.gap_of(values),
+        )
+        return Observation(
+            time=time,
+            motor_pos=motor_pos,
+            joint_pos=joint_pos,
+            joint_vel=absolute(self.joints, arrays.qvel),
+            spring_torque=self._stiffness * (motor_pos - joint_pos),
+            applied_pos=applied_pos.copy(),
+            truth=truth,
+        )

@@ -9,9 +9,8 @@ import numpy as np
 from legbench.design import LegDesign
 from legbench.errors import PlantFault
 from legbench.mjcf import BuildOptions, build_spec, rest_qpos, to_xml
-from legbench.mjcf.sensors import SensorLayout
 from legbench.plant.abstract import AbstractPlant
-from legbench.plant.observe import JointLayout, branch_fault, observe
+from legbench.plant.observe import LiveArrays, Observer, branch_fault
 from legbench.plant.start import PERIOD, Start
 from legbench.servo import Servo, ServoConfig
 from legbench.signals import Command, Observation
@@ -42,23 +41,26 @@ class SimPlant(AbstractPlant):
         self._start_qpos = rest_qpos(self.model, design, start.joint_pos)
         self._start = start
         self._servo = Servo(servo or ServoConfig(), PERIOD)
-        self._stiffness = np.asarray(design.stiffness)
-        self._joints = JointLayout.of(self.model)
-        self._sensors = SensorLayout.of(self.model)
-        self._qpos, self._qvel = self.data.qpos, self.data.qvel
-        self._ctrl, self._sensordata = self.data.ctrl, self.data.sensordata
-        self._energy = self.data.energy
+        self._arrays = LiveArrays(
+            qpos=self.data.qpos,
+            qvel=self.data.qvel,
+            ctrl=self.data.ctrl,
+            sensordata=self.data.sensordata,
+            energy=self.data.energy,
+        )
+        stiffness = np.asarray(design.stiffness)
+        self._observer = Observer(self.model, self._arrays, stiffness, self._servo)
         self._cycle = 0
 
     def reset(self) -> Observation:
         """Put the leg at rest in its start posture."""
         mujoco.mj_resetData(self.model, self.data)
-        self._qpos[:] = self._start_qpos
-        self._ctrl[:] = self._start.motor_pos
+        self._arrays.qpos[:] = self._start_qpos
+        self._arrays.ctrl[:] = self._start.motor_pos
         self._servo.reset(self._start.motor_pos)
         mujoco.mj_forward(self.model, self.data)
         self._cycle = 0
-        return self._observe(Command.holding(self._start.motor_pos))
+        return self._observer.look(0.0, self._start.motor_pos)
 
     def step(self, command: Command) -> Observation:
         """Apply a command over one period of substeps.
@@ -73,35 +75,20 @@ class SimPlant(AbstractPlant):
                 f"commanded motor positions are {command.motor_pos} rad at t = "
                 f"{self._cycle * PERIOD:.3f} s; the controller must give finite numbers",
             )
-        self._ctrl[:] = self._servo.follow(command.motor_pos)
+        self._arrays.ctrl[:] = self._servo.follow(command.motor_pos)
         try:
             mujoco.mj_step(self.model, self.data, self._substeps)
             mujoco.mj_step1(self.model, self.data)
         except mujoco.FatalError as error:
             raise PlantFault("simulation failed", str(error)) from error
         self._cycle += 1
-        if (cause := branch_fault(self._joints, self._qpos)) is not None:
+        if (cause := branch_fault(self._observer.joints, self._arrays.qpos)) is not None:
             raise PlantFault(
                 cause,
                 f"{cause} at t = {self._cycle * PERIOD:.3f} s: the leg is no longer on the branch "
                 "it was assembled on; push less (--dz2) or limit the servo (--slew-rate)",
             )
-        return self._observe(command)
+        return self._observer.look(self._cycle * PERIOD, command.motor_pos)
 
     def close(self) -> None:
         """Nothing to release."""
-
-    def _observe(self, command: Command) -> Observation:
-        return observe(
-            time=self._cycle * PERIOD,
-            qpos=self._qpos,
-            qvel=self._qvel,
-            sensordata=self._sensordata,
-            energy=self._energy,
-            joints=self._joints,
-            sensors=self._sensors,
-            stiffness=self._stiffness,
-            servo=self._servo,
-            motor_pos=self._ctrl.copy(),
-            applied_pos=command.motor_pos,
-        )
