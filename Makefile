@@ -1,5 +1,5 @@
 .DEFAULT_GOAL := help
-.PHONY: help setup jump test check bench models clean
+.PHONY: help setup jump test test-engine check bench models clean
 
 PYTHON ?= python3.11
 BIN := .venv/bin
@@ -11,7 +11,7 @@ help: ## show this list
 $(STAMP): pyproject.toml constraints.txt
 	@command -v $(PYTHON) >/dev/null || { echo "needs $(PYTHON); or say make PYTHON=python3.12" >&2; exit 1; }
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[viz,render,dev]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[viz,render,modes,dev]'
 	@touch $@
 
 setup: $(STAMP) ## make .venv with everything, pinned
@@ -31,8 +31,14 @@ check: $(STAMP) typings/mujoco/__init__.pyi ## lint, format, types, layers
 test: check ## check, then the tests
 	$(BIN)/pytest
 
+test-engine: $(STAMP) ## the tests against Pinocchio, which is installed for them
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[pinocchio]'
+	$(BIN)/pytest tests/analytic/test_against_pinocchio.py
+
 bench: $(STAMP) ## performance targets as ratios against a baseline in the same run
 	$(BIN)/python scripts/bench.py
+	$(BIN)/python scripts/bench_design.py
+	$(BIN)/python scripts/bench_modes.py
 
 models: $(STAMP) ## rewrite the golden MJCF files of models/
 	$(BIN)/python scripts/golden.py

@@ -1,0 +1,160 @@
+"""The equations of motion, typed once, for numbers, arrays and symbols alike.
+
+Every function takes its elementary functions from `ops` and its angles one by one, so that the same
+lines run on floats (`SCALAR`), on batches of any shape (`ARRAY`), on complex numbers for exact
+derivatives (`COMPLEX`), and on the expressions from which `taylor` compiles its integrators.
+A pair is `(component 1, component 2)` or `(forward, up)`.
+"""
+
+import cmath
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from legbench.analytic.terms import FloatingTerms, PairTerms
+
+Term = Any
+"""A float, an array, a complex number or an expression."""
+Pair = tuple[Term, Term]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ops:
+    """The functions that differ from one kind of number to another."""
+
+    sin: Callable[[Term], Term]
+    cos: Callable[[Term], Term]
+    sqrt: Callable[[Term], Term]
+
+
+SCALAR = Ops(sin=math.sin, cos=math.cos, sqrt=math.sqrt)
+ARRAY = Ops(sin=np.sin, cos=np.cos, sqrt=np.sqrt)
+COMPLEX = Ops(sin=cmath.sin, cos=cmath.cos, sqrt=cmath.sqrt)
+
+
+def spring_torque(stiffness: Pair, motor: Pair, q: Pair) -> Pair:
+    """Right-hand side of eq. (1): `k_i (q_d,i - q_i)` [N m]."""
+    return stiffness[0] * (motor[0] - q[0]), stiffness[1] * (motor[1] - q[1])
+
+
+def damped(torque: Pair, damping: Pair, v: Pair) -> Pair:
+    """A torque less viscous damping, `- d_i qdot_i` (Table III) [N m]."""
+    return torque[0] - damping[0] * v[0], torque[1] - damping[1] * v[1]
+
+
+def pair_bias(ops: Ops, terms: PairTerms, q: Pair, v: Pair) -> Pair:
+    """`C(q, qdot) qdot + g(q)` of Appendix I [N m]."""
+    swirl = terms.coupling * ops.sin(q[0] - q[1])
+    return (
+        swirl * v[1] * v[1] + terms.moment[0] * ops.sin(q[0]),
+        -swirl * v[0] * v[0] + terms.moment[1] * ops.sin(q[1]),
+    )
+
+
+def pair_solve(ops: Ops, terms: PairTerms, q: Pair, right: Pair) -> Pair:
+    """`M(q)^-1 right` for the inertia matrix of Appendix I, by Cramer's rule."""
+    mixed = terms.coupling * ops.cos(q[0] - q[1])
+    determinant = terms.inertia[0] * terms.inertia[1] - mixed * mixed
+    return (
+        (terms.inertia[1] * right[0] - mixed * right[1]) / determinant,
+        (terms.inertia[0] * right[1] - mixed * right[0]) / determinant,
+    )
+
+
+def pair_acceleration(ops: Ops, terms: PairTerms, q: Pair, v: Pair, torque: Pair) -> Pair:
+    """Eq. (1) solved for the accelerations: `M^-1 (tau - C qdot - g)` [rad/s^2]."""
+    bias = pair_bias(ops, terms, q, v)
+    return pair_solve(ops, terms, q, (torque[0] - bias[0], torque[1] - bias[1]))
+
+
+def pair_kinetic(ops: Ops, terms: PairTerms, q: Pair, v: Pair) -> Term:
+    """`qdot^T M(q) qdot / 2` [J]."""
+    mixed = terms.coupling * ops.cos(q[0] - q[1])
+    own = terms.inertia[0] * v[0] * v[0] + terms.inertia[1] * v[1] * v[1]
+    return 0.5 * own + mixed * v[0] * v[1]
+
+
+def pair_potential(ops: Ops, terms: PairTerms, q: Pair) -> Term:
+    """Of gravity; its gradient is `g(q)` of Appendix I [J]."""
+    return -terms.moment[0] * ops.cos(q[0]) - terms.moment[1] * ops.cos(q[1])
+
+
+def spring_energy(stiffness: Pair, motor: Pair, q: Pair) -> Term:
+    """`U_e` of Fig. 2: `sum k_i (q_d,i - q_i)^2 / 2` [J]."""
+    stretch = (motor[0] - q[0], motor[1] - q[1])
+    return 0.5 * (stiffness[0] * stretch[0] * stretch[0] + stiffness[1] * stretch[1] * stretch[1])
+
+
+def sweep(ops: Ops, q: Pair, along: Pair) -> Pair:
+    """`along_1 dir(q1) + along_2 dir(q2)`, with `dir(a) = (sin a, -cos a)` (forward, up)."""
+    return (
+        along[0] * ops.sin(q[0]) + along[1] * ops.sin(q[1]),
+        -along[0] * ops.cos(q[0]) - along[1] * ops.cos(q[1]),
+    )
+
+
+def sweep_rate(ops: Ops, q: Pair, v: Pair, along: Pair) -> Pair:
+    """First time derivative of `sweep`: `dir'(a) = (cos a, sin a)`."""
+    return (
+        along[0] * ops.cos(q[0]) * v[0] + along[1] * ops.cos(q[1]) * v[1],
+        along[0] * ops.sin(q[0]) * v[0] + along[1] * ops.sin(q[1]) * v[1],
+    )
+
+
+def sweep_acceleration(ops: Ops, q: Pair, v: Pair, a: Pair, along: Pair) -> Pair:
+    """Second time derivative of `sweep`: `dir'' = -dir`."""
+    turning = sweep_rate(ops, q, a, along)
+    centripetal = sweep(ops, q, (along[0] * v[0] * v[0], along[1] * v[1] * v[1]))
+    return turning[0] - centripetal[0], turning[1] - centripetal[1]
+
+
+def flight_acceleration(
+    ops: Ops, terms: FloatingTerms, falling: PairTerms, q: Pair, v: Pair, torque: Pair
+) -> tuple[Pair, Pair]:
+    """Accelerations of trunk [m/s^2] and angles [rad/s^2] of the floating leg without contact.
+
+    The trunk is eliminated: seen from the falling centre of mass the angles move as in eq. (1)
+    without gravity (`falling`), and `m (a_t + g) + d^2/dt^2 sum_i first_i dir(q_i) = 0` gives
+    the trunk.
+    """
+    a = pair_acceleration(ops, falling, q, v, torque)
+    inner = sweep_acceleration(ops, q, v, a, terms.first)
+    return (-inner[0] / terms.mass, -inner[1] / terms.mass - terms.gravity), a
+
+
+def contact_force(ops: Ops, terms: FloatingTerms, q: Pair, v: Pair, a: Pair) -> Pair:
+    """Ground on pinned foot (forward, up): what the centre of mass needs beyond gravity [N].
+
+    `m r_com = m r_foot + sum_i (first_i - m l2) dir(q_i)`, differentiated twice.
+    """
+    inertial = sweep_acceleration(ops, q, v, a, terms.above_foot)
+    return inertial[0], inertial[1] + terms.mass * terms.gravity
+
+
+def free_foot_acceleration(
+    ops: Ops, terms: FloatingTerms, falling: PairTerms, q: Pair, v: Pair, torque: Pair
+) -> Pair:
+    """Of the foot tip if nothing held it (forward, up) [m/s^2]."""
+    trunk, a = flight_acceleration(ops, terms, falling, q, v, torque)
+    inner = sweep_acceleration(ops, q, v, a, (terms.reach, terms.reach))
+    return trunk[0] + inner[0], trunk[1] + inner[1]
+
+
+def touchdown_rates(
+    ops: Ops, stance: PairTerms, terms: FloatingTerms, q: Pair, v: Pair, foot_vel: Pair
+) -> Pair:
+    """Eq. (12) in closed form: joint rates after the foot, at `foot_vel` before, has stopped.
+
+    The impulse acts on the foot alone, so in coordinates (foot, q) the momentum of q stays:
+    `M qdot+ = M qdot- + B v_foot`, `B_i = (first_i - m l2) dir'(q_i)^T`, M of Appendix I.
+    """
+    h1, h2 = terms.above_foot
+    kick = (
+        h1 * (ops.cos(q[0]) * foot_vel[0] + ops.sin(q[0]) * foot_vel[1]),
+        h2 * (ops.cos(q[1]) * foot_vel[0] + ops.sin(q[1]) * foot_vel[1]),
+    )
+    change = pair_solve(ops, stance, q, kick)
+    return v[0] + change[0], v[1] + change[1]

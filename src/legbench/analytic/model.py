@@ -1,0 +1,146 @@
+"""A design as the equations see it, under the conditions of a setup."""
+
+from dataclasses import dataclass
+
+from legbench.analytic.equations import (
+    SCALAR,
+    Ops,
+    Pair,
+    Term,
+    contact_force,
+    damped,
+    flight_acceleration,
+    free_foot_acceleration,
+    pair_acceleration,
+    pair_kinetic,
+    pair_potential,
+    spring_energy,
+    spring_torque,
+    sweep,
+    sweep_rate,
+)
+from legbench.analytic.stops import Stop, make_stops, stop_torque
+from legbench.analytic.terms import (
+    Bars,
+    FloatingTerms,
+    PairTerms,
+    floating_terms,
+    stance_terms,
+)
+from legbench.design import LegDesign
+from legbench.design.statics import GRAVITY
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LegModel:
+    """Constants of one leg: what turns, what pulls, what stops it."""
+
+    floating: FloatingTerms
+    stance: PairTerms
+    """Foot pinned."""
+    hanging: PairTerms
+    """Trunk fixed."""
+    falling: PairTerms
+    """Seen from the centre of mass in flight."""
+    stiffness: tuple[float, float]
+    """[N m/rad]"""
+    damping: tuple[float, float]
+    """[N m s/rad]"""
+    stops: tuple[Stop, ...]
+    """Empty: joints turn freely, through the straight leg too."""
+
+    @classmethod
+    def of(
+        cls,
+        design: LegDesign,
+        *,
+        gravity: float = GRAVITY,
+        bars: Bars | None = None,
+        stops: bool = True,
+        undamped: bool = False,
+    ) -> "LegModel":
+        """Collect the terms of a design; `gravity` in [m/s^2], bars without mass if not given."""
+        floating = floating_terms(design, gravity, bars)
+        return cls(
+            floating=floating,
+            stance=stance_terms(design, gravity) if bars is None else floating.pinned(),
+            hanging=floating.hanging(),
+            falling=floating.falling(),
+            stiffness=design.stiffness,
+            damping=(0.0, 0.0) if undamped else design.damping,
+            stops=make_stops(floating, design.limits) if stops else (),
+        )
+
+    def torque(self, motor: Pair, q: Pair, v: Pair) -> Pair:
+        """Springs, dampers and touched stops on q1 and q2 of one leg [N m]."""
+        torque = self.smooth_torque(motor, q, v)
+        if not self.stops:
+            return torque
+        stop = stop_torque(self.stops, q, v)
+        return torque[0] + stop[0], torque[1] + stop[1]
+
+    def smooth_torque(self, motor: Pair, q: Pair, v: Pair) -> Pair:
+        """Springs and dampers alone; for every kind of number [N m]."""
+        return damped(spring_torque(self.stiffness, motor, q), self.damping, v)
+
+    def stance_acceleration(self, motor: Pair, q: Pair, v: Pair) -> Pair:
+        """Of q1 and q2 while the foot stands [rad/s^2]."""
+        return pair_acceleration(SCALAR, self.stance, q, v, self.torque(motor, q, v))
+
+    def hanging_acceleration(self, motor: Pair, q: Pair, v: Pair) -> Pair:
+        """Of q1 and q2 while the trunk is held [rad/s^2]."""
+        return pair_acceleration(SCALAR, self.hanging, q, v, self.torque(motor, q, v))
+
+    def flight_acceleration(self, motor: Pair, q: Pair, v: Pair) -> tuple[Pair, Pair]:
+        """Of trunk [m/s^2] and of q1, q2 [rad/s^2] while nothing touches the ground."""
+        torque = self.torque(motor, q, v)
+        return flight_acceleration(SCALAR, self.floating, self.falling, q, v, torque)
+
+    def stance_force(self, motor: Pair, q: Pair, v: Pair) -> Pair:
+        """Ground on foot (forward, up) while the foot stands [N]."""
+        a = self.stance_acceleration(motor, q, v)
+        return contact_force(SCALAR, self.floating, q, v, a)
+
+    def released_rise(self, motor: Pair, q: Pair, v: Pair) -> float:
+        """Upward acceleration that the standing foot would have if it were let go [m/s^2]."""
+        torque = self.torque(motor, q, v)
+        return free_foot_acceleration(SCALAR, self.floating, self.falling, q, v, torque)[1]
+
+    def foot_from_hip(self, q: Pair, ops: Ops = SCALAR) -> Pair:
+        """Foot tip seen from the hip (forward, up) [m]."""
+        return sweep(ops, q, (self.floating.reach, self.floating.reach))
+
+    def foot_vel_from_hip(self, q: Pair, v: Pair, ops: Ops = SCALAR) -> Pair:
+        """Velocity of the foot tip seen from the hip [m/s]."""
+        return sweep_rate(ops, q, v, (self.floating.reach, self.floating.reach))
+
+    def mass_centre_from_hip(self, q: Pair, ops: Ops = SCALAR) -> Pair:
+        """Centre of mass seen from the hip [m]."""
+        moved = sweep(ops, q, self.floating.first)
+        return moved[0] / self.floating.mass, moved[1] / self.floating.mass
+
+    def mass_centre_vel_from_hip(self, q: Pair, v: Pair, ops: Ops = SCALAR) -> Pair:
+        """Velocity of the centre of mass seen from the hip [m/s]."""
+        moved = sweep_rate(ops, q, v, self.floating.first)
+        return moved[0] / self.floating.mass, moved[1] / self.floating.mass
+
+    def spring_energy(self, motor: Pair, q: Pair) -> Term:
+        """Stored in the series springs [J]."""
+        return spring_energy(self.stiffness, motor, q)
+
+    def pair_energy(self, terms: PairTerms, q: Pair, v: Pair, ops: Ops = SCALAR) -> Pair:
+        """Gravity's potential and kinetic energy of a leg whose foot or trunk is held [J]."""
+        return pair_potential(ops, terms, q), pair_kinetic(ops, terms, q, v)
+
+    def floating_energy(self, height: Term, hip_vel: Pair, q: Pair, v: Pair) -> Pair:
+        """Potential over the ground and kinetic energy of the free leg, hip at `height` [J].
+
+        Koenig: the centre of mass, and the angles around it.
+        """
+        mass = self.floating.mass
+        centre = self.mass_centre_from_hip(q)
+        inner = self.mass_centre_vel_from_hip(q, v)
+        moved = hip_vel[0] + inner[0], hip_vel[1] + inner[1]
+        kinetic = 0.5 * mass * (moved[0] * moved[0] + moved[1] * moved[1])
+        kinetic += pair_kinetic(SCALAR, self.falling, q, v)
+        return mass * self.floating.gravity * (height + centre[1]), kinetic

@@ -1,0 +1,107 @@
+"""Where a leg is, what it touches, and what happened on the way."""
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+
+from legbench.analytic.equations import Pair
+from legbench.analytic.model import LegModel
+from legbench.errors import ConfigError
+
+
+class Regime(StrEnum):
+    """Which equations hold."""
+
+    FLIGHT = "flight"
+    """Nothing touches the ground."""
+    STANCE = "stance"
+    """The foot stands still on the ground."""
+    PINNED = "pinned"
+    """The foot is held and cannot lift off (FFS)."""
+    HANGING = "hanging"
+    """The trunk is held (hFTS, vFTS)."""
+
+    @property
+    def stands(self) -> bool:
+        """Whether the foot is held by the ground."""
+        return self in (Regime.STANCE, Regime.PINNED)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LegState:
+    """One leg at one instant; pairs are (1, 2) or (forward, up)."""
+
+    time: float
+    """[s]"""
+    regime: Regime
+    q: Pair
+    """[rad]"""
+    v: Pair
+    """[rad/s]"""
+    trunk_pos: Pair
+    """Hip in the world, ground at height 0 [m]."""
+    trunk_vel: Pair
+    """[m/s]"""
+    since: float = -math.inf
+    """When the regime began; a start has always been in it [s]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Transition:
+    """A touchdown or a lift-off."""
+
+    time: float
+    """[s]"""
+    before: LegState
+    after: LegState
+
+    @property
+    def touchdown(self) -> bool:
+        """Otherwise a lift-off."""
+        return self.after.regime is Regime.STANCE
+
+
+def standing(
+    model: LegModel, q: Pair, v: Pair = (0.0, 0.0), *, time: float = 0.0, pinned: bool = False
+) -> LegState:
+    """A leg whose foot stands at the origin."""
+    foot, foot_vel = model.foot_from_hip(q), model.foot_vel_from_hip(q, v)
+    return LegState(
+        time=time,
+        regime=Regime.PINNED if pinned else Regime.STANCE,
+        q=q,
+        v=v,
+        trunk_pos=(-foot[0], -foot[1]),
+        trunk_vel=(-foot_vel[0], -foot_vel[1]),
+    )
+
+
+def flying(
+    model: LegModel, q: Pair, v: Pair, trunk_pos: Pair, trunk_vel: Pair, *, time: float = 0.0
+) -> LegState:
+    """A leg in the air.
+
+    Raises:
+        ConfigError: the foot would be below the ground, or lower than the leg can ever be.
+    """
+    height = trunk_pos[1] + model.foot_from_hip(q)[1]
+    if height < 0.0:
+        raise ConfigError(
+            f"the start puts the foot {-1e3 * height:.3g} mm below the ground; raise the trunk "
+            f"from {trunk_pos[1]:.4g} m to {trunk_pos[1] - height:.4g} m or more"
+        )
+    return LegState(
+        time=time, regime=Regime.FLIGHT, q=q, v=v, trunk_pos=trunk_pos, trunk_vel=trunk_vel
+    )
+
+
+def energy(model: LegModel, state: LegState, motor: Pair) -> float:
+    """Gravity, motion and springs [J]; constant while nothing is damped, hit or commanded."""
+    spring = model.spring_energy(motor, state.q)
+    if state.regime is Regime.HANGING:
+        potential, kinetic = model.pair_energy(model.hanging, state.q, state.v)
+    else:
+        potential, kinetic = model.floating_energy(
+            state.trunk_pos[1], state.trunk_vel, state.q, state.v
+        )
+    return potential + kinetic + spring

@@ -1,0 +1,241 @@
+"""`legbench hop`: the apex return map of a leg, its periodic hops and their basin."""
+
+import json
+import math
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import tyro
+
+from legbench.analytic import LegModel
+from legbench.analytic.taylor import TaylorLeg
+from legbench.cli.output import note, print_json, progress
+from legbench.cli.parse import parse
+from legbench.control import JumpConfig
+from legbench.design import LegDesign, load_design
+from legbench.design.statics import Support
+from legbench.errors import ConfigError
+from legbench.modes.basin import Axis, Fate, Question, map_basin
+from legbench.modes.drive import JumpLaw, Passive
+from legbench.modes.hop import Apex, FixedPoint, fixed_point, settle
+from legbench.modes.passive import free_hops
+from legbench.modes.scene import make_scene
+from legbench.modes.slip import Slip, leg_groups, slip_groups
+from legbench.signals import Ints
+
+DROPS = (0.02, 0.05, 0.1)
+"""From which leg and template are compared [m]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HopArguments:
+    """Hopping as a map from apex to apex."""
+
+    design: Annotated[Path, tyro.conf.Positional]
+    """Design file."""
+    passive: bool = False
+    """Motors held and no damping, instead of the jump controller."""
+    rest: float = 0.9
+    """Passive: set point z2 of the standing leg, orthonormal [rad]."""
+    jump: JumpConfig = field(default_factory=JumpConfig)
+    height: float | None = None
+    """Apex of the centre of mass to start from [m]; none: 30 mm over standing."""
+    hops: int = 60
+    """Hops until the leg should be periodic."""
+    basin: int = 0
+    """Points a side of the basin map; 0: none."""
+    across: str = "z1"
+    """What varies to the right in the basin map."""
+    across_span: float = 0.3
+    """How far, either way."""
+    up: str = "height"
+    """What varies upwards."""
+    up_span: float = 0.08
+    """How far, either way."""
+    workers: int = 2
+    """Processes for the basin map."""
+    out: Path | None = None
+    """Folder for hop.json, pictures and the basin's rows; a map begun there is continued."""
+    json: bool = False
+    """One JSON object instead of tables."""
+
+
+def main(arguments: list[str]) -> int:
+    """Run the command."""
+    flags = parse(HopArguments, "hop", arguments)
+    if flags.basin and flags.out is None:
+        raise ConfigError("a basin map needs --out, the folder that it is written to")
+    if flags.hops < 1:
+        raise ConfigError(f"hops is {flags.hops}; it must be 1 or more")
+    design = load_design(flags.design)
+    content = _passive(flags, design) if flags.passive else _driven(flags, design)
+    if flags.json:
+        print_json(content)
+    if flags.out is not None:
+        _save(flags.out, content)
+    return 0
+
+
+def _driven(flags: HopArguments, design: LegDesign) -> dict[str, Any]:
+    model, law = LegModel.of(design), JumpLaw(flags.jump, design)
+    leg = TaylorLeg(model, probe=law.probe)
+    z2 = flags.jump.z2 + flags.jump.dz2
+    q = (-z2 * math.sqrt(0.5), z2 * math.sqrt(0.5))
+    standing = model.mass_centre_from_hip(q)[1] - model.foot_from_hip(q)[1]
+    height = standing + 0.03 if flags.height is None else flags.height
+    start = Apex(height=height, speed=0.0, z1=0.0, z2=z2, dz1=0.0, dz2=0.0)
+    apexes = settle(leg, law, start, flags.hops)
+    if len(apexes) <= flags.hops:
+        raise ConfigError(
+            f"the leg stops hopping after {len(apexes) - 1} of {flags.hops} hops from an apex of "
+            f"{height:.4g} m; change --dz2 or --height"
+        )
+    point = fixed_point(leg, law, apexes[-1])
+    content: dict[str, Any] = {
+        "design": design.name,
+        "drive": "jump",
+        "jump": asdict(flags.jump),
+        "apexes": [asdict(apex) for apex in apexes],
+        "fixed_points": [_point(point)],
+    }
+    if not flags.json:
+        print(f"{design.name} under the jump controller (continuous time)")
+        print("\nhop   apex height [m]   speed [m/s]   z1 [rad]")
+        for index in range(0, len(apexes), max(1, len(apexes) // 12)):
+            apex = apexes[index]
+            print(f"{index:3d} {apex.height:17.5f} {apex.speed:13.5f} {apex.z1:10.5f}")
+        _print_point(point)
+    if flags.out is not None:
+        _plot_return(flags.out, design, apexes, point)
+    if flags.basin and flags.out is not None:
+        fates = _basin(flags, design, point, flags.out)
+        content["basin"] = _share(fates)
+        if not flags.json:
+            print("\nbasin   " + ", ".join(f"{k} {v:.1%}" for k, v in _share(fates).items()))
+    return content
+
+
+def _passive(flags: HopArguments, design: LegDesign) -> dict[str, Any]:
+    from legbench.design.setup import SetupKind
+
+    scene = make_scene(design, SetupKind.JUMP, flags.rest)
+    model, half = LegModel.of(design, undamped=True), 0.5 * (scene.motor[1] - scene.motor[0])
+    if abs(scene.motor[0] + scene.motor[1]) > 1e-12:
+        note("the motors are set symmetrically; this leg is not quite matched")
+    drive = Passive((-half, half))
+    leg = TaylorLeg(model, probe=drive.probe)
+    depth = np.linspace(scene.rest[1], 0.5 * design.limits.knee[1], 150)
+    points: list[FixedPoint] = []
+    for apex in free_hops(leg, drive, depth):
+        try:
+            points.append(fixed_point(leg, drive, apex))
+        except ConfigError as error:
+            note(f"not a hop of this leg: {error}")
+    slip = Slip.of(model, half)
+    compared = [
+        {"drop": drop, "leg": asdict(leg_groups(leg, slip, half, drop))}
+        | {"slip": asdict(slip_groups(slip, drop))}
+        for drop in DROPS
+    ]
+    if not flags.json:
+        print(f"{design.name}, motors held at half angle {half:.4f} rad, undamped")
+        print(f"\n{len(points)} hops without impact on x1 = 0")
+        for point in points:
+            _print_point(point)
+        _print_slip(slip, compared)
+    return {
+        "design": design.name,
+        "drive": "passive",
+        "support": str(Support.FOOT),
+        "motor_half": half,
+        "fixed_points": [_point(point) for point in points],
+        "slip": asdict(slip) | {"firmness": slip.firmness},
+        "compared": compared,
+    }
+
+
+def _print_slip(slip: Slip, compared: list[dict[str, Any]]) -> None:
+    print(
+        f"\ntemplate: m = {slip.mass:.4g} kg, k = {slip.stiffness:.4g} N/m, "
+        f"l = {slip.length:.4g} m, k l / m g = {slip.firmness:.3f}"
+    )
+    names = list(compared[0]["leg"])
+    print("            " + " ".join(f"{name:>13}" for name in names))
+    for entry in compared:
+        for who in ("leg", "slip"):
+            print(f"{who:<12}" + " ".join(f"{entry[who][name]:13.4f}" for name in names))
+
+
+def _print_point(point: FixedPoint) -> None:
+    apex, done = point.apex, point.hop
+    flight = done.duration - (done.liftoff - done.touchdown)
+    sizes = ", ".join(f"{abs(value):.4g}" for value in point.multipliers)
+    print(
+        f"\nperiodic hop   apex {apex.height:.5f} m, speed {apex.speed:+.5f} m/s, "
+        f"z1 {apex.z1:+.5f} rad, z2 {apex.z2:.5f} rad"
+    )
+    print(
+        f"  period {done.duration:.5f} s, flight {flight:.5f} s, impact {1e3 * done.impact:.3g} mJ"
+    )
+    print(f"  multipliers {sizes}: {'stable' if point.stable else 'not stable'}")
+
+
+def _point(point: FixedPoint) -> dict[str, Any]:
+    return {
+        "apex": asdict(point.apex),
+        "period": point.hop.duration,
+        "touchdown": point.hop.touchdown,
+        "liftoff": point.hop.liftoff,
+        "impact": point.hop.impact,
+        "multipliers": [[value.real, value.imag] for value in point.multipliers],
+        "residual": point.residual,
+    }
+
+
+def _plot_return(out: Path, design: LegDesign, apexes: list[Apex], point: FixedPoint) -> None:
+    from legbench.cli.mode_plots import plot_return
+
+    heights = np.array([apex.height for apex in apexes])
+    pairs = np.stack([heights[:-1], heights[1:]], axis=-1)
+    title = f"{design.name}: apex return map"
+    plot_return(pairs, point.apex.height, title, out / "return.png")
+    note(f"wrote {out / 'return.png'}")
+
+
+def _basin(flags: HopArguments, design: LegDesign, point: FixedPoint, out: Path) -> Ints:
+    from legbench.cli.mode_plots import plot_basin
+
+    def axis(name: str, span: float) -> Axis:
+        middle = getattr(point.apex, name, 0.0)
+        return Axis(name=name, low=middle - span, high=middle + span, count=flags.basin)
+
+    question = Question(
+        design=design,
+        jump=flags.jump,
+        motor=(0.0, 0.0),
+        undamped=False,
+        centre=point.apex,
+        across=axis(flags.across, flags.across_span),
+        up=axis(flags.up, flags.up_span),
+    )
+    rows = out / "basin.jsonl"
+    fates = map_basin(question, rows, workers=flags.workers, progress=progress)
+    plot_basin(question, fates, out / "basin.png")
+    note(f"wrote {rows} and {out / 'basin.png'}")
+    return fates
+
+
+def _share(fates: Ints) -> dict[str, float]:
+    return {fate.name.lower(): float(np.mean(fates == fate)) for fate in Fate if fate in fates}
+
+
+def _save(out: Path, content: dict[str, Any]) -> None:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        text = json.dumps(content, indent=1, allow_nan=False)
+        (out / "hop.json").write_text(text + "\n", encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(f"{out} cannot be written: {error}") from error
+    note(f"wrote {out / 'hop.json'}")

@@ -1,0 +1,230 @@
+"""Which hops end in the periodic one: a grid of starts, each followed until it is clear.
+
+Rows of the grid go to a file as they are finished, so a map that was interrupted goes on where
+it stopped; the file begins with what was asked, and a different question is refused.
+"""
+
+import json
+import multiprocessing
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from enum import IntEnum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from legbench.analytic import LegModel
+from legbench.analytic.taylor import TaylorLeg
+from legbench.control import JumpConfig
+from legbench.design import LegDesign
+from legbench.design.toml import design_to_mapping
+from legbench.errors import ConfigError
+from legbench.modes.drive import AbstractDrive, JumpLaw, Passive
+from legbench.modes.hop import NAMES, UNITS, Apex, Ending, return_map
+from legbench.signals import Floats, Ints
+
+Progress = Callable[[int, int], None]
+
+
+class Fate(IntEnum):
+    """What became of a start."""
+
+    RETURNS = 0
+    """Ended in the periodic hop."""
+    WANDERS = 1
+    """Still hops, not (yet) periodically."""
+    STANDS = 2
+    """Came to stand."""
+    FELL = 3
+    """Swung over."""
+    FAULT = 4
+    """Could not be followed."""
+    BURIED = 5
+    """Began with the foot under the ground."""
+
+
+ENDINGS = {Ending.STANDS: Fate.STANDS, Ending.FELL: Fate.FELL, Ending.FAULT: Fate.FAULT}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Axis:
+    """One side of the grid.
+
+    Raises:
+        ConfigError: an unknown number of the apex, or an empty range.
+    """
+
+    name: str
+    """One of the apex's six numbers."""
+    low: float
+    high: float
+    count: int
+
+    def __post_init__(self) -> None:
+        if self.name not in NAMES:
+            raise ConfigError(f"axis '{self.name}' is unknown; an apex has {', '.join(NAMES)}")
+        if not (self.low < self.high and self.count >= 2):
+            raise ConfigError(
+                f"axis {self.name} runs from {self.low:g} to {self.high:g} in {self.count} points; "
+                "it needs low < high and two points or more"
+            )
+
+    def values(self) -> Floats:
+        """The grid points (count,)."""
+        return np.linspace(self.low, self.high, self.count)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Question:
+    """Everything that decides a basin map.
+
+    Raises:
+        ConfigError: both axes the same, or no hop at all.
+    """
+
+    design: LegDesign
+    jump: JumpConfig | None
+    """The jump controller, or none: motors held at `motor`."""
+    motor: tuple[float, float]
+    """[rad]"""
+    undamped: bool
+    centre: Apex
+    """The periodic hop; starts differ from it along the axes only."""
+    across: Axis
+    up: Axis
+    hops: int = 25
+    """Until a start is said to wander."""
+    near: float = 0.05
+    """Distance from the periodic hop that counts as returned, in units of `hop.UNITS` [-]."""
+
+    def __post_init__(self) -> None:
+        if self.across.name == self.up.name:
+            raise ConfigError(f"both axes are {self.up.name}; a map needs two different ones")
+        if self.hops < 1:
+            raise ConfigError(f"hops is {self.hops}; it must be 1 or more")
+
+    def text(self) -> str:
+        """One line of JSON; equal for equal questions."""
+        content = asdict(self) | {"design": design_to_mapping(self.design)}
+        return json.dumps(content, sort_keys=True)
+
+    def tools(self) -> tuple[TaylorLeg, AbstractDrive]:
+        """The compiled leg and its drive."""
+        model = LegModel.of(self.design, undamped=self.undamped)
+        drive = JumpLaw(self.jump, self.design) if self.jump else Passive(self.motor)
+        return TaylorLeg(model, probe=drive.probe), drive
+
+
+def fate_of(leg: TaylorLeg, drive: AbstractDrive, question: Question, start: Apex) -> Fate:
+    """Hop from a start until it is clear where it leads."""
+    wanted, at = question.centre.vector(), start
+    for _ in range(question.hops):
+        try:
+            done = return_map(leg, drive, at)
+        except ConfigError:
+            return Fate.BURIED
+        if done.after is None:
+            return ENDINGS[done.ending]
+        at = done.after
+        if np.max(np.abs(at.vector() - wanted) / UNITS) < question.near:
+            return Fate.RETURNS
+    return Fate.WANDERS
+
+
+_worker: tuple[Question, TaylorLeg, AbstractDrive] | None = None
+
+
+def _start_worker(question: Question) -> None:
+    global _worker
+    _worker = (question, *question.tools())
+
+
+def _row(index: int) -> tuple[int, list[int]]:
+    if _worker is None:
+        raise RuntimeError("the worker was not started")
+    question, leg, drive = _worker
+    places = {name: NAMES.index(name) for name in (question.across.name, question.up.name)}
+    vector = question.centre.vector()
+    vector[places[question.up.name]] = question.up.values()[index]
+    fates = []
+    for value in question.across.values():
+        vector[places[question.across.name]] = value
+        fates.append(int(fate_of(leg, drive, question, Apex.of(vector))))
+    return index, fates
+
+
+def _read(path: Path, question: Question) -> dict[int, list[int]]:
+    """Rows that an earlier run has finished; a last line that was cut off does not count."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    if not lines or lines[0] != question.text():
+        raise ConfigError(
+            f"{path} belongs to another map; give a new file or remove it to start afresh"
+        )
+    rows: dict[int, list[int]] = {}
+    for line in lines[1:]:
+        try:
+            entry = json.loads(line)
+            index, fates = int(entry["row"]), [int(fate) for fate in entry["fates"]]
+        except (ValueError, KeyError, TypeError):
+            continue
+        if len(fates) == question.across.count and 0 <= index < question.up.count:
+            rows[index] = fates
+    return rows
+
+
+def map_basin(
+    question: Question, path: Path, *, workers: int = 2, progress: Progress | None = None
+) -> Ints:
+    """Fates (up, across) of the whole grid; written to `path` row by row.
+
+    Raises:
+        ConfigError: `path` holds the rows of another question, or cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        rows = _read(path, question) if path.exists() else {}
+        text = "\n".join([question.text(), *(_line(*row) for row in sorted(rows.items()))])
+        path.write_text(text + "\n", encoding="utf-8")
+        todo = [index for index in range(question.up.count) if index not in rows]
+        with path.open("a", encoding="utf-8") as file:
+            for index, fates in _rows(question, todo, workers):
+                rows[index] = fates
+                file.write(_line(index, fates) + "\n")
+                file.flush()
+                if progress is not None:
+                    progress(len(rows), question.up.count)
+    except OSError as error:
+        raise ConfigError(f"{path} cannot be written: {error}") from error
+    return np.array([rows[index] for index in range(question.up.count)], dtype=np.int64)
+
+
+def _line(index: int, fates: list[int]) -> str:
+    return json.dumps({"row": index, "fates": fates})
+
+
+def _rows(question: Question, todo: list[int], workers: int) -> Iterator[tuple[int, list[int]]]:
+    if not todo:
+        return
+    if workers == 1:
+        _start_worker(question)
+        yield from map(_row, todo)
+        return
+    with _pool(question, workers) as pool:
+        for future in as_completed([pool.submit(_row, index) for index in todo]):
+            yield future.result()
+
+
+@contextmanager
+def _pool(question: Question, workers: int) -> Iterator[ProcessPoolExecutor]:
+    """Fresh processes: a compiled leg does not survive a fork."""
+    context: Any = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(
+        workers, mp_context=context, initializer=_start_worker, initargs=(question,)
+    )
+    try:
+        yield pool
+    finally:
+        pool.shutdown(cancel_futures=True)

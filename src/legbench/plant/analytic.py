@@ -1,0 +1,150 @@
+"""One leg in the equations of the paper, behind the same seam as the simulated one."""
+
+import math
+from typing import final
+
+import numpy as np
+
+from legbench.analytic import HybridLeg, LegModel, LegState, Regime, Transition, standing
+from legbench.analytic.smooth import Accuracy
+from legbench.analytic.terms import Bars
+from legbench.design import LegDesign
+from legbench.design.setup import Setup, SetupKind
+from legbench.design.statics import GRAVITY
+from legbench.errors import ConfigError, PlantFault
+from legbench.plant.abstract import AbstractPlant
+from legbench.plant.start import PERIOD, Start
+from legbench.servo import Servo, ServoConfig
+from legbench.signals import Command, Observation, Truth
+
+STRAIGHT_MARGIN = 0.02
+"""A knee this close to 0 or pi has gone through its stop [rad]."""
+HANGING_BEND = 0.6
+"""A fixed trunk is as high as that of a standing leg with this half angle [rad]."""
+
+
+@final
+class AnalyticPlant(AbstractPlant):
+    """The leg of a design under eqs. (1) and (12), commands sampled and held at 1 kHz.
+
+    Joint stops are elastic (`legbench.analytic.stops`), the foot neither slides nor bounces, and
+    the bars have no mass unless `bars` says so. The contact force is that of the instant; contact
+    is told also for a touch that began and ended within the cycle.
+
+    Attributes:
+        transitions: touchdowns and lift-offs since the reset, in order.
+
+    Raises:
+        ConfigError: a setup with a boom, which these equations do not know.
+    """
+
+    def __init__(
+        self,
+        design: LegDesign,
+        setup: Setup,
+        start: Start,
+        servo: ServoConfig | None = None,
+        accuracy: Accuracy | None = None,
+        bars: Bars | None = None,
+    ) -> None:
+        if setup.boom_radius is not None:
+            raise ConfigError(
+                f"the analytic plant has no boom (boom_radius {setup.boom_radius:g} m): leave it "
+                "out, or use the simulated plant"
+            )
+        self.period = PERIOD
+        self.transitions: list[Transition] = []
+        gravity = 0.0 if setup.kind is SetupKind.HFTS else GRAVITY
+        self._model = LegModel.of(design, gravity=gravity, bars=bars)
+        self._leg = HybridLeg(self._model, accuracy)
+        self._setup, self._start = setup, start
+        self._servo = Servo(servo or ServoConfig(), PERIOD)
+        self._stiffness = np.asarray(design.stiffness)
+        self._state = self._first_state()
+        self._motor = start.motor_pos
+        self._touched = False
+        self._cycle = 0
+
+    def reset(self) -> Observation:
+        """Put the leg at rest in its start posture."""
+        self._state, self._motor = self._first_state(), self._start.motor_pos
+        self._servo.reset(self._motor)
+        self.transitions = []
+        self._touched = False
+        self._cycle = 0
+        return self._observe(Command.holding(self._motor))
+
+    def step(self, command: Command) -> Observation:
+        """Apply a command over one period.
+
+        Raises:
+            PlantFault: the integration failed, or the leg straightened or folded through.
+        """
+        self._motor = self._servo.follow(command.motor_pos)
+        self._cycle += 1
+        motor = (float(self._motor[0]), float(self._motor[1]))
+        self._state, happened = self._leg.advance(self._state, self._cycle * PERIOD, motor)
+        self._touched = bool(happened)
+        self.transitions += happened
+        knee = self._state.q[1] - self._state.q[0]
+        if not STRAIGHT_MARGIN <= knee <= math.pi - STRAIGHT_MARGIN:
+            cause = "leg straightened through" if knee < 1.0 else "leg folded through"
+            raise PlantFault(
+                cause,
+                f"{cause} at t = {self._cycle * PERIOD:.3f} s: the stops did not hold; push less "
+                "(--dz2) or limit the servo (--slew-rate)",
+            )
+        return self._observe(command)
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+    def _first_state(self) -> LegState:
+        q = (float(self._start.joint_pos[0]), float(self._start.joint_pos[1]))
+        if self._setup.trunk_moves:
+            return standing(self._model, q, pinned=self._setup.kind is SetupKind.FFS)
+        height = 2.0 * self._model.floating.reach * math.cos(HANGING_BEND)
+        return LegState(
+            time=0.0,
+            regime=Regime.HANGING,
+            q=q,
+            v=(0.0, 0.0),
+            trunk_pos=(0.0, height),
+            trunk_vel=(0.0, 0.0),
+        )
+
+    def _observe(self, command: Command) -> Observation:
+        state = self._state
+        joint_pos = self._servo.encode(np.array(state.q))
+        motor_pos = self._servo.encode(self._motor.copy())
+        return Observation(
+            time=self._cycle * PERIOD,
+            motor_pos=motor_pos,
+            joint_pos=joint_pos,
+            joint_vel=np.array(state.v),
+            spring_torque=self._stiffness * (motor_pos - joint_pos),
+            applied_pos=command.motor_pos.copy(),
+            truth=self._truth(state),
+        )
+
+    def _truth(self, state: LegState) -> Truth:
+        model = self._model
+        foot = model.foot_from_hip(state.q)
+        tip = (state.trunk_pos[0] + foot[0], state.trunk_pos[1] + foot[1])
+        force = (0.0, 0.0)
+        if state.regime.stands:
+            motor = (float(self._motor[0]), float(self._motor[1]))
+            force, tip = model.stance_force(motor, state.q, state.v), (tip[0], 0.0)
+        if state.regime is Regime.HANGING:
+            energy = model.pair_energy(model.hanging, state.q, state.v)
+        else:
+            energy = model.floating_energy(state.trunk_pos[1], state.trunk_vel, state.q, state.v)
+        return Truth(
+            trunk_pos=np.array(state.trunk_pos),
+            trunk_vel=np.array(state.trunk_vel),
+            foot_pos=np.array(tip),
+            contact_force=np.array(force),
+            contact=np.asarray(state.regime.stands or self._touched),
+            energy=np.array(energy),
+            loop_gap=np.zeros(2),
+        )

@@ -1,0 +1,6 @@
+"""The exact leg is shared with the tests of the equations."""
+
+import sys
+from pathlib import Path
+
+sys.path.append(str(Path(__file__).parents[1] / "analytic"))
