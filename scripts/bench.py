@@ -56,7 +56,8 @@ def timed(work: Callable[[], object]) -> float:
 
 def ratio_of(candidate: Callable[[], object], baseline: Callable[[], object]) -> tuple[float, str]:
     """Median of candidate over baseline, in turns after a warm-up, and the medians in words."""
-    candidate(), baseline()
+    candidate()
+    baseline()
     pairs = [(timed(candidate), timed(baseline)) for _ in range(PAIRS)]
     ratio = statistics.median(ours / bare for ours, bare in pairs)
     ours, bare = (statistics.median(column) for column in zip(*pairs, strict=True))

@@ -30,7 +30,7 @@ def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("mass = 207", "mass = -207", ("[thigh] mass is -0.207 kg",)),
         ("length = 133", "length = 140", ("0.14 m", "0.133 m", "l2 = l1 + l3")),
         ("[thigh]", "[thigh", ("not valid TOML",)),
-        ("mass = 637", "mass = 0.9", ("bars weigh 0.001519 kg", "reduced")),
+        ("mass = 637", "mass = 0.9", ("bars weigh 0.001302 kg", "reduced")),
         ("inertia = 70", "inertia = 1e-14", ("MuJoCo refuses", "'optimal'")),
     ],
     ids=["negative mass", "lengths", "malformed", "light trunk", "tiny inertia"],
