@@ -5,13 +5,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from tyro.conf import Positional
+from tyro.conf import Positional, UseAppendAction
 
 from legbench.cli.output import note, print_json
 from legbench.cli.parse import parse
-from legbench.cli.table import print_summary
-from legbench.metrics import summarise
+from legbench.cli.table import print_comparison, print_summary
+from legbench.metrics import Comparison, compare, summarise
 from legbench.recording.reader import Recording, load
+
+SHOWN = 4
+"""Entries in which two manifests differ that a note lists."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,6 +23,8 @@ class ReplayArguments:
 
     run: Annotated[Path, Positional]
     """Run folder; a torn one is read as far as it goes."""
+    against: UseAppendAction[tuple[Path, ...]] = ()
+    """Another run to compare with and to draw over this one; may be repeated."""
     view: bool = False
     """Open it in rerun."""
     serve: bool = False
@@ -35,29 +40,48 @@ class ReplayArguments:
 def main(arguments: list[str]) -> int:
     """Replay; 0 also for a run that a fault had ended."""
     chosen = parse(ReplayArguments, "replay", arguments)
-    recording = load(chosen.run)
-    if recording.torn is not None:
-        note(f"legbench: {chosen.run} is torn ({recording.torn}); read as far as it goes")
+    recording, *others = [_loaded(path) for path in (chosen.run, *chosen.against)]
     summary = summarise(recording)
+    comparisons = [_compared(recording, other) for other in others]
     if chosen.figure is not None:
         from legbench.viz.figures import phase_figure, save_figure
 
-        note(f"wrote {save_figure(phase_figure(recording), chosen.figure)}")
+        note(f"wrote {save_figure(phase_figure(recording, others), chosen.figure)}")
     if chosen.json:
-        print_json(summary.to_json())
+        against = {"against": [each.to_json() for each in comparisons]} if others else {}
+        print_json(summary.to_json() | against)
     else:
         print_summary(summary)
+        for comparison in comparisons:
+            print_comparison(comparison)
     if chosen.rrd is not None or chosen.view or chosen.serve:
-        show(recording, chosen)
+        show(recording, others, chosen)
     return 0
 
 
-def show(recording: Recording, chosen: ReplayArguments) -> None:
+def _loaded(path: Path) -> Recording:
+    recording = load(path)
+    if recording.torn is not None:
+        note(f"legbench: {path} is torn ({recording.torn}); read as far as it goes")
+    return recording
+
+
+def _compared(recording: Recording, other: Recording) -> Comparison:
+    comparison = compare(recording, other)
+    if unlike := comparison.unlike:
+        listed = ", ".join(unlike[:SHOWN]) + (
+            f" and {len(unlike) - SHOWN} more entries" if len(unlike) > SHOWN else ""
+        )
+        note(f"legbench: {comparison.other} is another experiment: it differs in {listed}")
+    return comparison
+
+
+def show(recording: Recording, others: list[Recording], chosen: ReplayArguments) -> None:
     """Write the rerun file, and open it where that was asked for."""
     from legbench.viz.rrd import write_rrd
     from legbench.viz.viewer import open_viewer
 
-    rrd = write_rrd(recording, chosen.rrd or recording.path / "view.rrd")
+    rrd = write_rrd(recording, chosen.rrd or recording.path / "view.rrd", others)
     note(f"wrote {rrd}")
     if not (chosen.view or chosen.serve):
         return

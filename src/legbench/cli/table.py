@@ -2,7 +2,7 @@
 
 import math
 
-from legbench.metrics import Summary
+from legbench.metrics import Comparison, Summary
 
 Row = tuple[str, float, str, float]
 """Label, value, unit, factor from SI to that unit."""
@@ -27,6 +27,26 @@ def print_summary(summary: Summary) -> None:
             print(f"{label:<17} {value * factor:.4g} {unit}")
 
 
+def print_comparison(comparison: Comparison) -> None:
+    """Print how another run differs; what one of the two does not show is left out."""
+    print()
+    print(f"{'against':<17} {comparison.other}")
+    print(f"{'':<17} {comparison.other_name} minus {comparison.run_name}")
+    for label, value, unit, factor in _differences(comparison):
+        if math.isfinite(value):
+            print(f"{label:<17} {value * factor:.4g} {unit}")
+    for label, values, unit, factor in (
+        ("lift-off", comparison.liftoff, "ms", 1e3),
+        ("touchdown", comparison.touchdown, "ms", 1e3),
+        ("apex height", comparison.apex_height, "%", 1e2),
+    ):
+        known = [factor * value for value in values if math.isfinite(value)]
+        if known:
+            largest = max(known, key=abs)
+            ends = f"{known[0]:+.4g} first, {largest:+.4g} largest, {known[-1]:+.4g} last"
+            print(f"{label:<17} {ends} of {len(known)} [{unit}]")
+
+
 def _ratings(values: list[float]) -> str:
     return f"{min(values):.4f} lowest, {values[-1]:.4f} last of {len(values)}"
 
@@ -42,4 +62,18 @@ def _rows(summary: Summary) -> tuple[Row, ...]:
         ("energy residual", summary.energy_residual, "of the peak kinetic energy", 1.0),
         ("duration", summary.duration, "s", 1.0),
         ("speed", summary.real_time_factor, "x real time", 1.0),
+    )
+
+
+def _differences(comparison: Comparison) -> tuple[Row, ...]:
+    landing = f"rad before the first touchdown at {comparison.first_touchdown:.4g} s"
+    common = f"rad over {comparison.duration:.4g} s"
+    return (
+        ("|dq|, max", comparison.joint_before_touchdown, landing, 1.0),
+        ("|dz2|, max", comparison.z2_before_touchdown, landing, 1.0),
+        ("|dq|, max", comparison.joint_max, common, 1.0),
+        ("|dz2|, max", comparison.z2_max, common, 1.0),
+        ("P^r stance", comparison.rating_stance, "between the means", 1.0),
+        ("P^r flight", comparison.rating_flight, "between the means", 1.0),
+        ("P^r periods", comparison.rating_periods, "between the means", 1.0),
     )

@@ -1,6 +1,7 @@
 """What is measured from recordings alone, whatever plant made them."""
 
 from legbench.metrics.budget import EnergyBudget, energy_budget
+from legbench.metrics.compare import Comparison, Differences, compare, differences
 from legbench.metrics.energy import Flows, energy_flows, energy_residual, loop_gap_max
 from legbench.metrics.jump import JumpFigures, jump_figures
 from legbench.metrics.modal import Trajectory, trajectory
@@ -11,6 +12,8 @@ from legbench.metrics.source import Recorded, Reference, Terms, terms_of
 from legbench.metrics.summary import Summary, summarise
 
 __all__ = [
+    "Comparison",
+    "Differences",
     "EnergyBudget",
     "Flows",
     "Gait",
@@ -24,7 +27,9 @@ __all__ = [
     "Terms",
     "Trajectory",
     "alignment",
+    "compare",
     "deflection",
+    "differences",
     "energy_budget",
     "energy_flows",
     "energy_residual",

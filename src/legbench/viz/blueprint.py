@@ -1,5 +1,7 @@
 """How the viewer lays out what `publish` logs."""
 
+from collections.abc import Sequence
+
 from legbench.viz._rerun import rr, rrb
 from legbench.viz.facts import Facts
 from legbench.viz.leg2d import leg_view
@@ -12,15 +14,18 @@ WINDOW = 4.0
 """Time that series show while a run is going on [s]."""
 
 
-def blueprint(facts: Facts, *, room: tuple[float, float], live: bool = False) -> rrb.Blueprint:
+def blueprint(
+    facts: Facts, *, room: tuple[float, float], live: bool = False, others: Sequence[str] = ()
+) -> rrb.Blueprint:
     """The layout: leg and facts, the four planes, the signals over time.
 
     Args:
         facts: of the run.
         room: lowest and highest point that the pictures of the leg show [m].
         live: follow the newest rows and let the series slide.
+        others: keys of the other runs that are shown in the same views.
     """
-    plots = {name: plot_view(spec) for name, spec in plot_specs(facts).items()}
+    plots = {name: plot_view(spec, others) for name, spec in plot_specs(facts).items()}
     pictures = [leg_view(room), *([scene_view(room)] if facts.model else [])]
     left = rrb.Vertical(
         rrb.Tabs(*pictures),

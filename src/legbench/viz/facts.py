@@ -1,7 +1,7 @@
 """What a picture must know of a run besides its rows."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -87,8 +87,8 @@ def _shown(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def as_markdown(facts: Facts, summary: Summary | None = None) -> str:
-    """The run's facts as a document: what ran, on what, and what came of it."""
+def as_markdown(facts: Facts, summary: Summary | None = None, against: Sequence[str] = ()) -> str:
+    """The run's facts as a document: what ran, on what, what came of it, what it is shown with."""
     manifest = facts.manifest
     lines = [f"**{facts.headline}**", "", f"run `{facts.run_id}`", ""]
     lines += [
@@ -96,6 +96,8 @@ def as_markdown(facts: Facts, summary: Summary | None = None) -> str:
         for key in ("created", "status", "cause", "rows", "duration")
         if manifest.get(key) is not None
     ]
+    if against:
+        lines += ["", "**drawn over it**", "", *(f"- {name}" for name in against)]
     if summary is not None:
         lines += _section("what came of it", _results(summary))
     for name in ("controller", "setup", "linkage", "ground", "servo"):

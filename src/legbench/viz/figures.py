@@ -1,69 +1,83 @@
 """Print figures: the three planes of Figs. 4 and 6."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from legbench.errors import ConfigError
-from legbench.metrics.modal import trajectory
 from legbench.recording.reader import Recording
 from legbench.signals import Floats
 from legbench.viz import style
 from legbench.viz._matplotlib import (
     Axes,
-    BoundaryNorm,
     Figure,
     FigureCanvasAgg,
-    Line2D,
     LineCollection,
-    ListedColormap,
-    ScalarMappable,
     styled,
 )
 from legbench.viz.colouring import Colouring, colouring_of
 from legbench.viz.drafts import draft_of, require_rows
 from legbench.viz.facts import Facts, facts_of
+from legbench.viz.legend import FAINT_COLOUR, explain
+from legbench.viz.names import names_of
+from legbench.viz.overlay import (
+    draw_differences,
+    draw_other,
+    planes_of,
+)
 
 SUFFIXES = (".png", ".svg", ".pdf")
-SIZE = (10.0, 3.7)
-"""[inch]"""
+SIZE, TALL = (10.0, 3.7), (10.0, 6.4)
+"""Of one row of panels, of two [inch]."""
+WIDTH, WIDE = 1.3, 2.4
+"""Of the coloured lines alone, and under those of another run [pt]."""
 DPI = 200
-FAINT_COLOUR = (0.80, 0.80, 0.82)
+PLANES = (
+    (style.POLAR, style.X1, style.X2),
+    (style.JOINT, style.Q1, style.Q2),
+    (style.MODAL, style.Z2, style.DZ2),
+)
+"""Title and axes of the three panels."""
 
 
-def phase_figure(recording: Recording) -> Figure:
+def phase_figure(recording: Recording, against: Sequence[Recording] = ()) -> Figure:
     """Foot tip in polar coordinates, joint space with w1 and w2, modal phase, side by side.
 
     A jump shows its last three jumps in the colours of stance and flight, earlier rows faintly;
     any other run is coloured by oscillation period.
 
+    Args:
+        recording: the run.
+        against: other runs, drawn dashed over it in its modal convention; their differences over
+            time make a second row.
+
     Raises:
-        FormatError: the run's manifest cannot be drawn.
-        RecordingError: the run has no rows.
+        FormatError: a run's manifest cannot be drawn.
+        RecordingError: a run has no rows, or none at the time of another.
     """
-    require_rows(recording)
-    facts = facts_of(recording.manifest, recording.path)
-    moved, colouring = trajectory(recording), colouring_of(recording)
-    radial = np.stack([moved.modal[:, 1], moved.modal_rate[:, 1]], axis=-1)
-    planes = (
-        (style.POLAR, style.X1, style.X2, moved.polar),
-        (style.JOINT, style.Q1, style.Q2, recording["joint_pos"]),
-        (style.MODAL, style.Z2, style.DZ2, radial),
-    )
+    for run in (recording, *against):
+        require_rows(run)
+    facts, colouring = facts_of(recording.manifest, recording.path), colouring_of(recording)
+    points = planes_of(recording, facts.terms.convention)
     with styled():
-        figure = Figure(figsize=SIZE, layout="constrained")
+        figure = Figure(figsize=TALL if against else SIZE, layout="constrained")
         FigureCanvasAgg(figure)
-        panels = [figure.add_subplot(1, 3, place) for place in (1, 2, 3)]
-        for panel, letter, (title, x, y, points) in zip(panels, "abc", planes, strict=True):
+        panels, below = _panels(figure, bool(against))
+        for panel, letter, (title, x, y), plane in zip(panels, "abc", PLANES, points, strict=True):
             panel.set_title(f"({letter}) {title}", loc="left")
             panel.set_xlabel(x.math)
             panel.set_ylabel(y.math)
             panel.locator_params(axis="x", nbins=4)
             panel.locator_params(axis="y", nbins=5)
-            _draw(panel, points, colouring)
+            _draw(panel, plane, colouring, WIDE if against else WIDTH)
+        for place, other in enumerate(against):
+            draw_other(panels, other, facts.terms.convention, place)
+        if against:
+            draw_differences(below, recording, against)
         _at_least(panels[0], style.POLAR_LEAST)
         _draw_modes(panels[1], facts, recording["joint_pos"])
-        _explain(figure, panels, colouring)
+        explain(figure, panels, colouring, names_of([recording, *against]) if against else [])
         title = " — ".join(filter(None, [facts.headline, colouring.ratings]))
         figure.suptitle(title, fontsize=10.5)
     return figure
@@ -86,7 +100,16 @@ def save_figure(figure: Figure, path: Path) -> Path:
     return path
 
 
-def _draw(panel: Axes, points: Floats, colouring: Colouring) -> None:
+def _panels(figure: Figure, two_rows: bool) -> tuple[list[Axes], list[Axes]]:
+    """The three panels of the planes, and the two below them."""
+    if not two_rows:
+        return [figure.add_subplot(1, 3, place) for place in (1, 2, 3)], []
+    grid = figure.add_gridspec(2, 6, height_ratios=(1.5, 1.0))
+    above = [figure.add_subplot(grid[0, column : column + 2]) for column in (0, 2, 4)]
+    return above, [figure.add_subplot(grid[1, column : column + 3]) for column in (0, 3)]
+
+
+def _draw(panel: Axes, points: Floats, colouring: Colouring, width: float) -> None:
     """The whole run faintly, the highlighted stretches over it.
 
     Lines are pixels in vector files, which else would weigh megabytes.
@@ -95,7 +118,7 @@ def _draw(panel: Axes, points: Floats, colouring: Colouring) -> None:
     lines = LineCollection(
         [points[stretch.first : stretch.stop + 1] for stretch in colouring.stretches],
         colors=[stretch.colour for stretch in colouring.stretches],
-        linewidths=1.3,
+        linewidths=width,
         capstyle="round",
         zorder=3,
         rasterized=True,
@@ -134,20 +157,3 @@ def _draw_modes(panel: Axes, facts: Facts, joint: Floats) -> None:
             color=style.unit(colour),
             va="center",
         )
-
-
-def _explain(figure: Figure, panels: list[Axes], colouring: Colouring) -> None:
-    """A colour bar of the periods, or a legend of stance and flight."""
-    if colouring.periods:
-        colours = ListedColormap([stretch.colour for stretch in colouring.stretches])
-        edges = np.arange(colouring.periods + 1) + 0.5
-        scale = ScalarMappable(BoundaryNorm(edges, colours.N), colours)
-        step = max(1, -(-colouring.periods // 7))
-        ticks = list(range(1, colouring.periods + 1, step))
-        bar = figure.colorbar(scale, ax=panels, label="oscillation period", ticks=ticks, pad=0.01)
-        bar.minorticks_off()
-    elif colouring.stretches:
-        known = (("stance", style.STANCE), ("flight", style.FLIGHT))
-        lines = [Line2D([], [], color=style.unit(colour), label=name) for name, colour in known]
-        lines.append(Line2D([], [], color=FAINT_COLOUR, label="earlier"))
-        figure.legend(handles=lines, loc="outside lower center", ncols=3, frameon=False)

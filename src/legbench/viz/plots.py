@@ -61,6 +61,7 @@ class Plots:
         self._plots = {name: XYPlot(stream, spec) for name, spec in plot_specs(facts).items()}
         self._thinner = Thinner(FREQ)
         self._seen: dict[str, list[Floats]] = {name: [] for name in self._plots}
+        self._others: dict[str, list[Floats]] = {name: [] for name in self._plots}
 
     def push(self, trace: Trace) -> None:
         """Add rows to the trails."""
@@ -82,11 +83,20 @@ class Plots:
                 phases if by_phase else periods,
             )
 
+    def overlay(self, key: str, trace: Trace, colour: style.Rgb) -> None:
+        """Draw the whole of another run over the trails."""
+        kept = Thinner(FREQ).pick(trace.time)
+        for name, plot in self._plots.items():
+            points = _points(trace, name)[kept]
+            self._others[name].append(points)
+            plot.overlay(key, trace.time[kept], points, colour)
+
     def finish(self) -> None:
-        """Draw the whole run behind the trails."""
+        """Draw the whole run behind the trails, on axes that also fit the other runs."""
         for name, plot in self._plots.items():
             if seen := self._seen[name]:
-                plot.ghost(np.concatenate(seen))
+                others = self._others[name]
+                plot.ghost(np.concatenate(seen), np.concatenate(others) if others else None)
 
 
 def _points(trace: Trace, name: str) -> Floats:

@@ -4,6 +4,7 @@ A run is published whole, or in slices while it is still going on; both give the
 with the same rows.
 """
 
+from collections.abc import Sequence
 from typing import final
 
 from legbench.metrics.source import Recorded
@@ -11,6 +12,7 @@ from legbench.metrics.summary import Summary
 from legbench.viz._rerun import rr
 from legbench.viz.blueprint import blueprint
 from legbench.viz.facts import Facts, as_markdown
+from legbench.viz.ghost import Ghost, Other
 from legbench.viz.leg2d import Leg2D, hip_of, leg_room
 from legbench.viz.plots import Plots
 from legbench.viz.rating import Rating
@@ -27,10 +29,18 @@ APPLICATION = "legbench"
 class Publisher:
     """Publishes consecutive rows of one run into a recording stream."""
 
-    def __init__(self, stream: rr.RecordingStream, facts: Facts, *, live: bool = False) -> None:
+    def __init__(
+        self,
+        stream: rr.RecordingStream,
+        facts: Facts,
+        *,
+        live: bool = False,
+        others: Sequence[Other] = (),
+    ) -> None:
         self._stream = stream
         self._facts = facts
         self._live = live
+        self._others = tuple(others)
         self._tracer = Tracer(facts)
         self._laid_out = False
         self._plots = Plots(stream, facts)
@@ -46,7 +56,10 @@ class Publisher:
 
     def describe(self, facts: Facts, summary: Summary | None = None) -> None:
         """Show a run's facts; again once it has ended and is rated."""
-        text = as_markdown(facts, summary)
+        others = [
+            f"{other.label}: {other.name}, run `{other.facts.run_id}`" for other in self._others
+        ]
+        text = as_markdown(facts, summary, others)
         document = rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
         self._stream.log("/run", document, static=True)
 
@@ -58,12 +71,17 @@ class Publisher:
         if not self._laid_out:
             hip = hip_of(rows, self._facts)
             room = leg_room(self._facts, hip, live=self._live)
-            layout = blueprint(self._facts, room=room, live=self._live)
+            keys = [other.key for other in self._others]
+            layout = blueprint(self._facts, room=room, live=self._live, others=keys)
             self._stream.send_blueprint(layout)
             self._laid_out = True
         for section in self._sections:
             section.push(trace)
 
     def finish(self) -> None:
-        """Add what only a finished run has."""
+        """Add what only a finished run has, and the other runs as a whole."""
+        for other in self._others:
+            ghost = Ghost(self._stream, other)
+            ghost.push()
+            self._plots.overlay(other.key, ghost.trace, other.colour)
         self._plots.finish()

@@ -1,5 +1,6 @@
 """A run as a file for the viewer: derived from the recording, disposable."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from legbench.metrics.summary import summarise
@@ -7,22 +8,30 @@ from legbench.recording.reader import Recording
 from legbench.viz._rerun import rr
 from legbench.viz.drafts import draft_of, require_rows
 from legbench.viz.facts import facts_of
+from legbench.viz.ghost import other_of
 from legbench.viz.publish import APPLICATION, Publisher
 
 
-def write_rrd(recording: Recording, path: Path) -> Path:
+def write_rrd(recording: Recording, path: Path, against: Sequence[Recording] = ()) -> Path:
     """Write a run with its layout as an `.rrd` file; an older one is replaced when all is well.
 
+    Args:
+        recording: the run.
+        path: of the file.
+        against: other runs, shown in the same views from the same t = 0, in its modal convention.
+
     Raises:
-        FormatError: the run's manifest cannot be drawn.
-        RecordingError: the run has no rows or a damaged model, or nothing can be written there.
+        FormatError: a run's manifest cannot be drawn.
+        RecordingError: a run has no rows or a damaged model, or nothing can be written there.
     """
-    require_rows(recording)
+    for run in (recording, *against):
+        require_rows(run)
     facts = facts_of(recording.manifest, recording.path)
+    others = [other_of(run, place, facts) for place, run in enumerate(against)]
     with draft_of(path) as draft:
         stream = rr.RecordingStream(APPLICATION, recording_id=facts.run_id)
         stream.save(draft)
-        publisher = Publisher(stream, facts)
+        publisher = Publisher(stream, facts, others=others)
         publisher.push(recording)
         publisher.finish()
         publisher.describe(facts, summarise(recording))

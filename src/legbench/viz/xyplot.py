@@ -1,5 +1,6 @@
 """An XY plot for rerun, which has none: axes drawn, y up, raw values on hover."""
 
+from collections.abc import Sequence
 from typing import final
 
 import numpy as np
@@ -56,10 +57,28 @@ class XYPlot:
         head = rr.Points2D.columns(positions=path[1:].astype(np.float32), colors=colours)
         self._stream.send_columns(f"{data}/head", index, head)
 
-    def ghost(self, points: Floats) -> None:
-        """Draw the whole run (n, 2) faintly behind everything, with axes that fit it."""
+    def overlay(self, key: str, time: Floats, points: Floats, colour: style.Rgb) -> None:
+        """Draw another run's trajectory (n, 2) thinly over the trail, all in one colour."""
+        index = [rr.TimeColumn("t", duration=time)]
+        path = points.astype(np.float32)
+        trail, head = (f"{self._spec.path}/data/{key}/{name}" for name in ("trail", "head"))
+        radius = rr.Radius.ui_points(0.7)
+        looks = rr.LineStrips2D.from_fields(colors=[colour], radii=radius, draw_order=25)
+        self._stream.log(trail, looks, static=True)
+        segments = np.stack([np.concatenate([path[:1], path[:-1]]), path], axis=1)
+        self._stream.send_columns(trail, index, rr.LineStrips2D.columns(strips=segments))
+        radius = rr.Radius.ui_points(3.5)
+        dot = rr.Points2D.from_fields(colors=[colour], radii=radius, draw_order=31)
+        self._stream.log(head, dot, static=True)
+        self._stream.send_columns(head, index, rr.Points2D.columns(positions=path))
+
+    def ghost(self, points: Floats, others: Floats | None = None) -> None:
+        """Draw the whole run (n, 2) faintly behind everything, with axes that fit it.
+
+        Points (m, 2) of other runs have room, too.
+        """
         self._limits = None
-        self.cover(points)
+        self.cover(points if others is None else np.concatenate([points, others]))
         strip = points.astype(np.float32)[None]
         whole = rr.LineStrips2D(strip, colors=[FAINT], radii=HAIR, draw_order=5)
         self._stream.log(f"{self._spec.path}/data/ghost", whole, static=True)
@@ -78,17 +97,21 @@ def _grown(old: Span, low: float, high: float) -> Span:
     return (old[0] if old[0] <= low else low - room, old[1] if high <= old[1] else high + room)
 
 
-def plot_view(spec: PlotSpec) -> rrb.Spatial2DView:
-    """The view of an XY plot: axes and head at the cursor's time, the trail before it."""
+def plot_view(spec: PlotSpec, others: Sequence[str] = ()) -> rrb.Spatial2DView:
+    """The view of an XY plot: axes and head at the cursor's time, the trail before it.
+
+    Other runs, by the keys of their overlays, have a trail as long.
+    """
     trail = rrb.VisibleTimeRange(
         "t",
         start=rrb.TimeRangeBoundary.cursor_relative(seconds=-spec.trail),
         end=rrb.TimeRangeBoundary.cursor_relative(),
     )
+    trails = [f"{spec.path}/data/{name}" for name in ("trail", *(f"{o}/trail" for o in others))]
     return rrb.Spatial2DView(
         origin=spec.path,
         name=spec.title,
-        overrides={f"{spec.path}/data/trail": rrb.VisibleTimeRanges([trail])},
+        overrides={path: rrb.VisibleTimeRanges([trail]) for path in trails},
         visual_bounds=rrb.VisualBounds2D(
             x_range=(-0.75, WIDTH + 0.25), y_range=(-HEIGHT - 0.4, 0.95)
         ),
