@@ -288,3 +288,56 @@ def test_a_plant_is_closed_at_the_end_of_its_block() -> None:
 def test_holding_is_resting() -> None:
     assert Command.holding(np.zeros(2)).phase == Phase.REST
     assert Command.holding(np.zeros((4, 2))).phase.tolist() == [Phase.REST] * 4
+
+
+class Unsafe(AbstractPlant):
+    """Tells when it was closed; `what` goes wrong in a cycle, or on the way to the start."""
+
+    period = 0.001
+
+    def __init__(self, what: BaseException, *, at_reset: bool) -> None:
+        self._what, self._at_reset = what, at_reset
+        self.closed = False
+
+    def reset(self) -> Observation:
+        if self._at_reset:
+            raise self._what
+        return Told().seen(0.0)
+
+    def step(self, command: Command) -> Observation:
+        raise self._what
+
+    def close(self) -> None:
+        self.closed = True
+
+
+@pytest.mark.parametrize("at_reset", [True, False])
+@pytest.mark.parametrize("what", [ValueError("driver"), SystemExit(3)])
+def test_whatever_goes_wrong_closes_the_plant_first(what: BaseException, at_reset: bool) -> None:
+    plant = Unsafe(what, at_reset=at_reset)
+    with pytest.raises(type(what)):
+        run(plant, ToldController(Told()), 10)
+    assert plant.closed
+
+
+def test_a_stop_on_the_way_to_the_start_ends_the_run_there() -> None:
+    stop = StopFlag()
+
+    class Slow(AbstractPlant):
+        period = 0.001
+        closed = False
+
+        def reset(self) -> Observation:
+            stop.set()
+            raise AssertionError("the stop was not heard")
+
+        def step(self, command: Command) -> Observation:
+            raise AssertionError("no cycle may begin")
+
+        def close(self) -> None:
+            self.closed = True
+
+    plant = Slow()
+    outcome = run(plant, ToldController(Told()), 10, stop=stop)
+    assert (outcome.status, outcome.cycles) == ("interrupted", 0)
+    assert plant.closed

@@ -19,6 +19,8 @@ Progress = Callable[[int, int], None]
 """Called now and then, and at the end, with cycles done and cycles in all."""
 PROGRESS_EVERY = 250
 """Cycles between two calls of the progress function."""
+STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+"""^C, a polite end, and the terminal's end."""
 
 
 class RowSink(Protocol):
@@ -47,19 +49,32 @@ class Outcome:
 
 
 class StopFlag:
-    """Set by ^C or by whoever holds it; the loop ends before the next cycle."""
+    """Set by ^C or by whoever holds it; the loop ends before the next cycle.
+
+    Attributes:
+        is_set: whether the loop has been asked to end.
+        raises: whether to ask by KeyboardInterrupt: while a plant goes to its start posture, no
+            loop looks at the flag.
+    """
 
     def __init__(self) -> None:
         self.is_set = False
+        self.raises = False
 
     def set(self) -> None:
-        """Ask the loop to end."""
+        """Ask the loop to end.
+
+        Raises:
+            KeyboardInterrupt: a plant is being reset.
+        """
         self.is_set = True
+        if self.raises:
+            raise KeyboardInterrupt
 
 
 @contextmanager
 def stop_on_interrupt() -> Iterator[StopFlag]:
-    """Turn ^C and SIGTERM into a flag while the loop runs, so that no row is cut in half."""
+    """Turn ^C, SIGTERM and SIGHUP into a flag, so that the loop ends between two rows."""
     flag = StopFlag()
     if threading.current_thread() is not threading.main_thread():
         yield flag
@@ -68,7 +83,7 @@ def stop_on_interrupt() -> Iterator[StopFlag]:
     def handle(_signal: int, _frame: FrameType | None) -> None:
         flag.set()
 
-    previous = {name: signal.signal(name, handle) for name in (signal.SIGINT, signal.SIGTERM)}
+    previous = {name: signal.signal(name, handle) for name in STOP_SIGNALS}
     try:
         yield flag
     finally:
@@ -88,14 +103,40 @@ def run(
 ) -> Outcome:
     """Control a plant for a number of cycles.
 
-    The first fault ends the run and is returned as its cause; every row until then is kept.
+    The first fault ends the run and is returned as its cause; every row until then is kept. An
+    exception of any kind closes the plant before anything else happens: drives come to rest
+    while disks are still busy.
 
     Raises:
-        RecordingError: the recording failed; the plant has been left in its last state.
+        PlantFault: the plant did not get to its start.
+        RecordingError: the recording failed.
     """
     clock, stop = clock or VirtualClock(), stop or StopFlag()
-    observation = plant.reset()
-    controller.reset(observation)
+    try:
+        stop.raises = True
+        observation = plant.reset()
+        stop.raises = False
+        controller.reset(observation)
+        return _cycle(plant, controller, observation, cycles, clock, sink, stop, progress)
+    except BaseException as error:
+        stop.raises = False
+        plant.close()
+        if isinstance(error, KeyboardInterrupt) and stop.is_set:
+            return Outcome(status="interrupted", cause=None, message=None, cycles=0, wall_time=0.0)
+        raise
+
+
+def _cycle(
+    plant: AbstractPlant,
+    controller: AbstractController,
+    observation: Observation,
+    cycles: int,
+    clock: AbstractClock,
+    sink: RowSink | None,
+    stop: StopFlag,
+    progress: Progress | None,
+) -> Outcome:
+    """The loop itself, from the first observation on."""
     began = time.perf_counter()
     previous = began
     cycle_us = 0.0

@@ -1,6 +1,7 @@
 """What commands print: results on stdout, everything else on stderr."""
 
 import json
+import select
 import sys
 from collections.abc import Mapping
 from typing import Any
@@ -22,8 +23,10 @@ def print_json(content: Mapping[str, Any]) -> None:
 
 
 def progress(done: int, total: int) -> None:
-    """A line that overwrites itself, on a terminal only."""
-    if not sys.stderr.isatty():
+    """A line that overwrites itself, on a terminal that takes it at once: a stalled one (^S, a lost
+    connection) must not hold up who reports.
+    """
+    if not sys.stderr.isatty() or not select.select([], [sys.stderr], [], 0.0)[1]:
         return
     width = 32
     filled = width * done // max(total, 1)
