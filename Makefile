@@ -39,6 +39,7 @@ bench: $(STAMP) ## performance targets as ratios against a baseline in the same 
 	$(BIN)/python scripts/bench.py
 	$(BIN)/python scripts/bench_design.py
 	$(BIN)/python scripts/bench_modes.py
+	$(BIN)/python scripts/bench_drives.py
 
 models: $(STAMP) ## rewrite the golden MJCF files of models/
 	$(BIN)/python scripts/golden.py

@@ -31,6 +31,7 @@ from legbench.plant.start import Start
 from legbench.recording.reader import load
 from legbench.recording.writer import RunWriter
 from legbench.signals import Floats
+from legbench.viz.rrd import write_rrd
 
 MODELS = Path(__file__).parent.parent / "models"
 PAIRS = 5
@@ -158,8 +159,6 @@ def bench_row() -> Result:
 
 def bench_rrd() -> Result:
     """An 8 s run to `.rrd` with all plots."""
-    from legbench.viz.rrd import write_rrd
-
     with tempfile.TemporaryDirectory() as folder:
         experiment = Experiment(design=prototype(), controller=JumpConfig())
         recording = load(record(experiment, Path(folder)).path)
@@ -183,11 +182,9 @@ def main() -> int:
         result = BENCHES[name]()
         met = result.value <= result.bound
         missed += not met
-        print(
-            f"{'ok    ' if met else 'MISSED'} {result.name:<32} {result.value:6.2f} {result.unit:<2} "
-            f"(bound {result.bound:g})  {result.detail}",
-            flush=True,
-        )
+        verdict = "ok" if met else "MISSED"
+        measured = f"{result.value:6.2f} {result.unit:<2} (bound {result.bound:g})"
+        print(f"{verdict:<6} {result.name:<32} {measured}  {result.detail}", flush=True)
     return 1 if missed else 0
 
 

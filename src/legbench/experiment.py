@@ -26,9 +26,9 @@ from legbench.design.toml import design_to_mapping
 from legbench.errors import ConfigError, RecordingError
 from legbench.kinematics import ModalConvention
 from legbench.loop import Outcome, Progress, StopFlag, run
-from legbench.mjcf import BuildOptions, Ground, Linkage, Numerics, xml_hash
-from legbench.plant.sim import SimPlant
+from legbench.mjcf import BuildOptions, Ground, Linkage, Numerics, build_spec, to_xml, xml_hash
 from legbench.plant.start import PERIOD, Start
+from legbench.plants import Leg, PlantChoice, SimChoice, open_plant
 from legbench.recording.writer import RunWriter
 from legbench.servo import ServoConfig
 
@@ -44,7 +44,7 @@ RECORDED_PACKAGES = ("mujoco-core", "numpy", "scipy", "pyarrow")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Experiment:
-    """Everything that decides a simulated run.
+    """Everything that decides a run.
 
     Raises:
         ConfigError: a duration that is shorter than a cycle, or endless.
@@ -61,6 +61,7 @@ class Experiment:
     convention: ModalConvention = ModalConvention.ORTHONORMAL
     duration: float = 8.0
     """[s]"""
+    plant: PlantChoice = field(default_factory=SimChoice)
 
     def __post_init__(self) -> None:
         if not PERIOD <= self.duration < math.inf:
@@ -110,6 +111,17 @@ def targets_of(experiment: Experiment) -> LegTargets:
     )
 
 
+def start_of(experiment: Experiment) -> Start:
+    """The state that an experiment begins in: its controller's first posture, at rest.
+
+    Raises:
+        ConfigError: settings that the leg refuses.
+    """
+    targets = targets_of(experiment)
+    motor_pos = make_controller(experiment.controller, targets).start_motor_pos
+    return Start(joint_pos=targets.link_at_rest(motor_pos), motor_pos=motor_pos)
+
+
 def record(
     experiment: Experiment,
     out: Path,
@@ -124,35 +136,50 @@ def record(
     Args:
         experiment: what to run.
         out: folder of the runs, made if need be.
-        clock: when cycles begin.
+        clock: when cycles begin; by default as the plant paces itself.
         stop: ends the run when it is set.
         progress: told now and then how far the run is.
         on_started: told the run folder before the first cycle.
 
     Raises:
-        ConfigError: settings that the leg refuses; nothing is written.
+        ConfigError: settings that the leg or the plant refuses; nothing is written.
+        BusError, DriveError: a bus or a drive is not what it should be; before the first cycle.
+        PlantFault: something went wrong on the way to the start posture.
         RecordingError: the folder cannot be written, or the disk failed on the way; what was
             written by then stays readable.
     """
-    targets = targets_of(experiment)
-    controller = make_controller(experiment.controller, targets)
-    motor_pos = controller.start_motor_pos
-    start = Start(joint_pos=targets.link_at_rest(motor_pos), motor_pos=motor_pos)
+    controller = make_controller(experiment.controller, targets_of(experiment))
+    start = start_of(experiment)
     cycles = round(experiment.duration / PERIOD)
-    with SimPlant(experiment.design, experiment.options, start, experiment.servo) as plant:
-        manifest = _manifest(experiment, start, plant.xml)
+    leg = Leg(
+        design=experiment.design, options=experiment.options, start=start, servo=experiment.servo
+    )
+    xml = to_xml(build_spec(experiment.design, experiment.options))
+    opened = open_plant(experiment.plant, leg)
+    with opened.plant:
+        manifest = _manifest(experiment, start, xml) | opened.manifest
         kind = experiment.controller.kind
         name = f"{kind}-{experiment.design.name}"
         with RunWriter.create(out, manifest, name=name) as writer:
             try:
-                (writer.path / "leg.xml").write_text(plant.xml, encoding="utf-8")
+                (writer.path / "leg.xml").write_text(xml, encoding="utf-8")
+                opened.start_log(writer.path)
                 if on_started is not None:
                     on_started(writer.path)
             except OSError as error:
                 raise RecordingError(f"{writer.path}: {error}") from error
             outcome = run(
-                plant, controller, cycles, clock=clock, sink=writer, stop=stop, progress=progress
+                opened.plant,
+                controller,
+                cycles,
+                clock=clock or opened.clock,
+                sink=writer,
+                stop=stop,
+                progress=progress,
             )
+            opened.plant.close()
+            for event, detail in opened.events().items():
+                writer.event(outcome.cycles * PERIOD, event, **detail)
             writer.event(outcome.cycles * PERIOD, "end", status=outcome.status, cause=outcome.cause)
             writer.close(outcome.status, outcome.cause)
     return Finished(path=writer.path, outcome=outcome)
@@ -163,7 +190,6 @@ def _manifest(experiment: Experiment, start: Start, xml: str) -> dict[str, Any]:
     return {
         "design": design_to_mapping(experiment.design),
         "mjcf_sha256": xml_hash(xml),
-        "plant": "sim",
         "setup": asdict(experiment.setup),
         "linkage": asdict(experiment.linkage),
         "ground": asdict(experiment.ground),

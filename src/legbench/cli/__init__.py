@@ -15,6 +15,9 @@ COMMANDS = {
     "render": "make a video or a picture of a recorded run",
     "design": "find a leg that meets requirements and modal matching",
     "check": "check a leg against the conditions of modal matching",
+    "modes": "linear and nonlinear modes of a leg",
+    "hop": "apex return map, periodic hops and basin of a leg",
+    "drives": "commission the servo drives, or emulate them",
 }
 """Command -> one line of help; the module is `legbench.cli.<command>` with `main(arguments)`."""
 

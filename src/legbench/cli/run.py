@@ -9,17 +9,18 @@ from tyro.conf import subcommand
 from legbench.cli.output import note, print_json, progress
 from legbench.cli.parse import parse
 from legbench.cli.table import print_summary
-from legbench.clock import VirtualClock, WallClock
+from legbench.clock import WallClock
 from legbench.control import BangBangConfig, JumpConfig, PositionJumpConfig, SetpointMeaning
 from legbench.design import load_design
 from legbench.design.setup import Setup, SetupKind
-from legbench.errors import MissingExtraError
+from legbench.errors import ConfigError, MissingExtraError
 from legbench.experiment import USUAL_SETUP, Experiment, record
 from legbench.kinematics import ModalConvention
 from legbench.loop import stop_on_interrupt
 from legbench.metrics import summarise
 from legbench.mjcf import Ground, Linkage, LinkageKind
 from legbench.plant.start import PERIOD
+from legbench.plants import EMULATED, AnalyticChoice, CanChoice, PlantChoice, SimChoice
 from legbench.recording.reader import load
 from legbench.servo import ServoConfig
 
@@ -46,8 +47,20 @@ class RunArguments:
     """Physical parallel bars, or the constraint they make."""
     tip_radius: float = Ground().tip_radius
     """Radius of the rolling foot tip [m]."""
-    plant: Literal["sim"] = "sim"
-    """What is controlled: sim is MuJoCo."""
+    plant: Literal["sim", "analytic", "can"] = "sim"
+    """What is controlled: MuJoCo, the paper's equations, or the drives on a bus."""
+    limits: Path | None = None
+    """Safety limits; on can by default limits.toml beside the bus file, elsewhere none."""
+    bus: Path = Path("hardware/leg.toml")
+    """can: bus file."""
+    interface: str | None = None
+    """can: python-can's name of the interface, legbench is an emulated leg; else the bus file's."""
+    channel: str | None = None
+    """can: such as can0; else the bus file's."""
+    bitrate: int | None = None
+    """can: of interfaces that set their own; else the bus file's [bit/s]."""
+    read_only: bool = False
+    """can: observe, never enable; commands are recorded and go nowhere."""
     setpoint: SetpointMeaning = SetpointMeaning.LINK
     """Whether z2 is the link's equilibrium or the motor's position."""
     convention: ModalConvention = ModalConvention.ORTHONORMAL
@@ -84,7 +97,39 @@ def experiment_of(chosen: RunArguments) -> Experiment:
         meaning=chosen.setpoint,
         convention=chosen.convention,
         duration=chosen.duration,
+        plant=plant_of(chosen),
     )
+
+
+def plant_of(chosen: RunArguments) -> PlantChoice:
+    """The plant that the flags describe.
+
+    Raises:
+        ConfigError: a flag of the bus for a plant that has none.
+    """
+    given = (chosen.interface, chosen.channel, chosen.bitrate, chosen.read_only or None)
+    if chosen.plant != "can" and any(value is not None for value in given):
+        raise ConfigError(
+            "interface, channel, bitrate and read-only are of a bus, and plant "
+            f"{chosen.plant} has none; add --plant can"
+        )
+    if chosen.plant == "sim":
+        return SimChoice(limits=chosen.limits)
+    if chosen.plant == "analytic":
+        return AnalyticChoice(limits=chosen.limits)
+    return CanChoice(
+        bus=chosen.bus,
+        interface=chosen.interface,
+        channel=chosen.channel,
+        bitrate=chosen.bitrate,
+        read_only=chosen.read_only,
+        limits=chosen.limits,
+    )
+
+
+def plays_alone(chosen: RunArguments) -> bool:
+    """Whether time is the computer's own to choose; drives on a wire keep their own."""
+    return chosen.plant != "can" or chosen.interface == EMULATED
 
 
 @dataclass(slots=True)
@@ -118,7 +163,8 @@ def main(arguments: list[str]) -> int:
     experiment = experiment_of(chosen)
     watched = chosen.view or chosen.serve
     watching = Watching(serve=chosen.serve)
-    clock = WallClock(PERIOD) if watched or chosen.real_time else VirtualClock()
+    paced = watched or chosen.real_time
+    clock = WallClock(PERIOD) if paced and plays_alone(chosen) else None
     with stop_on_interrupt() as stop:
         finished = record(
             experiment,

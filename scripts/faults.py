@@ -1,0 +1,40 @@
+"""Try every fault in mid-jump on the emulated leg; the table of docs/drives.md on stdout."""
+
+import tempfile
+from pathlib import Path
+
+from legbench.commissioning.fault_trial import TRIALS, Result, try_fault
+from legbench.design import load_design
+
+ROOT = Path(__file__).parents[1]
+EXIT = {"complete": 0, "interrupted": 0, "fault": 1}
+
+
+def row(result: Result) -> str:
+    """One line of the table."""
+    lost = f"bridged, {result.lost_cycles} lost" if result.lost_cycles else "bridged"
+    reaction = lost if result.cycles is None else f"{result.cycles}"
+    exit_status = EXIT.get(result.status, "-")
+    drives = ", ".join(sorted({state.value for state in result.drives}))
+    return (
+        f"| {result.name} | {result.cause or result.status} | {reaction} | {drives} | "
+        f"{'none' if result.excess <= 0.0 else f'{result.excess:.2g} rad'} | "
+        f"{'whole' if result.intact else 'NOT WHOLE'} | {exit_status} |"
+    )
+
+
+def main() -> None:
+    """Print the table."""
+    print(
+        "| fault | ended by | cycles | drives in the end | command beyond limits | recording | "
+        "exit |"
+    )
+    print("|---|---|---|---|---|---|---|")
+    design = load_design(ROOT / "models" / "optimal.toml")
+    with tempfile.TemporaryDirectory() as folder:
+        for trial in TRIALS:
+            print(row(try_fault(trial, ROOT / "hardware" / "leg.toml", design, Path(folder))))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,64 @@
+"""`legbench drives`: commission the servo drives, or emulate them."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from tyro.conf import subcommand
+
+from legbench.cli import drives_moving, drives_reading, drives_serving
+from legbench.cli.drives_reading import Bench
+from legbench.cli.parse import parse
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DrivesArguments:
+    """Commission the servo drives, or emulate them."""
+
+    action: (
+        Annotated[
+            drives_reading.Scan, subcommand("scan", description="who is on the bus; writes nothing")
+        ]
+        | Annotated[
+            drives_reading.Status,
+            subcommand("status", description="what the drives say of themselves, in words"),
+        ]
+        | Annotated[
+            drives_moving.Configure,
+            subcommand("configure", description="compare the drives with the bus file, or write"),
+        ]
+        | Annotated[
+            drives_moving.Zero,
+            subcommand("zero", description="measure the encoders' offsets in a known posture"),
+        ]
+        | Annotated[
+            drives_moving.Home,
+            subcommand("home", description="home one drive by its own procedure; IT MAY MOVE"),
+        ]
+        | Annotated[
+            drives_moving.Jog,
+            subcommand("jog", description="move one motor a little, under all limits; IT MOVES"),
+        ]
+        | Annotated[
+            drives_reading.Jitter,
+            subcommand("jitter", description="how punctual the cycle is; enables nothing"),
+        ]
+        | Annotated[
+            drives_reading.Budget,
+            subcommand("budget", description="what the schedule takes of the wire at worst"),
+        ]
+        | Annotated[
+            drives_serving.Emulate,
+            subcommand("emulate", description="an emulated leg for other processes"),
+        ]
+        | Annotated[
+            drives_serving.Monitor,
+            subcommand("monitor", description="listen, and tell what the drives say"),
+        ]
+    )
+    bench: Bench
+
+
+def main(arguments: list[str]) -> int:
+    """Do one action; 0 when it went well, 1 when something is not as it should be."""
+    chosen = parse(DrivesArguments, "drives", arguments)
+    return chosen.action.run(chosen.bench)

@@ -1,0 +1,178 @@
+"""`legbench drives configure|zero|home|jog`: writing to drives, moving them a little."""
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from types import FrameType
+
+from legbench.cli.drives_reading import Bench
+from legbench.cli.output import note, print_json
+from legbench.drives.config import NodeConfig
+from legbench.drives.session import Session
+from legbench.errors import ConfigError
+from legbench.loop import STOP_SIGNALS
+from legbench.plants import LIMITS_NAME, limits_for
+
+
+@contextmanager
+def interrupted_by_signals() -> Iterator[None]:
+    """Turn ^C, SIGTERM and SIGHUP into KeyboardInterrupt, once: drives are brought to rest on the
+    way out, and a second signal must not end that.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    came = False
+
+    def handle(_signal: int, _frame: FrameType | None) -> None:
+        nonlocal came
+        if not came:
+            came = True
+            raise KeyboardInterrupt
+
+    previous = {name: signal.signal(name, handle) for name in STOP_SIGNALS}
+    try:
+        yield
+    finally:
+        for name, handler in previous.items():
+            signal.signal(name, handler)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Configure:
+    """Compare what the drives hold with the bus file; write it only with --write."""
+
+    write: bool = False
+    """Write the whole configuration and read every object back."""
+
+    def run(self, bench: Bench) -> int:
+        """Print the differences; 1 if there are any left."""
+        from legbench.commissioning.configure import differences, write
+
+        written = 0
+        with bench.session() as session:
+            if self.write:
+                written = write(session)
+            different = differences(session)
+        if bench.json:
+            print_json({"written": written, "differences": [asdict(entry) for entry in different]})
+        else:
+            if self.write:
+                print(f"wrote {written} objects, read every one back")
+            for entry in different:
+                print(f"{entry.node}: {entry.object} holds {entry.holds}, wanted {entry.wanted}")
+            print(f"{len(different)} objects differ from {bench.bus}")
+        return 1 if different else 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Zero:
+    """Offsets of both encoders from a leg that is held in a known posture; nothing is enabled."""
+
+    posture: tuple[float, float]
+    """Angles q1 and q2 of the leg as it stands, springs unloaded [rad]."""
+    out: Path | None = None
+    """Bus file to write; by default the one that is read."""
+    dry_run: bool = False
+    """Print only."""
+
+    def run(self, bench: Bench) -> int:
+        """Measure, print, write the offsets into the bus file."""
+        from legbench.commissioning.zero import measure, write
+
+        with bench.session() as session:
+            zeros = measure(session, self.posture)
+        path = None if self.dry_run else write(bench.bus, zeros, self.out)
+        if bench.json:
+            print_json({"zeros": [asdict(zero) for zero in zeros], "file": path and str(path)})
+            return 0
+        for zero in zeros:
+            print(
+                f"{zero.node}: motor offset_counts = {zero.motor_offset}, "
+                f"link offset_counts = {zero.link_offset}"
+            )
+        if path is not None:
+            print(f"wrote {path}")
+        return 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Home:
+    """Home one drive by its own procedure; with methods that search, IT MOVES."""
+
+    node: str
+    """Name in the bus file."""
+    method: int = 37
+    """6098h: 37 calls the present position zero; -1 to -4 search a hard stop."""
+    timeout: float = 20.0
+    """[s]"""
+
+    def run(self, bench: Bench) -> int:
+        """Home and print the counts before and after."""
+        from legbench.commissioning.home import home
+
+        with interrupted_by_signals(), bench.session() as session:
+            homed = home(session, _node(session, self.node), self.method, timeout=self.timeout)
+        if bench.json:
+            print_json(asdict(homed))
+        else:
+            print(
+                f"{homed.node}: method {homed.method}, {homed.before_counts} counts before, "
+                f"{homed.after_counts} after"
+            )
+        return 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Jog:
+    """Move one motor a little and slowly, under all limits; both drives are enabled."""
+
+    node: str
+    """Name in the bus file."""
+    by: float = 0.05
+    """How far, at most 0.3 rad [rad]."""
+    speed: float = 0.2
+    """How fast, at most 1 rad/s [rad/s]."""
+    stay: bool = False
+    """Do not go back."""
+
+    def run(self, bench: Bench) -> int:
+        """Jog and print where the motors and links were."""
+        from legbench.commissioning.jog import jog
+
+        design = bench.leg()
+        limits = limits_for(bench.limits or bench.bus.parent / LIMITS_NAME, design)
+        with interrupted_by_signals(), bench.session() as session:
+            jogged = jog(
+                session,
+                limits,
+                design.stiffness,
+                self.node,
+                by=self.by,
+                speed=self.speed,
+                back=not self.stay,
+            )
+        if bench.json:
+            print_json(asdict(jogged))
+            return 0
+        note("enabled where they stood; quick stop at the end")
+        for place, (before, after) in enumerate(
+            zip(jogged.before_pos, jogged.after_pos, strict=True), start=1
+        ):
+            link, torque = jogged.link_pos[place - 1], jogged.spring_torque[place - 1]
+            print(
+                f"motor {place}: {before:+.4f} -> {after:+.4f} rad, link {link:+.4f} rad, "
+                f"spring {torque:+.4f} N m"
+            )
+        return 0
+
+
+def _node(session: Session, name: str) -> NodeConfig:
+    for node in session.config.nodes:
+        if node.name == name:
+            return node
+    names = ", ".join(node.name for node in session.config.nodes)
+    raise ConfigError(f"no node '{name}' in the bus file; there are {names}")

@@ -1,0 +1,189 @@
+"""`legbench drives scan|status|jitter|budget`: looking, never enabling."""
+
+from contextlib import AbstractContextManager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import arg
+
+from legbench.cli.output import note, print_json
+from legbench.design import LegDesign, load_design
+from legbench.drives.bus_file import load_bus
+from legbench.drives.config import BusConfig
+from legbench.drives.session import Session
+from legbench.errors import ConfigError
+from legbench.plants import CanChoice, open_session
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bench:
+    """Which bus, and how to print."""
+
+    bus: Path = Path("hardware/leg.toml")
+    """Bus file."""
+    interface: str | None = None
+    """python-can's name of the interface; else the bus file's."""
+    channel: str | None = None
+    """Such as can0; else the bus file's."""
+    bitrate: int | None = None
+    """Of interfaces that set their own; else the bus file's [bit/s]."""
+    design: Path = Path("models/optimal.toml")
+    """Design file: springs, and the limits that no limits file may exceed."""
+    limits: Path | None = None
+    """Safety limits; by default limits.toml beside the bus file."""
+    json: bool = False
+    """Print one JSON object on stdout."""
+
+    @property
+    def choice(self) -> CanChoice:
+        """The same for plants."""
+        return CanChoice(
+            bus=self.bus, interface=self.interface, channel=self.channel, bitrate=self.bitrate
+        )
+
+    def config(self) -> BusConfig:
+        """The bus file; raises ConfigError."""
+        return load_bus(self.bus)
+
+    def leg(self) -> LegDesign:
+        """The design; raises DesignError."""
+        return load_design(self.design)
+
+    def session(self) -> AbstractContextManager[Session]:
+        """The bus, open; raises ConfigError, BusError."""
+        return open_session(self.config(), self.choice)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scan:
+    """Who is on the bus; writes nothing."""
+
+    last: int = 127
+    """Highest node id to ask."""
+
+    def run(self, bench: Bench) -> int:
+        """Print every node; 1 if a node of the bus file is not there."""
+        from legbench.commissioning.scan import scan
+
+        with bench.session() as session:
+            found = list(scan(session, self.last))
+            names = {f"'{node.name}' of the bus file" for node in session.config.nodes}
+        if bench.json:
+            print_json({"nodes": [asdict(node) for node in found]})
+        else:
+            for node in found:
+                print(
+                    f"node {node.node_id:3d}  vendor {node.vendor:#010x}  product "
+                    f"{node.product:#010x}  serial {node.serial}  revision {node.revision}  "
+                    f"{node.verdict}"
+                )
+        missing = sorted(names - {node.verdict for node in found})
+        for verdict in missing:
+            note(f"not there: {verdict}; look at its power, its wiring and the bitrate")
+        return 1 if missing else 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Status:
+    """What the drives say of themselves, in words."""
+
+    def run(self, bench: Bench) -> int:
+        """Print state, mode, error and encoders of every drive."""
+        from legbench.commissioning.status import status
+
+        with bench.session() as session:
+            nodes = status(session)
+        if bench.json:
+            print_json({"nodes": [asdict(node) for node in nodes]})
+            return 0
+        for node in nodes:
+            heat = "" if node.temperature is None else f", {node.temperature:.1f} deg C"
+            print(f"{node.name} (node {node.node_id}): {node.statusword}")
+            print(f"  mode {node.mode}, error {node.error}{heat}")
+            print(
+                f"  motor {node.motor_pos:+.4f} rad ({node.motor_counts} counts), "
+                f"link {node.link_pos:+.4f} rad ({node.link_counts} counts)"
+            )
+        return 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Jitter:
+    """How punctual the cycle is; SYNC and process data flow, nothing is enabled."""
+
+    cycles: int = 5000
+    """How many."""
+    cpu: int | None = None
+    """Processor to stay on."""
+    plot: Annotated[Path | None, arg(metavar="FILE")] = None
+    """Draw both distributions: .png, .svg or .pdf."""
+
+    def run(self, bench: Bench) -> int:
+        """Measure and print a table, with what the system granted."""
+        from legbench.commissioning.jitter import measure
+
+        if self.cycles < 1:
+            raise ConfigError(f"cycles is {self.cycles}; it must be 1 or more")
+        with bench.session() as session:
+            granted = session.be_punctual(self.cpu)
+            timing = measure(session, bench.leg().stiffness, self.cycles)
+        table = timing.table()
+        if self.plot is not None:
+            from legbench.viz.timing import draw_timing
+
+            draw_timing(timing.late_us, timing.exchange_us, self.plot)
+            note(f"wrote {self.plot}")
+        content = {
+            "cycles": self.cycles,
+            "time": "virtual" if granted is None else "wall",
+            "granted": None if granted is None else asdict(granted),
+            **table,
+            "skipped": timing.skipped,
+            "lost": timing.lost,
+        }
+        if bench.json:
+            print_json(content)
+            return 0
+        print(f"{self.cycles} cycles in {content['time']} time")
+        for name, words in ({} if granted is None else asdict(granted)).items():
+            print(f"  {name:<11} {words}")
+        print(f"{'[us]':<13}" + "".join(f"{word:>9}" for word in table["late_us"]))
+        for label, name in (("wake-up", "late_us"), ("exchange", "exchange_us")):
+            print(f"{label:<13}" + "".join(f"{value:9.0f}" for value in table[name].values()))
+        print(f"skipped {timing.skipped} ticks, lost process data in {timing.lost} cycles")
+        return 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Budget:
+    """What the schedule of the bus file takes of the wire at worst; opens no bus."""
+
+    def run(self, bench: Bench) -> int:
+        """Print every frame; raises ConfigError above 80 %."""
+        from legbench.drives.wire import MAX_LOAD, bus_load, check_load, schedule
+
+        config = bench.config()
+        entries, load = schedule(config), bus_load(config)
+        if bench.json:
+            print_json(
+                {
+                    "bitrate": config.bitrate,
+                    "load": load,
+                    "limit": MAX_LOAD,
+                    "frames": [asdict(entry) for entry in entries],
+                }
+            )
+        else:
+            for entry in entries:
+                share = entry.bits * entry.rate / config.bitrate
+                print(
+                    f"{entry.what:<24} {entry.bits:4d} bits  {entry.rate:7.1f} /s  "
+                    f"{100 * share:5.1f} %"
+                )
+            print(
+                f"{'worst load':<24} {100 * load:.1f} % of {config.bitrate} bit/s, the limit is "
+                f"{100 * MAX_LOAD:.0f} %"
+            )
+        check_load(config)
+        return 0

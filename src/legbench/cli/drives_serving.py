@@ -1,0 +1,119 @@
+"""`legbench drives emulate|monitor`: running until told to stop."""
+
+import math
+import sys
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from legbench.cli.drives_reading import Bench
+from legbench.cli.output import note, print_json
+from legbench.errors import ConfigError
+
+UNIX = "legbench_unix"
+"""Interface of a bus behind a socket file."""
+
+
+def _check_time(name: str, value: float) -> None:
+    if not value > 0.0:
+        raise ConfigError(f"{name} is {value:g} s; it must be positive")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Emulate:
+    """An emulated leg for other processes, at --channel: a socket file for legbench_unix.
+
+    With --interface it sits on that bus instead, such as socketcan on a vcan. --bitrate is that of
+    the emulated wire.
+    """
+
+    bare: bool = False
+    """Nothing on the shafts: no MuJoCo."""
+    patience: int = 5
+    """Periods without SYNC or target that fault an enabled drive; more on a busy machine."""
+    seconds: float = math.inf
+    """End after so long [s]."""
+
+    def run(self, bench: Bench) -> int:
+        """Serve until ^C or SIGTERM, printing every change of a drive's state."""
+        from legbench.commissioning.emulate import serve
+        from legbench.control import JumpConfig
+        from legbench.drives.bus_server import BusServer
+        from legbench.drives.emulated.network import Network, stiff_body
+        from legbench.drives.unix_server import UnixServer
+        from legbench.experiment import Experiment, start_of
+        from legbench.loop import stop_on_interrupt
+        from legbench.plant.emulated_leg import EmulatedLeg
+        from legbench.plants import open_session
+
+        _check_time("seconds", self.seconds)
+        if bench.channel is None:
+            raise ConfigError("emulate needs --channel: a socket file, or a bus with --interface")
+        chosen = Experiment(design=bench.leg(), controller=JumpConfig())
+        start = start_of(chosen)
+        body = stiff_body if self.bare else EmulatedLeg(chosen.design, chosen.options, start)
+        config = bench.config()
+        if bench.bitrate is not None:
+            config = replace(config, bitrate=bench.bitrate)
+        channel, end = bench.channel, time.monotonic() + self.seconds
+
+        def serve_at(network: Network) -> UnixServer | BusServer:
+            if bench.interface in (None, UNIX):
+                return UnixServer(network, Path(channel))
+            return BusServer(network, open_session(config, bench.choice).bus)
+
+        def ready() -> None:
+            interface = bench.interface or UNIX
+            note(f"serving {channel}; use it with --interface {interface} --channel {channel}")
+
+        def report(at: float, node: str, state: str) -> None:
+            if bench.json:
+                print_json({"time": at, "node": node, "state": state})
+            else:
+                print(f"{at:9.3f} s  {node}: {state}")
+            sys.stdout.flush()
+
+        with stop_on_interrupt() as stop:
+            serve(
+                config,
+                serve_at,
+                start_pos=tuple(start.motor_pos.tolist()),
+                body=body,
+                patience=self.patience,
+                report=report,
+                ready=ready,
+                stop=lambda: stop.is_set or time.monotonic() > end,
+            )
+        return 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Monitor:
+    """Listen beside a master, send nothing, tell what the drives say."""
+
+    seconds: float = math.inf
+    """End after so long [s]."""
+    every: float = 0.2
+    """Between two looks [s]."""
+
+    def run(self, bench: Bench) -> int:
+        """Print a line a drive, in place on a terminal, until ^C."""
+        from legbench.commissioning.monitor import monitor
+
+        _check_time("seconds", self.seconds)
+        _check_time("every", self.every)
+        in_place = sys.stdout.isatty() and not bench.json
+        with bench.session() as session:
+            seconds = min(self.seconds, 1e9)
+            for count, (at, lines) in enumerate(
+                monitor(session, seconds=seconds, every=self.every)
+            ):
+                if bench.json:
+                    print_json({"time": at, "drives": lines})
+                    continue
+                if in_place and count:
+                    print(f"\x1b[{len(lines)}F", end="")
+                for line in lines:
+                    print(f"{at:9.3f} s  {line}" + ("\x1b[K" if in_place else ""))
+                sys.stdout.flush()
+        return 0

@@ -1,0 +1,69 @@
+"""The emulated leg for other processes."""
+
+import time
+from collections.abc import Callable
+
+from legbench.drives.bus_server import BusServer
+from legbench.drives.cia402 import DriveState
+from legbench.drives.config import BusConfig
+from legbench.drives.emulated.behaviour import Behaviour
+from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.network import Body, Network, stiff_body
+from legbench.drives.realtime import ask
+from legbench.drives.unix_server import UnixServer
+
+Report = Callable[[float, str, str], None]
+"""Called with time since the start [s], node and its new state."""
+
+
+def serve(
+    config: BusConfig,
+    serve_at: Callable[[Network], UnixServer | BusServer],
+    *,
+    start_pos: tuple[float, ...],
+    body: Body = stiff_body,
+    patience: int = 5,
+    report: Report,
+    ready: Callable[[], None],
+    stop: Callable[[], bool],
+) -> None:
+    """Serve emulated drives until told to stop.
+
+    The drives reply at once: the way through two processes takes long enough.
+
+    Args:
+        config: the bus.
+        serve_at: makes the server of a network.
+        start_pos: motor positions at power-on [rad].
+        body: what hangs on the shafts.
+        patience: periods without SYNC or target after which an enabled drive faults.
+        report: told every change of a drive's state.
+        ready: called when the bus can be used.
+        stop: asked all the time.
+
+    Raises:
+        BusError: the bus cannot be opened, or has failed.
+        PlantFault: the leg has come apart.
+    """
+    behaviours = [
+        Behaviour(
+            reply_delay_us=(0, 0),
+            start_pos=pos,
+            missing_limit=patience,
+            sync_loss_periods=patience,
+        )
+        for pos in start_pos
+    ]
+    ask()
+    network = emulate(config, behaviours, body=body)
+    shown: dict[str, DriveState] = {}
+    began = time.monotonic()
+    with serve_at(network) as server:
+        ready()
+        while not stop():
+            server.poll()
+            for node, drive in zip(config.nodes, network.drives, strict=True):
+                state = drive.axis.power.state
+                if shown.get(node.name) is not state:
+                    shown[node.name] = state
+                    report(time.monotonic() - began, node.name, state.value)

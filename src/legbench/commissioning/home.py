@@ -1,0 +1,221 @@
+"""Homing of one drive by its own procedure (CiA 402-2, homing mode), over SDO.
+
+The drive is configured as for a run and goes to operational, so that its own watchdog stops it
+when this master falls silent; it is always led out by quick stop.
+"""
+
+from dataclasses import dataclass
+from typing import final
+
+from legbench.drives.cia402 import (
+    POWERED,
+    Controlword,
+    DriveState,
+    Goal,
+    Mode,
+    StatusBit,
+    Way,
+    decode_state,
+    describe_statusword,
+    next_controlword,
+)
+from legbench.drives.codec.datatypes import DataType
+from legbench.drives.codec.nmt import NmtCommand, NmtState, heartbeat_frame, nmt_frame
+from legbench.drives.config import NodeConfig
+from legbench.drives.errors import DriveError
+from legbench.drives.master.sdo_port import SdoPort
+from legbench.drives.objects import name_of
+from legbench.drives.session import Session
+from legbench.errors import ConfigError
+
+START_HOMING = 0x1F
+"""Enable operation with bit 4."""
+IN_PLACE = (35, 37)
+"""Methods that do not move."""
+NEEDED = ((0x6065, 0), (0x6072, 0), (0x6085, 0))
+"""Window, torque and ramp that a search is not made without, in the bus file."""
+FASTEST = 1.0
+"""A search for a hard stop goes no faster (6099h:01) [rad/s]."""
+PATIENCE = 200
+"""Looks at a drive for one step."""
+OBEY_LOOKS = 10
+"""A drive that is still enabled so many looks after quick stop loses its voltage."""
+LOOK_NS = 5_000_000
+"""Between two looks, or less, so that every one can bring a heartbeat in time [ns]."""
+U16, U32, I8, I32 = (
+    DataType.UNSIGNED16,
+    DataType.UNSIGNED32,
+    DataType.INTEGER8,
+    DataType.INTEGER32,
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Homed:
+    """What homing left."""
+
+    node: str
+    method: int
+    before_counts: int
+    after_counts: int
+
+
+def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20.0) -> Homed:
+    """Configure one drive, home it and leave it without power, by quick stop in any case.
+
+    Args:
+        session: the channel is taken.
+        node: of the bus file.
+        method: 6098h; 37 calls the present position zero, -1 to -4 drive against a hard stop.
+        timeout: [s]
+
+    Raises:
+        ConfigError: the bus file does not bound a search, or the search is too fast.
+        BusError: the channel has a master.
+        DriveError: another drive, a refused step, or homing failed.
+    """
+    if method not in IN_PLACE:
+        _check_bounded(node)
+    session.hold()
+    up = session.bring_up()
+    up.identify()
+    up.unpower()
+    up.pre_operational()
+    up.configure(node)
+    sdo = up.sdo(node)
+    if method not in IN_PLACE:
+        _check_speed(sdo, node)
+    before = up.preload(node)
+    _choose(sdo, node, method)
+    master = _Master(session, sdo, node)
+    try:
+        master.start()
+        master.enter_homing()
+        master.enable()
+        master.command(START_HOMING)
+        master.await_end(timeout)
+    finally:
+        try:
+            master.stop()
+        finally:
+            # Whatever failed until here: a drive that leaves operational stops by itself (6007h).
+            up.pre_operational()
+    after = sdo.get_int(0x6064, 0, I32)
+    return Homed(node=node.name, method=method, before_counts=before, after_counts=after)
+
+
+def _check_bounded(node: NodeConfig) -> None:
+    given = {parameter.key for parameter in node.parameters if parameter.value > 0}
+    missing = [name_of(*key) for key in NEEDED if key not in given]
+    if missing:
+        raise ConfigError(
+            f"a search moves '{node.name}' by itself, and its parameters in the bus file leave "
+            f"out {', '.join(missing)}; give each a value"
+        )
+
+
+def _check_speed(sdo: SdoPort, node: NodeConfig) -> None:
+    speed = sdo.get_int(0x6099, 1, U32) / abs(node.motor.counts_per_rad)
+    if speed > FASTEST:
+        raise ConfigError(
+            f"'{node.name}' would search its stop at {speed:.3g} rad/s, the limit is {FASTEST:g} "
+            'rad/s; give "6099:01 u32" [counts/s] in its parameters'
+        )
+
+
+def _choose(sdo: SdoPort, node: NodeConfig, method: int) -> None:
+    sdo.put(0x6098, 0, I8, method)
+    there = sdo.get_int(0x6098, 0, I8)
+    if there != method:
+        raise DriveError(f"drive '{node.name}' does not take homing method {method}: {there}")
+
+
+@final
+class _Master:
+    """Leads one drive by SDO, with a heartbeat in every wait."""
+
+    def __init__(self, session: Session, sdo: SdoPort, node: NodeConfig) -> None:
+        self._port, self._sdo, self._node = session.port(), sdo, node
+        self._timebase = session.timebase
+        self._beat = heartbeat_frame(session.config.master_id, NmtState.OPERATIONAL)
+        self._rest_ns = min(LOOK_NS, 1_000_000 * session.config.master_heartbeat_ms // 2)
+
+    def start(self) -> None:
+        """From the first heartbeat on the drive's watchdog runs (1016h)."""
+        self._port.send_frame(self._beat)
+        self._port.send_frame(nmt_frame(NmtCommand.START, self._node.node_id))
+
+    def enter_homing(self) -> None:
+        """Wait for the mode: 6061h lags behind 6060h."""
+        self._sdo.put(0x6060, 0, I8, Mode.HOMING)
+        for _ in range(PATIENCE):
+            self._wait()
+            if self._sdo.get_int(0x6061, 0, I8) == Mode.HOMING:
+                return
+        raise DriveError(f"drive '{self._node.name}' does not enter homing mode (6061h)")
+
+    def enable(self) -> None:
+        """Up the ladder, a rung a look."""
+        word = 0
+        for _ in range(PATIENCE):
+            word = self._look()
+            state = decode_state(word)
+            if state is None:
+                continue
+            controlword, way = next_controlword(state, Goal.ENABLED)
+            if way is Way.REACHED:
+                return
+            if way is Way.REFUSED:
+                break
+            self.command(controlword)
+        raise DriveError(
+            f"drive '{self._node.name}' does not become enabled: {describe_statusword(word)}"
+        )
+
+    def await_end(self, timeout: float) -> None:
+        """Until the drive says attained; raises DriveError if it fails or takes too long."""
+        name, until_ns = self._node.name, self._timebase.now_ns() + round(1e9 * timeout)
+        while self._timebase.now_ns() < until_ns:
+            word = self._look()
+            enabled = decode_state(word) is DriveState.OPERATION_ENABLED
+            if not enabled or word & StatusBit.FOLLOWING_ERROR:
+                raise DriveError(f"homing of '{name}' failed with statusword {word:04X}h")
+            if word & StatusBit.FOLLOWS_COMMAND and word & StatusBit.TARGET_REACHED:
+                return
+        raise DriveError(f"homing of '{name}' has not ended within {timeout:g} s; raise --timeout")
+
+    def stop(self) -> None:
+        """Quick stop, no voltage for a drive that does not obey, back to the usual mode.
+
+        Raises:
+            DriveError: the drive keeps its power, or does not answer.
+        """
+        self.command(Controlword.QUICK_STOP)
+        word = 0
+        for look in range(PATIENCE):
+            word = self._look()
+            state = decode_state(word)
+            if state not in POWERED:
+                break
+            if look >= OBEY_LOOKS and state in (None, DriveState.OPERATION_ENABLED):
+                self.command(Controlword.DISABLE_VOLTAGE)
+        else:
+            raise DriveError(
+                f"drive '{self._node.name}' keeps its power after quick stop: "
+                f"{describe_statusword(word)}; switch its power off"
+            )
+        self.command(Controlword.DISABLE_VOLTAGE)
+        self._sdo.put(0x6060, 0, I8, Mode.CYCLIC_SYNCHRONOUS_POSITION)
+
+    def command(self, controlword: int) -> None:
+        """Write 6040h."""
+        self._sdo.put(0x6040, 0, U16, controlword)
+
+    def _look(self) -> int:
+        """The statusword, after a wait."""
+        self._wait()
+        return self._sdo.get_int(0x6041, 0, U16)
+
+    def _wait(self) -> None:
+        self._port.send_frame(self._beat)
+        self._timebase.wait_until(self._timebase.now_ns() + self._rest_ns)

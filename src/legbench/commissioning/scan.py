@@ -1,0 +1,64 @@
+"""Who is on the bus."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from legbench.drives.codec.datatypes import DataType
+from legbench.drives.codec.frame import LAST_NODE
+from legbench.drives.config import BusConfig
+from legbench.drives.errors import DriveError
+from legbench.drives.session import Session
+
+PROBE_MS = 15
+"""For a node that may not be there, twice; a drive that has booted answers within 5 ms."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Found:
+    """One node."""
+
+    node_id: int
+    device_type: int
+    """1000h."""
+    vendor: int
+    product: int
+    revision: int
+    serial: int
+    verdict: str
+    """How it compares with the bus file."""
+
+
+def scan(session: Session, last: int = LAST_NODE) -> Iterator[Found]:
+    """Ask every node id up to `last` for its identity; nothing is written."""
+    for node_id in range(1, last + 1):
+        probe = session.sdo(node_id, timeout_ms=PROBE_MS, retries=2)
+        try:
+            device = probe.get_int(0x1000, 0, DataType.UNSIGNED32)
+        except DriveError:
+            continue
+        sdo = session.sdo(node_id, timeout_ms=session.config.sdo_timeout_ms, retries=3)
+        vendor, product, revision, serial = (
+            sdo.get_int(0x1018, sub, DataType.UNSIGNED32) for sub in range(1, 5)
+        )
+        yield Found(
+            node_id=node_id,
+            device_type=device,
+            vendor=vendor,
+            product=product,
+            revision=revision,
+            serial=serial,
+            verdict=_verdict(session.config, node_id, (vendor, product, serial)),
+        )
+
+
+def _verdict(config: BusConfig, node_id: int, there: tuple[int, int, int]) -> str:
+    for node in config.nodes:
+        wanted = node.identity
+        same = (wanted.vendor, wanted.product) == there[:2] and wanted.serial in (None, there[2])
+        if node.node_id == node_id and same:
+            return f"'{node.name}' of the bus file"
+        if node.node_id == node_id:
+            return f"in the place of '{node.name}', but another drive"
+        if same and wanted.serial is not None:
+            return f"'{node.name}' of the bus file, which expects it at node {node.node_id}"
+    return "not in the bus file"

@@ -1,0 +1,71 @@
+"""What the drives say of themselves, in words; by SDO, nothing is written."""
+
+from dataclasses import dataclass
+
+from legbench.drives.cia402 import Mode, describe_statusword
+from legbench.drives.codec.datatypes import DataType
+from legbench.drives.codec.emcy import MEANINGS
+from legbench.drives.config import NodeConfig
+from legbench.drives.session import Session
+from legbench.drives.units import unwrap
+
+MODES = {mode.value: mode.name.lower().replace("_", " ") for mode in Mode}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NodeStatus:
+    """One drive."""
+
+    name: str
+    node_id: int
+    statusword: str
+    mode: str
+    error: str
+    motor_pos: float
+    """[rad]"""
+    link_pos: float
+    """[rad]"""
+    motor_counts: int
+    link_counts: int
+    temperature: float | None
+    """[deg C]"""
+
+
+def read_counts(session: Session, node: NodeConfig) -> tuple[int, int]:
+    """Both encoders as shown, not unwrapped [counts]; raises DriveError."""
+    sdo = session.bring_up().sdo(node)
+    motor = sdo.get_int(0x6064, 0, DataType.INTEGER32)
+    link = node.link_object
+    return motor, sdo.get_int(link.index, link.sub, link.kind)
+
+
+def status(session: Session) -> list[NodeStatus]:
+    """All drives of the bus file.
+
+    Raises:
+        DriveError: one does not answer.
+    """
+    return [_status(session, node) for node in session.config.nodes]
+
+
+def _status(session: Session, node: NodeConfig) -> NodeStatus:
+    sdo = session.bring_up().sdo(node)
+    motor, link = read_counts(session, node)
+    mode = sdo.get_int(0x6061, 0, DataType.INTEGER8)
+    code = sdo.get_int(0x603F, 0, DataType.UNSIGNED16)
+    heat = node.temperature_object
+    celsius = None if heat is None else 0.1 * sdo.get_int(heat.index, heat.sub, heat.kind)
+    motor_pos = node.motor.to_rad(motor)
+    near = node.link.to_counts(motor_pos)
+    return NodeStatus(
+        name=node.name,
+        node_id=node.node_id,
+        statusword=describe_statusword(sdo.get_int(0x6041, 0, DataType.UNSIGNED16)),
+        mode=MODES.get(mode, f"mode {mode}"),
+        error="none" if code == 0 else f"{code:04X}h {MEANINGS.get(code, 'see the drive manual')}",
+        motor_pos=motor_pos,
+        link_pos=node.link.to_rad(unwrap(link, near, node.link.bits)),
+        motor_counts=motor,
+        link_counts=link,
+        temperature=celsius,
+    )

@@ -1,0 +1,94 @@
+"""Encoder offsets from a leg that stands in a known posture."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from legbench.commissioning.status import read_counts
+from legbench.drives.config import NodeConfig
+from legbench.drives.errors import DriveError
+from legbench.drives.session import Session
+from legbench.drives.units import AxisUnits, wrap
+from legbench.errors import ConfigError, RecordingError
+from legbench.recording.files import write_whole
+
+READS = 5
+"""Of every encoder; they have to agree."""
+STILL_COUNTS = 40
+"""Largest spread of these reads."""
+_SECTION = re.compile(r"^\s*\[+\s*([\w.]+)\s*\]+")
+_OFFSET = re.compile(r"^(\s*offset_counts\s*=\s*)-?[\d_]+", re.MULTILINE)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Zero:
+    """Offsets of one node."""
+
+    node: str
+    motor_offset: int
+    """[counts]"""
+    link_offset: int
+    """[counts]"""
+
+
+def measure(session: Session, posture: Sequence[float]) -> list[Zero]:
+    """Offsets with which both encoders of every node show `posture`, one angle a node [rad].
+
+    Raises:
+        DriveError: a drive does not answer, is another one, or its encoders move.
+    """
+    session.bring_up().identify()
+    return [
+        _node(session, node, angle)
+        for node, angle in zip(session.config.nodes, posture, strict=True)
+    ]
+
+
+def _node(session: Session, node: NodeConfig, angle: float) -> Zero:
+    reads = [read_counts(session, node) for _ in range(READS)]
+    offsets = []
+    for place, (axis, units) in enumerate((("motor", node.motor), ("link", node.link))):
+        shown = sorted(read[place] for read in reads)
+        if shown[-1] - shown[0] > STILL_COUNTS:
+            raise DriveError(
+                f"{axis} encoder of '{node.name}' moves by {shown[-1] - shown[0]} counts while it "
+                f"is read, the limit is {STILL_COUNTS}; hold the leg still"
+            )
+        offsets.append(_offset(units, shown[READS // 2], angle))
+    return Zero(node=node.name, motor_offset=offsets[0], link_offset=offsets[1])
+
+
+def _offset(units: AxisUnits, shown: int, angle: float) -> int:
+    return wrap(shown - replace(units, offset_counts=0).to_counts(angle), units.bits)
+
+
+def write(path: Path, zeros: Sequence[Zero], out: Path | None = None) -> Path:
+    """Put offsets into a bus file, comments kept; whole or not at all.
+
+    Raises:
+        ConfigError: it has not one `offset_counts` for every encoder.
+        RecordingError: it cannot be read or written.
+    """
+    out = out or path
+    wanted = [value for zero in zeros for value in (zero.motor_offset, zero.link_offset)]
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+        section, place = "", 0
+        for number, line in enumerate(lines):
+            found = _SECTION.match(line)
+            if found is not None:
+                section = found[1]
+            if section in ("node.motor", "node.link") and _OFFSET.match(line):
+                if place < len(wanted):
+                    lines[number] = _OFFSET.sub(rf"\g<1>{wanted[place]}", line)
+                place += 1
+        if place != len(wanted):
+            raise ConfigError(
+                f"{path} has {place} lines 'offset_counts', {len(wanted)} encoders need one each; "
+                "add them to [node.motor] and [node.link], motor first"
+            )
+        write_whole(out, "".join(lines).encode())
+    except OSError as error:
+        raise RecordingError(f"cannot write offsets to {out}: {error.strerror}") from None
+    return out

@@ -1,0 +1,86 @@
+"""Emulated drives on any python-can bus, paced by the machine's clock, such as a vcan."""
+
+import time
+from collections.abc import Callable
+from types import TracebackType
+from typing import Self, final
+
+import can
+
+from legbench.drives.codec.frame import Frame
+from legbench.drives.emulated.network import Network
+from legbench.drives.errors import BusError
+from legbench.drives.pacer import Pacer
+
+
+@final
+class BusServer:
+    """Stands between an emulated network, with the times of its wire, and a bus."""
+
+    def __init__(
+        self, network: Network, bus: can.BusABC, now_ns: Callable[[], int] = time.monotonic_ns
+    ) -> None:
+        """Plug in; the bus is closed with this."""
+        self.network, self._bus = network, bus
+        self._station = network.attach()
+        self._pacer = Pacer(network, now_ns)
+
+    def poll(self) -> None:
+        """Wait a moment for frames, move them and time on.
+
+        Raises:
+            BusError: the bus has failed.
+        """
+        try:
+            message = self._bus.recv(self._pacer.wait_s())
+            self._pacer.advance()
+            while message is not None:
+                self._take(message)
+                message = self._bus.recv(0.0)
+            self._pacer.advance()
+            self._give()
+        except (can.CanError, OSError) as error:
+            raise BusError(f"{self._bus.channel_info}: {error}") from error
+
+    def _take(self, message: can.Message) -> None:
+        if message.is_error_frame:
+            return
+        frame = Frame(
+            message.arbitration_id,
+            bytes(message.data),
+            message.is_remote_frame,
+            message.is_extended_id,
+        )
+        try:
+            self.network.send(self._station, frame)
+        except BusError:
+            # As on a real bus: a full queue or bus-off loses the frame.
+            return
+
+    def _give(self) -> None:
+        while self._station.received:
+            _, frame = self._station.received.popleft()
+            if not frame.error:
+                self._bus.send(
+                    can.Message(
+                        arbitration_id=frame.cob_id,
+                        data=frame.data,
+                        is_extended_id=frame.extended,
+                        is_remote_frame=frame.remote,
+                    )
+                )
+
+    def close(self) -> None:
+        """Unplug; may be called twice."""
+        self._bus.shutdown()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()

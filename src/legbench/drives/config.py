@@ -1,0 +1,255 @@
+"""What is on the bus: nodes, their identity, process data, units; one frozen value each."""
+
+import math
+from dataclasses import dataclass
+
+from legbench.drives.codec.datatypes import DataType
+from legbench.drives.codec.frame import LAST_NODE, RPDO_BASES, TPDO_BASES
+from legbench.drives.codec.pdo import Mapped, PdoMap
+from legbench.drives.errors import CodecError
+from legbench.drives.limits import Range
+from legbench.drives.objects import LINK_SHORT, PDO_COUNT, Key, name_of
+from legbench.drives.units import AxisUnits
+from legbench.errors import ConfigError
+
+STATUSWORD = Mapped(0x6041, 0, DataType.UNSIGNED16)
+CONTROLWORD = Mapped(0x6040, 0, DataType.UNSIGNED16)
+POSITION_ACTUAL = Mapped(0x6064, 0, DataType.INTEGER32)
+TARGET_POSITION = Mapped(0x607A, 0, DataType.INTEGER32)
+LINK_POSITION_SHORT = Mapped(LINK_SHORT, 0, DataType.INTEGER16)
+LINK_POSITION = Mapped(0x60E4, 1, DataType.INTEGER32)
+LARGEST_COUNT = (1 << 31) - 1
+"""Of a position object of 32 bits."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Identity:
+    """Identity object 1018h; what is not given is not checked."""
+
+    vendor: int
+    product: int
+    serial: int | None = None
+    revision: int | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PdoConfig:
+    """One synchronous process data object (1400h/1600h or 1800h/1A00h and following).
+
+    Raises:
+        ConfigError: a number that does not exist, or objects that fill no frame.
+    """
+
+    number: int
+    """1 to 4."""
+    objects: tuple[Mapped, ...]
+    cob_id: int | None = None
+    """That of the predefined connection set by default."""
+    deadline_ms: int = 0
+    """RPDO: the drive faults when none came for so long (140xh:05); 0: that object,
+    which not every drive has, is left alone."""
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.number <= PDO_COUNT:
+            raise ConfigError(f"PDO number {self.number}; a drive has 1 to {PDO_COUNT}")
+        try:
+            PdoMap(self.objects)
+        except CodecError as error:
+            raise ConfigError(f"PDO {self.number}: {error}") from None
+
+
+RPDO = PdoConfig(number=1, objects=(CONTROLWORD, TARGET_POSITION), deadline_ms=20)
+"""The usual command: six bytes."""
+TPDO = PdoConfig(number=1, objects=(STATUSWORD, POSITION_ACTUAL, LINK_POSITION_SHORT))
+"""The usual answer: eight bytes."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parameter:
+    """An object that is written before enabling, and read back."""
+
+    index: int
+    sub: int
+    kind: DataType
+    value: int
+    optional: bool = False
+    """Left out on a drive that has no such object."""
+
+    @property
+    def key(self) -> Key:
+        """Index and sub-index."""
+        return (self.index, self.sub)
+
+
+OWN_OBJECTS = (0x1005, 0x1006, 0x1016, 0x1017, 0x1029, 0x6007, 0x6040, 0x605A, 0x6060)
+OWN_OBJECTS += (0x607A, 0x60B0, 0x60C2)
+"""Written from the rest of the bus file; a parameter would undo it."""
+PDO_OBJECTS = range(0x1400, 0x1C00)
+STOP_OBJECTS = range(0x605B, 0x605F)
+FOLLOWING_WINDOW, NO_WINDOW, SOFT_LIMITS = 0x6065, 0xFFFFFFFF, 0x607D
+
+
+def check_parameter(name: str, parameter: Parameter) -> None:
+    """Refuse a parameter that takes a protection away; raises ConfigError."""
+    index, what = parameter.index, None
+    if index in OWN_OBJECTS or index in PDO_OBJECTS:
+        what = "is written by itself, from the rest of the bus file: leave it out"
+    elif index == SOFT_LIMITS:
+        what = "would not move with offset_counts: give soft_limits = [low, high] in rad"
+    elif index in STOP_OBJECTS and parameter.value <= 0:
+        what = f"is {parameter.value}, which lets the leg drop: give 1 to 4"
+    elif index == FOLLOWING_WINDOW and parameter.value == NO_WINDOW:
+        what = "switches the following error off: give a window in counts"
+    if what is not None:
+        raise ConfigError(f"node '{name}': parameter {name_of(index, parameter.sub)} {what}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NodeConfig:
+    """One drive.
+
+    Raises:
+        ConfigError: a node id that does not exist, or process data that cannot close the loop.
+    """
+
+    name: str
+    node_id: int
+    identity: Identity
+    motor: AxisUnits
+    link: AxisUnits
+    link_object: Mapped = LINK_POSITION_SHORT
+    rpdos: tuple[PdoConfig, ...] = (RPDO,)
+    tpdos: tuple[PdoConfig, ...] = (TPDO,)
+    parameters: tuple[Parameter, ...] = ()
+    """Beyond what `configuration.configuration` writes by itself, in this order."""
+    temperature_object: Mapped | None = None
+    """In 0.1 deg C, if the drive reports it."""
+    soft_limits: Range | None = None
+    """Of the motor, in the drive itself (607Dh), which clamps targets to them [rad]."""
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.node_id <= LAST_NODE:
+            raise ConfigError(f"node '{self.name}' has id {self.node_id}; it must be 1 to 127")
+        for needed, pdos, words in (
+            ((CONTROLWORD, TARGET_POSITION), self.rpdos, "RPDO"),
+            ((STATUSWORD, POSITION_ACTUAL, self.link_object), self.tpdos, "TPDO"),
+        ):
+            mapped = [entry for pdo in pdos for entry in pdo.objects]
+            for entry in needed:
+                if mapped.count(entry) != 1:
+                    raise ConfigError(
+                        f"node '{self.name}' maps {entry} {mapped.count(entry)} times; it must "
+                        f"stand in one {words}"
+                    )
+        if self.link.bits != self.link_object.bits:
+            raise ConfigError(
+                f"node '{self.name}': link bits is {self.link.bits}, but {self.link_object} has "
+                f"{self.link_object.bits}"
+            )
+        for parameter in self.parameters:
+            check_parameter(self.name, parameter)
+        if self.soft_limits is not None:
+            _ = self.soft_limits_counts
+
+    @property
+    def soft_limits_counts(self) -> tuple[int, int] | None:
+        """The same in encoder counts, lower first; raises ConfigError beyond 607Dh."""
+        if self.soft_limits is None:
+            return None
+        low, high = self.soft_limits
+        if not (math.isfinite(low) and math.isfinite(high) and low < high):
+            raise ConfigError(
+                f"node '{self.name}': soft_limits is [{low:g}, {high:g}] rad; low must be below "
+                "high"
+            )
+        ends = sorted((self.motor.to_counts(low), self.motor.to_counts(high)))
+        if ends[0] < -LARGEST_COUNT or ends[1] > LARGEST_COUNT:
+            raise ConfigError(
+                f"node '{self.name}': soft_limits are {ends[0]} to {ends[1]} counts; 607Dh holds "
+                f"{LARGEST_COUNT}: zero the encoder, or leave them out"
+            )
+        return (ends[0], ends[1])
+
+    def rpdo_id(self, pdo: PdoConfig) -> int:
+        """COB-ID of an RPDO."""
+        return pdo.cob_id or RPDO_BASES[pdo.number - 1] + self.node_id
+
+    def tpdo_id(self, pdo: PdoConfig) -> int:
+        """COB-ID of a TPDO."""
+        return pdo.cob_id or TPDO_BASES[pdo.number - 1] + self.node_id
+
+
+FASTEST_START = 5.0
+"""Of a move before a run begins [rad/s]."""
+
+
+def check_start_speed(speed: float) -> None:
+    """Refuse what is no speed of a slow move [rad/s]; raises ConfigError."""
+    if not 0.0 < speed <= FASTEST_START:
+        raise ConfigError(
+            f"start_speed is {speed:g} rad/s; it must be above 0 and at most {FASTEST_START:g}"
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BusConfig:
+    """A bus with its drives, in the order of the leg's joints.
+
+    Raises:
+        ConfigError: ids or COB-IDs used twice, or times that no bus keeps.
+    """
+
+    nodes: tuple[NodeConfig, ...]
+    interface: str | None = None
+    """python-can's name of the interface; its own configuration decides if none is given."""
+    channel: str | None = None
+    bitrate: int = 1_000_000
+    """[bit/s]"""
+    period_us: int = 1000
+    tpdo_deadline_us: int = 700
+    """After SYNC; process data that comes later counts as lost. A reply delay of 250 us, two full
+    frames and a heartbeat in front make 640 us at 1 Mbit/s; RPDOs need 230 us after it."""
+    master_id: int = 126
+    """Producer of the heartbeat that the drives watch."""
+    heartbeat_ms: int = 20
+    """Of every drive (1017h); lost after three."""
+    master_heartbeat_ms: int = 10
+    """Of the master; the drives stop after three (1016h)."""
+    sdo_timeout_ms: int = 200
+    sdo_retries: int = 3
+    settle_cycles: int = 20
+    """Cycles with regular process data before anything is enabled."""
+    start_speed: float = 2.0
+    """Of a move to the start posture, before a run begins [rad/s]."""
+
+    def __post_init__(self) -> None:
+        if not self.nodes:
+            raise ConfigError("a bus needs at least one node")
+        ids = [node.node_id for node in self.nodes]
+        if self.master_id in ids or len(set(ids)) != len(ids):
+            raise ConfigError(
+                f"node ids {', '.join(map(str, ids))} and master {self.master_id} must differ"
+            )
+        cobs = [node.rpdo_id(pdo) for node in self.nodes for pdo in node.rpdos]
+        cobs += [node.tpdo_id(pdo) for node in self.nodes for pdo in node.tpdos]
+        if len(set(cobs)) != len(cobs):
+            raise ConfigError("two PDOs share a COB-ID; give one of them another 'cob_id'")
+        check_start_speed(self.start_speed)
+        if not 0 < self.tpdo_deadline_us < self.period_us:
+            raise ConfigError(
+                f"tpdo_deadline_us is {self.tpdo_deadline_us}; it must lie within the period of "
+                f"{self.period_us} us"
+            )
+        for name in ("bitrate", "heartbeat_ms", "master_heartbeat_ms", "sdo_timeout_ms"):
+            if getattr(self, name) <= 0:
+                raise ConfigError(f"{name} is {getattr(self, name)}; it must be positive")
+
+    @property
+    def period(self) -> float:
+        """Of the cycle [s]."""
+        return 1e-6 * self.period_us
+
+    @property
+    def period_ns(self) -> int:
+        """The same, exact [ns]."""
+        return 1000 * self.period_us

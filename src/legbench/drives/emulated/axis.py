@@ -1,0 +1,189 @@
+"""The CiA 402 half of an emulated drive: controlword, modes, motion, statusword; pure."""
+
+from typing import final
+
+from legbench.drives.cia402 import DriveState, Mode, StatusBit
+from legbench.drives.codec.frame import Frame
+from legbench.drives.codec.sdo import Abort
+from legbench.drives.config import NodeConfig
+from legbench.drives.emulated.alarms import Alarms
+from legbench.drives.emulated.behaviour import Behaviour
+from legbench.drives.emulated.homing import Homing, HomingState
+from legbench.drives.emulated.motion import Motion
+from legbench.drives.emulated.power import HALT, PowerStage
+from legbench.drives.objects import LINK_SHORT, Key
+from legbench.drives.units import wrap
+
+MODES = (Mode.NONE, Mode.HOMING, Mode.CYCLIC_SYNCHRONOUS_POSITION)
+FOLLOWING_ERROR, SETPOINTS_MISSING, SYNC_MISSING = 0x8611, 0xFF10, 0xFF11
+_ENABLED = DriveState.OPERATION_ENABLED
+_STATUS = int(StatusBit.REMOTE)
+
+
+@final
+class Axis:
+    """One motor with its two encoders, as the object dictionary shows them.
+
+    Attributes:
+        power: the state machine.
+        motion: the motor.
+        alarms: what is wrong.
+    """
+
+    def __init__(self, node: NodeConfig, behaviour: Behaviour, values: dict[Key, int]) -> None:
+        self._node, self._behaviour, self._values = node, behaviour, values
+        self.power = PowerStage(values)
+        self.motion = Motion(node.motor, behaviour, values)
+        self.alarms = Alarms(node.node_id, values)
+        self._homing = Homing(values, node.motor.counts_per_rev)
+        self._link_counts = node.link.to_counts(behaviour.start_pos)
+        self._torque = 0
+        self._mode_due_ns: int | None = None
+        self._waiting_word: int | None = None
+        self._out: list[Frame] = []
+        self.publish()
+
+    def restart(self) -> None:
+        """After a reset the electronics forget everything, the motor stays where it is."""
+        self.power.state = DriveState.NOT_READY_TO_SWITCH_ON
+        self.power.stopping = None
+        self.alarms = Alarms(self._node.node_id, self._values)
+        self._waiting_word = self._mode_due_ns = None
+        self.motion.hold(0)
+
+    def take(self) -> list[Frame]:
+        """Emergency messages since the last call."""
+        out, self._out = self._out, []
+        return out
+
+    def check(self, key: Key, value: int) -> Abort | None:
+        """Why an object of the profile may not become a value now."""
+        if key == (0x6060, 0):
+            if value not in MODES:
+                return Abort.INVALID_VALUE
+            halted = self._values[0x6040, 0] & HALT
+            changes = value != self._values[0x6060, 0]
+            if halted and changes and self._behaviour.halt_blocks_mode:
+                return Abort.DEVICE_STATE
+        return None
+
+    def written(self, key: Key, now_ns: int) -> None:
+        """An object of the profile has a new value."""
+        if key == (0x6040, 0):
+            if self._behaviour.slow_loop:
+                self._waiting_word = self._values[key]
+            else:
+                self._command(self._values[key], now_ns)
+        elif key == (0x6060, 0):
+            self._mode_due_ns = now_ns + 1000 * self._behaviour.mode_lag_us
+
+    def _command(self, controlword: int, now_ns: int) -> None:
+        was_enabled = self.power.state is _ENABLED
+        if self.power.command(controlword, cause_gone=not self.alarms.standing):
+            self._say(self.alarms.reset())
+        if self.power.state is _ENABLED and not was_enabled:
+            self.motion.hold(now_ns)
+        if self.power.state is _ENABLED and self._values[0x6061, 0] == Mode.HOMING:
+            self._homing.command(controlword)
+        self._status()
+
+    def fault(self, code: int) -> None:
+        """An error has come; react to it."""
+        self._say(self.alarms.raise_(code))
+        self.power.fault()
+
+    def sync(self, fresh: bool, now_ns: int) -> None:
+        """SYNC: the target becomes the new set point, if one has come."""
+        values = self._values
+        if self.power.state is not _ENABLED or values[0x6061, 0] != 8:
+            return
+        if self.power.stopping is not None or values[0x6040, 0] & HALT:
+            return
+        target = values[0x607A, 0] + values[0x60B0, 0] if fresh else None
+        if target is not None:
+            # The object wraps; the motor takes the short way round.
+            near = round(self.motion.demand)
+            target = near + wrap(target - near)
+        self.motion.latch(target, now_ns)
+        if self.motion.missing > self._behaviour.missing_limit:
+            self.fault(SETPOINTS_MISSING)
+
+    def tick(self, now_ns: int, step_ns: int) -> float:
+        """Move for `step_ns` until now; true motor position [rad]."""
+        if self._waiting_word is not None:
+            word, self._waiting_word = self._waiting_word, None
+            self._command(word, now_ns)
+        if self._mode_due_ns is not None and now_ns >= self._mode_due_ns:
+            self._values[0x6061, 0], self._mode_due_ns = self._values[0x6060, 0], None
+            self.motion.hold(now_ns)
+        before = self.motion.actual
+        self._move(now_ns, step_ns)
+        self._values[0x606C, 0] = round((self.motion.actual - before) * 1e9 / step_ns)
+        return self.motion.angle
+
+    def _move(self, now_ns: int, step_ns: int) -> None:
+        motion, power, values = self.motion, self.power, self._values
+        if power.stopping is not None:
+            if motion.ramp(self._deceleration(power.stopping), step_ns):
+                power.stopped()
+        elif power.state is DriveState.QUICK_STOP_ACTIVE:
+            motion.ramp(0.0, step_ns)
+        elif power.state is not _ENABLED:
+            motion.hold(now_ns)
+            return
+        elif values[0x6040, 0] & HALT:
+            motion.ramp(self._deceleration(values[0x605D, 0]), step_ns)
+        elif values[0x6061, 0] == Mode.CYCLIC_SYNCHRONOUS_POSITION:
+            motion.follow(now_ns, step_ns)
+        elif values[0x6061, 0] == Mode.HOMING:
+            self._homing.step(motion, step_ns)
+        motion.drive(step_ns)
+        if motion.overdue(step_ns):
+            self.fault(FOLLOWING_ERROR)
+
+    def _deceleration(self, option: int) -> float:
+        """Of a stop option [counts/s2]; 0 stops at once, as the current limit would allow."""
+        if option == 1:
+            return float(self._values[0x6084, 0])
+        return float(self._values[0x6085, 0]) if option == 2 else 0.0
+
+    def sense(self, link_pos: float, spring_torque: float) -> None:
+        """What the body did: link angle [rad] and torque of the spring [N m]."""
+        self._link_counts = self._node.link.to_counts(link_pos)
+        rated = self._behaviour.rated_torque
+        self._torque = round(self._node.motor.sign * 1000.0 * spring_torque / rated)
+
+    def publish(self) -> None:
+        """Bring the actual values of the object dictionary up to date."""
+        values, motion = self._values, self.motion
+        actual = round(motion.actual)
+        values[0x6064, 0] = wrap(actual)
+        values[0x6062, 0] = wrap(round(motion.demand))
+        values[0x60F4, 0] = wrap(round(motion.demand) - actual)
+        values[0x60E4, 1] = wrap(self._link_counts)
+        values[LINK_SHORT, 0] = wrap(self._link_counts, 16)
+        values[0x6077, 0] = min(max(self._torque, -32768), 32767)
+        self._status()
+
+    def _status(self) -> None:
+        word = self.power.low_byte | _STATUS
+        mode = self._values[0x6061, 0]
+        if mode == Mode.CYCLIC_SYNCHRONOUS_POSITION:
+            if self.power.state is _ENABLED and self.power.stopping is None:
+                if not (self._values[0x6040, 0] & HALT or self.motion.limited):
+                    word |= StatusBit.FOLLOWS_COMMAND
+                if self.motion.limited:
+                    word |= StatusBit.INTERNAL_LIMIT
+            if self._values[0x603F, 0] == FOLLOWING_ERROR:
+                word |= StatusBit.FOLLOWING_ERROR
+        elif mode == Mode.HOMING:
+            word |= {
+                HomingState.ATTAINED: StatusBit.TARGET_REACHED | StatusBit.FOLLOWS_COMMAND,
+                HomingState.FAILED: StatusBit.TARGET_REACHED | StatusBit.FOLLOWING_ERROR,
+                HomingState.IDLE: StatusBit.TARGET_REACHED,
+            }.get(self._homing.state, 0)
+        self._values[0x6041, 0] = int(word)
+
+    def _say(self, frame: Frame | None) -> None:
+        if frame is not None:
+            self._out.append(frame)

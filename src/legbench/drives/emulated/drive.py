@@ -1,0 +1,333 @@
+"""An emulated CiA 301/402 drive: frames in, frames out, time is an argument; pure."""
+
+import random
+from collections.abc import Iterator
+from typing import final
+
+from legbench.drives.cia402 import DriveState
+from legbench.drives.codec.frame import (
+    HEARTBEAT_BASE,
+    LAST_NODE,
+    NMT_ID,
+    SDO_REPLY_BASE,
+    SDO_REQUEST_BASE,
+    SYNC_ID,
+    Frame,
+)
+from legbench.drives.codec.nmt import (
+    HeartbeatWatch,
+    NmtCommand,
+    NmtState,
+    decode_heartbeat,
+    decode_nmt,
+    heartbeat_frame,
+)
+from legbench.drives.codec.sdo import Abort
+from legbench.drives.codec.sdo_server import SdoServer
+from legbench.drives.config import NodeConfig
+from legbench.drives.emulated.axis import SYNC_MISSING, Axis
+from legbench.drives.emulated.behaviour import Behaviour
+from legbench.drives.emulated.process_data import LAST_SYNCHRONOUS, ProcessData
+from legbench.drives.emulated.store import ObjectStore
+from legbench.drives.errors import SdoAbortError
+from legbench.drives.objects import OBJECTS, TEMPERATURE, Key
+
+UNDER_VOLTAGE, OVER_TEMPERATURE = 0x3220, 0x4310
+HEARTBEAT_LOST, PDO_SHORT, PDO_LONG, SYNC_LENGTH, RPDO_LATE = 0x8130, 0x8210, 0x8220, 0x8240, 0x8250
+TARGET = (0x607A, 0)
+_ORDERS = {
+    NmtCommand.START: NmtState.OPERATIONAL,
+    NmtCommand.STOP: NmtState.STOPPED,
+    NmtCommand.ENTER_PRE_OPERATIONAL: NmtState.PRE_OPERATIONAL,
+}
+
+
+@final
+class EmulatedDrive:
+    """One node on the bus.
+
+    Attributes:
+        node_id: its address.
+        state: NMT state; `BOOT_UP` until the boot-up message is out.
+        axis: the CiA 402 half.
+    """
+
+    def __init__(self, node: NodeConfig, behaviour: Behaviour | None = None) -> None:
+        self._node, self._behaviour = node, behaviour or Behaviour()
+        self.node_id = node.node_id
+        self._random = random.Random(self._behaviour.seed * LAST_NODE + node.node_id)
+        self._store = ObjectStore(OBJECTS.values(), self._check, self._written)
+        self._values = self._store.values
+        self._personal()
+        self.axis = Axis(node, self._behaviour, self._values)
+        self._pdos = ProcessData(self._store)
+        self._sdo = SdoServer(self._store.read, self._store.write)
+        self.state = NmtState.BOOT_UP
+        self._now_ns = 0
+        self._tick_ns = 0
+        self._boot_ns = 1000 * self._behaviour.boot_us
+        self._beat_ns = 0
+        self._sync_ns: int | None = None
+        self._fresh = False
+        self._watches: dict[int, HeartbeatWatch] = {}
+        self._out: list[tuple[int, Frame]] = []
+        self._mute = False
+
+    def _personal(self) -> None:
+        identity, node_id = self._node.identity, self._node.node_id
+        values = self._values
+        values[0x1018, 1], values[0x1018, 2] = identity.vendor, identity.product
+        values[0x1018, 3], values[0x1018, 4] = identity.revision or 0, identity.serial or 0
+        values[0x1014, 0] = 0x80 + node_id
+        for base in (0x1400, 0x1800):
+            for number in range(4):
+                values[base + number, 1] += node_id
+
+    # --- what the wire and the body call -----------------------------------------------------
+
+    def take(self) -> list[tuple[int, Frame]]:
+        """Frames to send since the last call, each with the time at which it is ready [ns]."""
+        out, self._out = self._out, []
+        return out
+
+    def receive(self, frame: Frame, now_ns: int) -> None:
+        """A frame of another node has been on the wire; whatever it says, nothing is raised."""
+        self._now_ns = now_ns
+        if frame.error or frame.extended or frame.remote or self.state is NmtState.BOOT_UP:
+            return
+        cob_id, data = frame.cob_id, frame.data
+        if cob_id == SYNC_ID:
+            self._sync(data)
+        elif cob_id in self._pdos.rpdos:
+            self._rpdo(cob_id, data)
+        elif cob_id == SDO_REQUEST_BASE + self.node_id:
+            if self.state is not NmtState.STOPPED:
+                reply = self._sdo.feed(data)
+                if reply is not None:
+                    self._send(Frame(SDO_REPLY_BASE + self.node_id, reply))
+        elif cob_id == NMT_ID:
+            order = decode_nmt(data)
+            if order is not None and order[1] in (0, self.node_id):
+                self._obey(order[0])
+        elif HEARTBEAT_BASE < cob_id <= HEARTBEAT_BASE + LAST_NODE:
+            self._heard(cob_id - HEARTBEAT_BASE, data)
+        self._forward()
+
+    def tick(self, now_ns: int) -> float:
+        """Move until now and look at the timers; true motor position [rad]."""
+        step_ns, self._now_ns, self._tick_ns = now_ns - self._tick_ns, now_ns, now_ns
+        if step_ns <= 0:
+            return self.axis.motion.angle
+        if self.state is NmtState.BOOT_UP:
+            if now_ns >= self._boot_ns:
+                self._boot()
+            return self.axis.motion.angle
+        angle = self.axis.tick(now_ns, step_ns)
+        self._timers()
+        self._forward()
+        return angle
+
+    def sense(self, link_pos: float, spring_torque: float) -> None:
+        """What the body did in this tick: link angle [rad], torque of its spring [N m]."""
+        self.axis.sense(link_pos, spring_torque)
+        self.axis.publish()
+        if self.state is NmtState.OPERATIONAL:
+            self._events()
+
+    # --- faults to inject --------------------------------------------------------------------
+
+    def reset(self, now_ns: int) -> None:
+        """Start over, as after a brown-out: configuration and state are lost."""
+        self._now_ns = now_ns
+        self._store.load_defaults()
+        self._personal()
+        self.axis.restart()
+        self._pdos.rebuild()
+        self._watches.clear()
+        self._out.clear()
+        self.state, self._sync_ns, self._fresh = NmtState.BOOT_UP, None, False
+        self._boot_ns = now_ns + 1000 * self._behaviour.boot_us
+
+    def trip(self, code: int, now_ns: int) -> None:
+        """The cause of an error comes and stays, such as `UNDER_VOLTAGE`."""
+        self._now_ns = now_ns
+        self.axis.alarms.hold(code)
+        if code == OVER_TEMPERATURE:
+            self._values[TEMPERATURE, 0] = 900
+        self.axis.fault(code)
+        self._forward()
+
+    def untrip(self, code: int) -> None:
+        """The cause of an error goes; a fault reset is possible again."""
+        self.axis.alarms.release(code)
+
+    def bus_off(self, now_ns: int) -> None:
+        """Its own controller has left the bus: stop as 6007h says."""
+        self._now_ns = now_ns
+        self.axis.power.connection_lost()
+        self._out.clear()
+
+    def mute_heartbeat(self, mute: bool = True) -> None:
+        """Stop producing heartbeats, while everything else goes on."""
+        self._mute = mute
+
+    # --- CiA 301 -----------------------------------------------------------------------------
+
+    def _check(self, key: Key, value: int) -> Abort | None:
+        if ProcessData.owns(key):
+            return self._pdos.check(key, value)
+        if key == (0x1019, 0) and self._values[0x1006, 0]:
+            return Abort.DEVICE_STATE
+        return self.axis.check(key, value)
+
+    def _written(self, key: Key) -> None:
+        if ProcessData.owns(key):
+            if key[0] & 0x200 or key[1] in (1, 2, 5):
+                self._pdos.rebuild()
+        elif key[0] == 0x1016:
+            self._watches.clear()
+        elif key[0] >= 0x6000:
+            if key == TARGET:
+                self._fresh = True
+            self.axis.written(key, self._now_ns)
+
+    def _boot(self) -> None:
+        self.state = NmtState.PRE_OPERATIONAL
+        self._pdos.rebuild()
+        self.axis.power.boot()
+        self._beat_ns = self._now_ns
+        self._out.append((self._now_ns, heartbeat_frame(self.node_id, NmtState.BOOT_UP)))
+
+    def _obey(self, command: NmtCommand) -> None:
+        if command in (NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION):
+            self.reset(self._now_ns)
+            return
+        self._enter(_ORDERS[command])
+
+    def _enter(self, state: NmtState) -> None:
+        before, self.state = self.state, state
+        if before is NmtState.OPERATIONAL and state is not NmtState.OPERATIONAL:
+            self.axis.power.connection_lost()
+            self._pdos.forget()
+            self._sync_ns, self._fresh = None, False
+        elif state is NmtState.OPERATIONAL and before is not state:
+            for node_id, timeout_ns in self._consumed():
+                self._watches.setdefault(node_id, HeartbeatWatch(timeout_ns, self._now_ns))
+
+    def _consumed(self) -> Iterator[tuple[int, int]]:
+        """Node and time-out [ns] of 1016h."""
+        for sub in (1, 2):
+            word = self._values[0x1016, sub]
+            if word >> 16 & 0x7F and word & 0xFFFF:
+                yield word >> 16 & 0x7F, 1_000_000 * (word & 0xFFFF)
+
+    def _heard(self, node_id: int, data: bytes) -> None:
+        if decode_heartbeat(data) is None:
+            return
+        for watched, timeout_ns in self._consumed():
+            if watched == node_id:
+                self._watches[node_id] = HeartbeatWatch(timeout_ns, self._now_ns)
+                self._send_now(self.axis.alarms.clear(HEARTBEAT_LOST))
+
+    def _sync(self, data: bytes) -> None:
+        overflow = self._values[0x1019, 0]
+        if len(data) != (1 if overflow else 0):
+            self._send_now(self.axis.alarms.raise_(SYNC_LENGTH))
+            return
+        if self.state is not NmtState.OPERATIONAL:
+            return
+        for pdo in self._pdos.tpdos:
+            if pdo.kind <= LAST_SYNCHRONOUS:
+                pdo.syncs += 1
+                if pdo.syncs >= pdo.kind:
+                    pdo.syncs = 0
+                    self._send(Frame(pdo.cob_id, self._pdos.sample(pdo)))
+        for pdo in self._pdos.rpdos.values():
+            if pdo.waiting is not None and pdo.kind <= LAST_SYNCHRONOUS:
+                values, pdo.waiting = pdo.waiting, None
+                self._apply(pdo.keys, values)
+        self.axis.sync(self._fresh, self._now_ns)
+        self._fresh, self._sync_ns = False, self._now_ns
+
+    def _rpdo(self, cob_id: int, data: bytes) -> None:
+        if self.state is not NmtState.OPERATIONAL:
+            return
+        pdo = self._pdos.rpdos[cob_id]
+        size = pdo.layout.size
+        if len(data) < size:
+            self._send_now(self.axis.alarms.raise_(PDO_SHORT))
+            return
+        if len(data) > size:
+            self._send_now(self.axis.alarms.raise_(PDO_LONG))
+        pdo.seen_ns = self._now_ns
+        self._send_now(self.axis.alarms.clear(RPDO_LATE))
+        window_ns = 1000 * self._values[0x1007, 0]
+        values = pdo.layout.unpack(data[:size])
+        if pdo.kind > LAST_SYNCHRONOUS:
+            self._apply(pdo.keys, values)
+        elif not (window_ns and self._sync_ns and self._now_ns - self._sync_ns > window_ns):
+            pdo.waiting = values
+
+    def _apply(self, keys: tuple[Key, ...], values: tuple[int, ...]) -> None:
+        for key, value in zip(keys, values, strict=True):
+            entry = self._store.entry(key)
+            if entry is not None:
+                try:
+                    self._store.put(entry, value)
+                except SdoAbortError:
+                    continue
+
+    def _timers(self) -> None:
+        now_ns, values = self._now_ns, self._values
+        beat_ns = 1_000_000 * values[0x1017, 0]
+        if beat_ns and now_ns - self._beat_ns >= beat_ns:
+            self._beat_ns = now_ns
+            if not self._mute:
+                self._out.append((now_ns, heartbeat_frame(self.node_id, self.state)))
+        if any(watch.lost(now_ns) for watch in self._watches.values()):
+            self._watches.clear()
+            self._connection_lost(HEARTBEAT_LOST)
+        for pdo in self._pdos.rpdos.values():
+            late = pdo.seen_ns is not None and now_ns - pdo.seen_ns > pdo.timer_ns
+            if pdo.timer_ns and late:
+                pdo.seen_ns = None
+                self._connection_lost(RPDO_LATE)
+        cycle_ns = 1000 * values[0x1006, 0] * self._behaviour.sync_loss_periods
+        if cycle_ns and self._sync_ns is not None and now_ns - self._sync_ns > cycle_ns:
+            self._sync_ns = None
+            if self.axis.power.state is DriveState.OPERATION_ENABLED:
+                self.axis.fault(SYNC_MISSING)
+
+    def _connection_lost(self, code: int) -> None:
+        """A communication error: say it, stop as 6007h says, fall back as 1029h says."""
+        self._send_now(self.axis.alarms.raise_(code))
+        self.axis.power.connection_lost()
+        fallback = {0: NmtState.PRE_OPERATIONAL, 2: NmtState.STOPPED}.get(self._values[0x1029, 1])
+        if fallback is not None and self.state is NmtState.OPERATIONAL:
+            self._enter(fallback)
+
+    def _events(self) -> None:
+        """Event-driven TPDOs: on change, and when their timer runs out."""
+        for pdo in self._pdos.tpdos:
+            if pdo.kind <= LAST_SYNCHRONOUS:
+                continue
+            before, data = pdo.last, self._pdos.sample(pdo)
+            since_ns = None if pdo.seen_ns is None else self._now_ns - pdo.seen_ns
+            late = bool(pdo.timer_ns) and (since_ns is None or since_ns >= pdo.timer_ns)
+            if data != before or late:
+                pdo.seen_ns = self._now_ns
+                self._send(Frame(pdo.cob_id, data))
+
+    # --- output ------------------------------------------------------------------------------
+
+    def _send(self, frame: Frame) -> None:
+        low, high = self._behaviour.reply_delay_us
+        delay_us = low if low == high else self._random.randint(low, high)
+        self._out.append((self._now_ns + 1000 * delay_us, frame))
+
+    def _send_now(self, frame: Frame | None) -> None:
+        if frame is not None:
+            self._out.append((self._now_ns, frame))
+
+    def _forward(self) -> None:
+        self._out += [(self._now_ns, frame) for frame in self.axis.take()]

@@ -1,0 +1,130 @@
+"""Which faults strike what and when; pure."""
+
+from collections.abc import Iterator, Sequence
+from typing import final
+
+from legbench.drives.codec.frame import Frame
+from legbench.drives.emulated.drive import OVER_TEMPERATURE, UNDER_VOLTAGE, EmulatedDrive
+from legbench.drives.emulated.faults import (
+    Babble,
+    Fault,
+    FrameFault,
+    FrameFaultKind,
+    NodeFault,
+    NodeFaultKind,
+)
+
+_TRIPS = {
+    NodeFaultKind.UNDER_VOLTAGE: UNDER_VOLTAGE,
+    NodeFaultKind.OVER_TEMPERATURE: OVER_TEMPERATURE,
+}
+Fate = tuple[tuple[int, Frame], ...]
+"""What arrives of a frame: delay [ns] and content of each copy."""
+
+
+@final
+class Injector:
+    """Holds the faults of one bus; stands in as the sender of frames that nobody sent."""
+
+    def __init__(self, faults: Sequence[Fault]) -> None:
+        self._frames: list[FrameFault] = []
+        self._nodes: list[NodeFault] = []
+        self._babbles: list[Babble] = []
+        self._begun: list[NodeFault] = []
+        self.broken = False
+        """Whether the frame on the wire is being destroyed."""
+        for fault in faults:
+            self.add(fault)
+
+    def add(self, fault: Fault) -> None:
+        """From now on this may strike."""
+        if isinstance(fault, FrameFault):
+            self._frames.append(fault)
+        elif isinstance(fault, NodeFault):
+            self._nodes.append(fault)
+        else:
+            self._babbles.append(fault)
+
+    def receive(self, frame: Frame, now_ns: int) -> None:
+        """Nothing is done with what others send."""
+
+    def take(self) -> list[tuple[int, Frame]]:
+        """Nothing is sent by itself."""
+        return []
+
+    def tick(self, now_ns: int) -> float:
+        """Nothing to do."""
+        return 0.0
+
+    def breaks(self, frame: Frame, now_ns: int) -> bool:
+        """Whether a frame is destroyed on the wire."""
+        self.broken = any(
+            fault.kind is FrameFaultKind.BAD_BITS and fault.hits(frame, now_ns)
+            for fault in self._frames
+        )
+        return self.broken
+
+    def fate(self, frame: Frame, now_ns: int) -> Fate:
+        """What arrives of a frame that was not destroyed."""
+        if not self._frames:
+            return ((0, frame),)
+        arrivals: Fate = ((0, frame),)
+        for fault in self._frames:
+            if not fault.hits(frame, now_ns):
+                continue
+            if fault.kind is FrameFaultKind.DROP:
+                return ()
+            if fault.kind is FrameFaultKind.WRONG_LENGTH:
+                cut = frame.data[: fault.length].ljust(fault.length, b"\0")
+                arrivals = ((0, frame._replace(data=cut)),)
+            elif fault.kind is FrameFaultKind.DELAY:
+                arrivals = ((max(1, fault.delay_ns), frame),)
+            elif fault.kind is FrameFaultKind.DUPLICATE:
+                arrivals = (*arrivals, (max(1, fault.delay_ns), frame))
+        return arrivals
+
+    def babble(self, now_ns: int, span_ns: int) -> Iterator[Frame]:
+        """Frames that somebody shouts in the coming span."""
+        for babble in self._babbles:
+            if babble.start_ns <= now_ns < babble.end_ns:
+                for _ in range(max(1, span_ns // babble.every_ns)):
+                    yield Frame(babble.cob_id, babble.data)
+
+    def node_events(self, now_ns: int) -> Iterator[tuple[NodeFault, bool]]:
+        """Faults of nodes that begin (true) or end (false) by now."""
+        for fault in tuple(self._nodes):
+            if now_ns >= fault.start_ns:
+                self._nodes.remove(fault)
+                self._begun.append(fault)
+                yield fault, True
+        for fault in tuple(self._begun):
+            if now_ns >= fault.end_ns:
+                self._begun.remove(fault)
+                yield fault, False
+
+    def silent(self, node_id: int, now_ns: int) -> bool:
+        """Whether a node's plug is pulled."""
+        return any(
+            fault.kind is NodeFaultKind.SILENT and fault.node_id == node_id for fault in self._begun
+        )
+
+    @staticmethod
+    def cuts_off(fault: NodeFault) -> bool:
+        """Whether a fault takes its node off the bus, knowingly."""
+        return fault.kind is NodeFaultKind.BUS_OFF
+
+    @staticmethod
+    def strike(drive: EmulatedDrive, fault: NodeFault, now_ns: int, *, begins: bool) -> None:
+        """Do to a drive what a fault says."""
+        code = _TRIPS.get(fault.kind)
+        if code is not None:
+            if begins:
+                drive.trip(code, now_ns)
+            else:
+                drive.untrip(code)
+        elif fault.kind is NodeFaultKind.HEARTBEAT_LOSS:
+            drive.mute_heartbeat(begins)
+        elif fault.kind is NodeFaultKind.RESET and begins:
+            drive.reset(now_ns)
+        elif fault.kind is NodeFaultKind.BUS_OFF and begins:
+            drive.bus_off(now_ns)

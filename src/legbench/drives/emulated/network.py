@@ -1,0 +1,289 @@
+"""The wire of an emulated bus and all that hangs on it, event by event in virtual time.
+
+Frames are sent one after the other, the lowest identifier first; the body moves on a fixed grid.
+Nothing here looks at a clock, and the same calls give the same frames to the nanosecond.
+"""
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from enum import Enum
+from typing import Protocol, final
+
+from legbench.drives.codec.frame import Frame
+from legbench.drives.emulated.drive import EmulatedDrive
+from legbench.drives.emulated.faults import Fault, NodeFault
+from legbench.drives.emulated.injector import Injector
+from legbench.drives.errors import BusError
+from legbench.drives.wire import ERROR_BITS, exact_bits, plain_bits, worst_bits
+
+Body = Callable[[tuple[float, ...]], tuple[Sequence[float], Sequence[float]]]
+"""Moves one body period with the motors at these positions [rad]; link positions [rad] and
+spring torques [N m] at its end."""
+PASSIVE, BUS_OFF = 128, 256
+"""Transmit error counts from which a node is error passive, or off the bus (ISO 11898-1)."""
+
+ERROR_FRAME = Frame(0x88, bytes(8), error=True)
+"""SocketCAN's report of a bus error: protocol violation."""
+BUS_OFF_FRAME = Frame(0x40, bytes(8), error=True)
+"""SocketCAN's report that the own controller has left the bus."""
+
+
+class Stuffing(Enum):
+    """How long frames are taken to be."""
+
+    NONE = "none"
+    WORST = "worst"
+    EXACT = "exact"
+
+
+class Participant(Protocol):
+    """Whatever takes part in the traffic by itself."""
+
+    def receive(self, frame: Frame, now_ns: int) -> None:
+        """A frame of another node has been on the wire."""
+        ...
+
+    def take(self) -> list[tuple[int, Frame]]:
+        """Frames to send, each with the time at which it is ready [ns]."""
+        ...
+
+    def tick(self, now_ns: int) -> float:
+        """Look at the timers, once a body period."""
+        ...
+
+
+@final
+class Station:
+    """A master's controller: a queue of received frames and an error counter."""
+
+    def __init__(self, tx_queue: int) -> None:
+        self.received: deque[tuple[int, Frame]] = deque()
+        self.tx_queue = tx_queue
+        self.waiting = 0
+        """Frames that have not been on the wire yet."""
+
+
+Node = Participant | Station
+_Pending = tuple[int, int, int, Node, Frame]
+"""Ready at [ns], identifier, sequence number, sender, frame."""
+
+
+def stiff_body(motor_pos: tuple[float, ...]) -> tuple[Sequence[float], Sequence[float]]:
+    """A body without springs: the links are where the motors are."""
+    return motor_pos, (0.0,) * len(motor_pos)
+
+
+@final
+class Network:
+    """A bus with emulated drives, a body, other participants and any number of masters.
+
+    Attributes:
+        now_ns: virtual time [ns].
+        drives: in the order of the leg's joints.
+        log: every frame that was on the wire with the time of its end, if wanted.
+        errors: transmit error counter of every node.
+    """
+
+    def __init__(
+        self,
+        drives: Sequence[EmulatedDrive],
+        *,
+        body: Body = stiff_body,
+        others: Sequence[Participant] = (),
+        bitrate: int = 1_000_000,
+        body_period_ns: int = 1_000_000,
+        stuffing: Stuffing = Stuffing.WORST,
+        faults: Sequence[Fault] = (),
+        keep_log: bool = False,
+    ) -> None:
+        self.now_ns = 0
+        self.drives = tuple(drives)
+        self.log: list[tuple[int, Frame]] | None = [] if keep_log else None
+        self._body = body
+        self._others = tuple(others)
+        self._nodes: list[Node] = [*drives, *others]
+        self.errors: dict[Node, int] = dict.fromkeys(self._nodes, 0)
+        self._bit_ns = round(1e9 / bitrate)
+        self._stuffing = stuffing
+        self._injector = Injector(faults)
+        self._body_period_ns = self._tick_ns = body_period_ns
+        self._pending: list[_Pending] = []
+        self._sequence = 0
+        self._copied: dict[int, Node] = {}
+        self._flying: _Pending | None = None
+        self._end_ns = 0
+
+    def attach(self, tx_queue: int = 64) -> Station:
+        """Plug a master in."""
+        station = Station(tx_queue)
+        self._nodes.append(station)
+        self.errors[station] = 0
+        return station
+
+    def detach(self, station: Station) -> None:
+        """Unplug a master; what it had not sent yet is lost."""
+        self._nodes.remove(station)
+        self._pending = [entry for entry in self._pending if entry[3] is not station]
+
+    def inject(self, fault: Fault) -> None:
+        """Add a fault."""
+        self._injector.add(fault)
+
+    def off_bus(self, node: Node) -> bool:
+        """Whether a node has gone bus-off."""
+        return self.errors[node] >= BUS_OFF
+
+    def recover(self, node: Node) -> None:
+        """Take a node back onto the bus."""
+        self.errors[node] = 0
+
+    def send(self, station: Station, frame: Frame) -> None:
+        """Hand a master's frame to its controller.
+
+        Raises:
+            BusError: the controller is bus-off, or its queue is full.
+        """
+        if self.off_bus(station):
+            raise BusError("the controller is bus-off; find the cause, then restart the interface")
+        if station.waiting >= station.tx_queue:
+            raise BusError(f"the transmit queue is full ({station.tx_queue} frames)")
+        station.waiting += 1
+        self._submit(station, self.now_ns, frame)
+
+    def advance(self, until_ns: int, station: Station | None = None) -> None:
+        """Let time pass until then, or until a frame for `station` has come."""
+        while station is None or not station.received:
+            at_ns, event = self._next()
+            if at_ns > until_ns:
+                break
+            self.now_ns = max(self.now_ns, at_ns)
+            event()
+        else:
+            return
+        self.now_ns = max(self.now_ns, until_ns)
+
+    def _next(self) -> tuple[int, Callable[[], None]]:
+        """What happens next, and when; the body's grid goes first."""
+        if self._flying is not None:
+            at_ns, event = self._end_ns, self._land
+        elif self._pending:
+            at_ns = max(self._end_ns, min(self._pending)[0])
+            event = self._arbitrate
+        else:
+            return self._tick_ns, self._tick
+        if self._tick_ns <= at_ns:
+            return self._tick_ns, self._tick
+        return at_ns, event
+
+    def _submit(self, node: Node, ready_ns: int, frame: Frame) -> None:
+        self._sequence += 1
+        self._pending.append((ready_ns, frame.cob_id, self._sequence, node, frame))
+
+    def _collect(self, node: Node) -> None:
+        if isinstance(node, Station):
+            return
+        for ready_ns, frame in node.take():
+            if not self.off_bus(node):
+                self._submit(node, ready_ns, frame)
+
+    def _tick(self) -> None:
+        now_ns = self.now_ns
+        self._tick_ns += self._body_period_ns
+        for fault, begins in self._injector.node_events(now_ns):
+            self._strike(fault, begins=begins)
+        for frame in self._injector.babble(now_ns, self._body_period_ns):
+            self._submit(self._injector, now_ns, frame)
+        angles = tuple([drive.tick(now_ns) for drive in self.drives])
+        if angles:
+            links, torques = self._body(angles)
+            for drive, link, torque in zip(self.drives, links, torques, strict=True):
+                drive.sense(float(link), float(torque))
+        for other in self._others:
+            other.tick(now_ns)
+        for node in self._nodes:
+            self._collect(node)
+
+    def _arbitrate(self) -> None:
+        """Of all frames that are ready the lowest identifier wins."""
+        now_ns = self.now_ns
+        ready = [entry for entry in self._pending if entry[0] <= now_ns]
+        winner = min(ready, key=lambda entry: entry[1:3])
+        self._pending.remove(winner)
+        self._flying = winner
+        frame = winner[4]
+        error = self._injector.breaks(frame, now_ns)
+        bits = ERROR_BITS + worst_bits(0) if error else self._length(frame)
+        self._end_ns = now_ns + bits * self._bit_ns
+
+    def _length(self, frame: Frame) -> int:
+        if self._stuffing is Stuffing.EXACT:
+            return exact_bits(frame)
+        count = worst_bits if self._stuffing is Stuffing.WORST else plain_bits
+        return count(len(frame.data), extended=frame.extended)
+
+    def _land(self) -> None:
+        flying, self._flying = self._flying, None
+        if flying is None:
+            return
+        _, _, sequence, sender, frame = flying
+        if self._injector.broken:
+            self._fail(sender, frame)
+            return
+        if sender in self.errors:
+            self.errors[sender] = max(0, self.errors[sender] - 1)
+        if isinstance(sender, Station):
+            sender.waiting -= 1
+        if sender is self._injector:
+            # Nobody hears a copy of what it has sent itself.
+            self._deliver(self._copied.pop(sequence, sender), frame)
+            return
+        for delay_ns, changed in self._injector.fate(frame, self.now_ns):
+            if delay_ns:
+                self._submit(self._injector, self.now_ns + delay_ns, changed)
+                self._copied[self._sequence] = sender
+            else:
+                self._deliver(sender, changed)
+
+    def _deliver(self, sender: Node, frame: Frame) -> None:
+        now_ns = self.now_ns
+        if self.log is not None:
+            self.log.append((now_ns, frame))
+        if isinstance(sender, EmulatedDrive) and self._injector.silent(sender.node_id, now_ns):
+            return
+        for node in self._nodes:
+            if node is sender:
+                continue
+            if isinstance(node, Station):
+                if not self.off_bus(node):
+                    node.received.append((now_ns, frame))
+            elif not (self.off_bus(node) or self._deaf(node)):
+                node.receive(frame, now_ns)
+                self._collect(node)
+
+    def _deaf(self, node: Participant) -> bool:
+        return isinstance(node, EmulatedDrive) and self._injector.silent(node.node_id, self.now_ns)
+
+    def _fail(self, sender: Node, frame: Frame) -> None:
+        """An error frame: everybody hears it, the sender tries again until it is bus-off."""
+        for node in self._nodes:
+            if isinstance(node, Station):
+                node.received.append((self.now_ns, ERROR_FRAME))
+        if sender not in self.errors:
+            return
+        self.errors[sender] += 8
+        if not self.off_bus(sender):
+            self._submit(sender, self.now_ns, frame)
+            return
+        self._pending = [entry for entry in self._pending if entry[3] is not sender]
+        if isinstance(sender, Station):
+            sender.waiting = 0
+            sender.received.append((self.now_ns, BUS_OFF_FRAME))
+        elif isinstance(sender, EmulatedDrive):
+            sender.bus_off(self.now_ns)
+
+    def _strike(self, fault: NodeFault, *, begins: bool) -> None:
+        for drive in self.drives:
+            if drive.node_id == fault.node_id:
+                self._injector.strike(drive, fault, self.now_ns, begins=begins)
+                if self._injector.cuts_off(fault):
+                    self.errors[drive] = BUS_OFF if begins else 0

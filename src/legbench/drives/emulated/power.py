@@ -1,0 +1,160 @@
+"""The power state machine inside a drive (CiA 402-2, fig. 9): controlwords in, state out."""
+
+from typing import final
+
+from legbench.drives.cia402 import DriveState
+from legbench.drives.objects import Key
+
+_S = DriveState
+_WORDS = {
+    _S.NOT_READY_TO_SWITCH_ON: 0x00,
+    _S.SWITCH_ON_DISABLED: 0x40,
+    _S.READY_TO_SWITCH_ON: 0x31,
+    _S.SWITCHED_ON: 0x33,
+    _S.OPERATION_ENABLED: 0x37,
+    _S.QUICK_STOP_ACTIVE: 0x17,
+    _S.FAULT_REACTION_ACTIVE: 0x1F,
+    _S.FAULT: 0x08,
+}
+"""Low byte of the statusword, voltage enabled (bit 4) with the main supply."""
+STAY_IN_QUICK_STOP = 5
+"""605Ah from here on stays in quick stop active."""
+HALT = 1 << 8
+POWERED = (_S.OPERATION_ENABLED, _S.QUICK_STOP_ACTIVE, _S.FAULT_REACTION_ACTIVE)
+"""States in which the motor holds or stops a load."""
+
+
+@final
+class PowerStage:
+    """State and pending stop of one drive.
+
+    Attributes:
+        state: of the machine.
+        stopping: option code of the stop that runs, none if none does; 0 drops the motor at
+            once, 1 is the slow-down ramp, 2 the quick-stop ramp, 3 and 4 the fastest possible.
+    """
+
+    def __init__(self, values: dict[Key, int]) -> None:
+        self._values = values
+        self.state = DriveState.NOT_READY_TO_SWITCH_ON
+        self.stopping: int | None = None
+        self._after: DriveState | None = None
+        self._before = 0
+
+    @property
+    def low_byte(self) -> int:
+        """Bits 0 to 6 of 6041h."""
+        return _WORDS[self.state]
+
+    def boot(self) -> None:
+        """Self-test done (transition 1)."""
+        self._enter(DriveState.SWITCH_ON_DISABLED)
+
+    def command(self, controlword: int, *, cause_gone: bool) -> bool:
+        """Obey 6040h; whether a fault was reset."""
+        before, self._before = self._before, controlword
+        if self.state is DriveState.FAULT:
+            edge = controlword & 0x80 and not before & 0x80
+            if edge and cause_gone:
+                self._enter(DriveState.SWITCH_ON_DISABLED)
+                return True
+            return False
+        if controlword & 0x80 or self.state in (
+            DriveState.FAULT_REACTION_ACTIVE,
+            DriveState.NOT_READY_TO_SWITCH_ON,
+        ):
+            return False
+        self._transit(controlword)
+        return False
+
+    def _transit(self, word: int) -> None:
+        state = self.state
+        disable, quick = not word & 0x02, word & 0x06 == 0x02
+        shutdown, on = word & 0x07 == 0x06, word & 0x07 == 0x07
+        enable = on and bool(word & 0x08)
+        if state is _S.SWITCH_ON_DISABLED:
+            if shutdown:
+                self._enter(_S.READY_TO_SWITCH_ON)  # 2
+        elif disable:
+            self._enter(_S.SWITCH_ON_DISABLED)  # 7, 9, 10, 12
+        elif state is _S.READY_TO_SWITCH_ON:
+            if quick:
+                self._enter(_S.SWITCH_ON_DISABLED)  # 7
+            elif on:
+                self._enter(_S.SWITCHED_ON)  # 3
+        elif state is _S.SWITCHED_ON:
+            if quick:
+                self._enter(_S.SWITCH_ON_DISABLED)  # 10
+            elif shutdown:
+                self._enter(_S.READY_TO_SWITCH_ON)  # 6
+            elif enable:
+                self._enter(_S.OPERATION_ENABLED)  # 4
+        elif state is _S.OPERATION_ENABLED:
+            self._from_enabled(quick=quick, shutdown=shutdown, on=on, enable=enable)
+        elif enable and self._values[0x605A, 0] >= STAY_IN_QUICK_STOP:
+            self._enter(_S.OPERATION_ENABLED)  # 16; only quick stop active is left here
+
+    def _from_enabled(self, *, quick: bool, shutdown: bool, on: bool, enable: bool) -> None:
+        if quick:
+            self.quick_stop()  # 11
+        elif shutdown:
+            self._stop(self._values[0x605B, 0], _S.READY_TO_SWITCH_ON)  # 8
+        elif on and not enable:
+            self._stop(self._values[0x605C, 0], _S.SWITCHED_ON)  # 5
+        elif enable:
+            self.stopping = self._after = None
+
+    def quick_stop(self) -> None:
+        """Stop as 605Ah says (transition 11)."""
+        if self.state is not DriveState.OPERATION_ENABLED:
+            return
+        option = self._values[0x605A, 0]
+        if option == 0:
+            self._enter(_S.SWITCH_ON_DISABLED)
+            return
+        self._enter(_S.QUICK_STOP_ACTIVE)
+        self.stopping = option if option < STAY_IN_QUICK_STOP else option - 4
+        self._after = None if option >= STAY_IN_QUICK_STOP else _S.SWITCH_ON_DISABLED
+
+    def fault(self) -> None:
+        """React as 605Eh says (transition 13)."""
+        if self.state in (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE):
+            return
+        moving = self.state in POWERED
+        option = self._values[0x605E, 0]
+        self._enter(_S.FAULT_REACTION_ACTIVE)
+        if moving and option > 0:
+            self.stopping, self._after = option, _S.FAULT
+        else:
+            self._enter(_S.FAULT)  # 14
+
+    def disable(self) -> None:
+        """Take the power away at once."""
+        if self.state not in (_S.FAULT, _S.FAULT_REACTION_ACTIVE, _S.NOT_READY_TO_SWITCH_ON):
+            self._enter(_S.SWITCH_ON_DISABLED)
+
+    def connection_lost(self) -> None:
+        """React as 6007h says."""
+        option = self._values[0x6007, 0]
+        if option == 1:
+            self.fault()
+        elif option == 2:
+            self.disable()
+        elif option == 3:
+            self.quick_stop()
+
+    def stopped(self) -> None:
+        """The ramp of a stop has ended."""
+        after, self._after = self._after, None
+        if after is not None:
+            self._enter(after)
+
+    def _stop(self, option: int, after: DriveState) -> None:
+        if option <= 0:
+            self._enter(after)
+        else:
+            self.stopping, self._after = option, after
+
+    def _enter(self, state: DriveState) -> None:
+        self.state = state
+        self.stopping = self._after = None

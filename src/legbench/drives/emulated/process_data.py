@@ -1,0 +1,140 @@
+"""PDOs of an emulated drive: mapping by SDO, latching at SYNC, sampling at SYNC."""
+
+from typing import final
+
+from legbench.drives.codec.frame import COB_INVALID, COB_MASK
+from legbench.drives.codec.pdo import Mapped, PdoMap, split_word
+from legbench.drives.codec.sdo import Abort
+from legbench.drives.emulated.store import ObjectStore
+from legbench.drives.errors import CodecError
+from legbench.drives.objects import MAX_MAPPED, PDO_COUNT, Access, Key
+
+RPDO, TPDO = 0x1400, 0x1800
+LAST_SYNCHRONOUS = 240
+_EVENT_TYPES = (254, 255)
+
+
+@final
+class Pdo:
+    """One PDO as its objects say."""
+
+    def __init__(self, cob_id: int, kind: int, timer_ms: int, layout: PdoMap) -> None:
+        self.cob_id, self.kind, self.layout = cob_id, kind, layout
+        self.timer_ns = 1_000_000 * timer_ms
+        self.keys = tuple(entry.key for entry in layout.entries)
+        self.waiting: tuple[int, ...] | None = None
+        """RPDO: received, not yet latched."""
+        self.seen_ns: int | None = None
+        """Last received or sent."""
+        self.last: bytes | None = None
+        self.syncs = 0
+
+
+@final
+class ProcessData:
+    """All PDOs of a drive.
+
+    Attributes:
+        rpdos: those that exist, by COB-ID.
+        tpdos: those that exist, in order.
+    """
+
+    def __init__(self, store: ObjectStore) -> None:
+        self._store = store
+        self.rpdos: dict[int, Pdo] = {}
+        self.tpdos: list[Pdo] = []
+
+    @staticmethod
+    def owns(key: Key) -> bool:
+        """Whether an object describes a PDO."""
+        return RPDO <= key[0] < TPDO + 0x200 + PDO_COUNT
+
+    def check(self, key: Key, value: int) -> Abort | None:
+        """Why an object of a PDO may not become a value (CiA 301, 7.5.2.36)."""
+        index, sub = key
+        mapping = bool(index & 0x200)
+        comm = index & ~0x200
+        exists = not self._store.values[comm, 1] & COB_INVALID
+        if not mapping:
+            return self._check_comm(comm, sub, value, exists)
+        if exists:
+            return Abort.DEVICE_STATE
+        if sub == 0:
+            return self._check_layout(index, value)
+        if self._store.values[index, 0]:
+            return Abort.DEVICE_STATE
+        return None if self._mapped(value, index) is not None else Abort.NOT_MAPPABLE
+
+    def _check_comm(self, comm: int, sub: int, value: int, exists: bool) -> Abort | None:
+        if sub == 1:
+            if (
+                exists
+                and not value & COB_INVALID
+                and (value ^ self._store.values[comm, 1]) & COB_MASK
+            ):
+                return Abort.INVALID_VALUE
+            return None
+        if sub == 2 and LAST_SYNCHRONOUS < value < _EVENT_TYPES[0]:
+            return Abort.INVALID_VALUE
+        return Abort.DEVICE_STATE if sub == 3 and exists else None
+
+    def _check_layout(self, index: int, count: int) -> Abort | None:
+        if count > MAX_MAPPED:
+            return Abort.PDO_LENGTH
+        entries = [
+            self._mapped(self._store.values[index, sub], index) for sub in range(1, count + 1)
+        ]
+        known = [entry for entry in entries if entry is not None]
+        if len(known) < count:
+            return Abort.NOT_MAPPABLE
+        return Abort.PDO_LENGTH if sum(entry.bits for entry in known) > 64 else None
+
+    def _mapped(self, word: int, index: int) -> Mapped | None:
+        """The object of a mapping entry, if it may stand in this PDO."""
+        at, sub, bits = split_word(word)
+        entry = self._store.entry((at, sub))
+        if entry is None or not entry.mappable:
+            return None
+        if index < TPDO and entry.access not in (Access.RW, Access.WO):
+            return None
+        mapped = Mapped(at, sub, entry.kind)
+        return mapped if mapped.bits == bits else None
+
+    def rebuild(self) -> None:
+        """Read the PDOs' objects again, after one of them was written."""
+        old = {pdo.cob_id: pdo for pdo in (*self.rpdos.values(), *self.tpdos)}
+        found = [self._build(RPDO + number, old) for number in range(PDO_COUNT)]
+        self.rpdos = {pdo.cob_id: pdo for pdo in found if pdo is not None}
+        found = [self._build(TPDO + number, old) for number in range(PDO_COUNT)]
+        self.tpdos = [pdo for pdo in found if pdo is not None]
+
+    def _build(self, comm: int, old: dict[int, Pdo]) -> Pdo | None:
+        values = self._store.values
+        cob = values[comm, 1]
+        mapping = comm + 0x200
+        count = values[mapping, 0]
+        if cob & COB_INVALID or not count:
+            return None
+        entries = [self._mapped(values[mapping, sub], mapping) for sub in range(1, count + 1)]
+        try:
+            layout = PdoMap([entry for entry in entries if entry is not None])
+        except CodecError:
+            return None
+        pdo = Pdo(cob & COB_MASK, values[comm, 2], values[comm, 5], layout)
+        known = old.get(pdo.cob_id)
+        if known is not None and known.keys == pdo.keys:
+            pdo.seen_ns = known.seen_ns
+        return pdo
+
+    def sample(self, pdo: Pdo) -> bytes:
+        """The bytes of a TPDO right now."""
+        values = self._store.values
+        pdo.last = pdo.layout.pack([values[key] for key in pdo.keys])
+        return pdo.last
+
+    def forget(self) -> None:
+        """Nothing received counts any more (on leaving operational)."""
+        for pdo in self.rpdos.values():
+            pdo.waiting = pdo.seen_ns = None
+        for pdo in self.tpdos:
+            pdo.last = pdo.seen_ns = None

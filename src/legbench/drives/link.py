@@ -1,0 +1,382 @@
+"""The cyclic link to the drives of one leg, over any python-can bus.
+
+    with Link(bus, config, limits, stiffness=(k1, k2)) as link:
+        sample = link.start()
+        while ...:
+            applied = link.command(controller(sample))
+            sample = link.exchange()
+
+A cycle: tick of the grid, SYNC, process data of all drives until a deadline, watchdogs and limits
+(`exchange`), then the command, slewed and clamped, in RPDOs that act at the next SYNC (`command`).
+Whatever goes wrong, all drives are told to stop in the same cycle and the first cause is kept.
+"""
+
+import math
+from collections.abc import Sequence
+from enum import Enum, auto
+from types import TracebackType
+from typing import Self, final
+
+import can
+
+from legbench.drives.cia402 import Goal
+from legbench.drives.config import BusConfig, check_start_speed
+from legbench.drives.errors import BusError, DriveError
+from legbench.drives.limits import Guard, SafetyLimits
+from legbench.drives.master.bring_up import BringUp
+from legbench.drives.master.cycle import Cycle, Tick
+from legbench.drives.master.lock import ChannelLock
+from legbench.drives.master.port import Listener, Port
+from legbench.drives.master.sample import Sample, sample_of
+from legbench.drives.master.start_up import StartUp
+from legbench.drives.master.stop import StopLadder
+from legbench.drives.master.supervisor import Supervisor
+from legbench.drives.open_bus import timebase_of
+from legbench.drives.timebase import Timebase
+from legbench.drives.wire import check_load
+from legbench.errors import PlantFault
+
+ARRIVED = 1e-9
+"""Of a target that has been reached [rad]."""
+
+
+class LinkState(Enum):
+    """How far a link has come."""
+
+    NEW = auto()
+    CONFIGURED = auto()
+    """Identity checked, configuration written and read back; nothing moves."""
+    CYCLIC = auto()
+    """Process data flows, targets follow the motors."""
+    RUNNING = auto()
+    """All drives in operation enabled, commands are taken."""
+    STOPPED = auto()
+
+
+@final
+class Link:
+    """One master, its bus and its drives.
+
+    Attributes:
+        state: how far it has come.
+        fault: the first fault; what ended the link.
+        skipped_total: ticks missed since the start.
+    """
+
+    def __init__(
+        self,
+        bus: can.BusABC,
+        config: BusConfig,
+        limits: SafetyLimits | None = None,
+        *,
+        stiffness: Sequence[float],
+        timebase: Timebase | None = None,
+        listener: Listener | None = None,
+        read_only: bool = False,
+        lock: ChannelLock | None = None,
+    ) -> None:
+        """Wire the parts; nothing is sent.
+
+        Args:
+            bus: stays the caller's, who shuts it down after `close`.
+            config: what hangs on it.
+            limits: enforced here.
+            stiffness: of the series springs, one a drive [N m/rad].
+            timebase: that of the bus by default.
+            listener: sees every frame, such as a `BusLog`.
+            read_only: observe; never send a controlword or a target.
+            lock: taken by `open`; by default one for the bus's channel.
+
+        Raises:
+            ConfigError: the bus cannot carry the schedule.
+        """
+        check_load(config)
+        self._config, self._limits = config, limits or SafetyLimits()
+        self._port = Port(bus, timebase or timebase_of(bus), listener)
+        self._read_only = read_only
+        self._lock = lock or ChannelLock(str(bus.channel_info))
+        self._stiffness = tuple(float(value) for value in stiffness)
+        self.cycle = Cycle(self._port, config)
+        self.bring_up = BringUp(self._port, config, self.cycle.other)
+        self._guard = Guard(self._limits, config.period)
+        self.state = LinkState.NEW
+        self.fault: PlantFault | None = None
+        self.skipped_total = 0
+        self._supervisor = Supervisor(self.cycle, config, self._limits, self._port.timebase)
+        self._start_up = StartUp(self._port, self.cycle, config, read_only=read_only)
+        self._last = Tick(0, 0, 0, False)
+        self._expected: list[tuple[float, ...]] = []
+
+    # --- before anything moves ---------------------------------------------------------------
+
+    def open(self) -> None:
+        """Take the channel, check who is there, write and read back the configuration.
+
+        Raises:
+            BusError: the channel has a master, or the interface does not work.
+            DriveError: a drive is missing, is another one, or refuses its configuration.
+        """
+        if self.state is not LinkState.NEW:
+            return
+        self._lock.acquire()
+        try:
+            self.bring_up.identify()
+            if self._read_only:
+                self._configure_to_look()
+            else:
+                self._configure_to_move()
+            for node, poll in zip(self._config.nodes, self.cycle.polls, strict=True):
+                reading = self.bring_up.temperature(node)
+                if reading is not None:
+                    poll.take(reading)
+        except BaseException:
+            self._lock.release()
+            raise
+        self.state = LinkState.CONFIGURED
+
+    def _configure_to_move(self) -> None:
+        self.bring_up.unpower()
+        self.bring_up.pre_operational()
+        for node in self._config.nodes:
+            self.bring_up.configure(node)
+            self.bring_up.check_soft_limits(node)
+            self.bring_up.preload(node)
+
+    def _configure_to_look(self) -> None:
+        """Drives that hold their configuration already are written nothing.
+
+        Raises:
+            DriveError: one holds another configuration, and has power.
+        """
+        other = [node for node in self._config.nodes if self.bring_up.differences(node)]
+        for node in other:
+            if self.bring_up.powered(node):
+                raise DriveError(
+                    f"drive '{node.name}' (node {node.node_id}) has power and is not configured as "
+                    "the bus file says; read-only does not change a drive with power"
+                )
+        if other:
+            self.bring_up.pre_operational()
+        for node in other:
+            self.bring_up.configure(node)
+
+    def start(self, *, clear_faults: bool = False) -> Sample:
+        """Open if need be, let process data settle, enable all drives where they stand.
+
+        In read-only it settles only. With `clear_faults` a drive in fault is reset, once. A leg
+        that is found beyond its joint range or spring torque is not enabled.
+
+        Raises:
+            BusError, DriveError: as `open`; or a drive is in fault, or does not become enabled.
+            PlantFault: something went wrong after process data had begun.
+        """
+        self.open()
+        if self.state is not LinkState.CONFIGURED:
+            raise DriveError(
+                f"a link that is {self.state.name.lower()} cannot start; make a new one"
+            )
+        self.state = LinkState.CYCLIC
+        try:
+            self._start_up.settle(self._settling_tick)
+            if not self._read_only:
+                self._enable(clear_faults=clear_faults)
+        except PlantFault as error:
+            self._end(error)
+            raise
+        except BaseException:
+            self.stop()
+            raise
+        return self._sample()
+
+    def _enable(self, *, clear_faults: bool) -> None:
+        up = self._start_up
+        if clear_faults:
+            words = "leave its fault, whose cause still stands"
+            up.seek(Goal.FAULT_RESET, up.faulted(), self._watched_tick, words)
+        for axis in up.faulted():
+            text = self.bring_up.error_text(axis.node)
+            raise DriveError(
+                f"drive '{axis.node.name}' (node {axis.node.node_id}) is in fault: {text}; remove "
+                "the cause, then start with a fault reset"
+            )
+        sample = self._sample()
+        self._check(sample)
+        self._guard.check_start(sample.motor_pos)
+        up.seek(Goal.ENABLED, self.cycle.axes, self._watched_tick, "become enabled")
+        # What the drives hold, not what their encoders show: the next target is the last one.
+        held = tuple(axis.target_pos for axis in self.cycle.axes)
+        self._guard.start_at(held)
+        self._expected = [held] * 2
+        self.state = LinkState.RUNNING
+
+    # --- the cycle ---------------------------------------------------------------------------
+
+    def exchange(self) -> Sample:
+        """Wait for the next tick and look at the drives.
+
+        Raises:
+            PlantFault: a watchdog or a limit; all drives have been stopped by then.
+        """
+        self._refuse_ended()
+        try:
+            if self.state is LinkState.CYCLIC:
+                self._watched_tick()
+                self._start_up.idle()
+                return self._sample()
+            self._watched_tick()
+            self._supervisor.states()
+            sample = self._sample()
+            self._check(sample)
+        except PlantFault as error:
+            self._end(error)
+            raise
+        except BaseException:
+            self.stop()
+            raise
+        return sample
+
+    def command(self, motor_pos: Sequence[float]) -> tuple[float, ...]:
+        """Send a command for the coming period; what of it was applied [rad].
+
+        Raises:
+            PlantFault: it is not finite or jumps too far; all drives have been stopped by then.
+            DriveError: the drives are not enabled.
+        """
+        self._refuse_ended()
+        if self.state is not LinkState.RUNNING:
+            raise DriveError(
+                "this link is read-only" if self._read_only else "the drives are not enabled"
+            )
+        try:
+            applied = self._guard.command(motor_pos)
+            words = []
+            for axis, target in zip(self.cycle.axes, applied, strict=True):
+                axis.aim(target)
+                words.append(axis.machine.controlword)
+            self._expected = [self._expected[-1], applied]
+            self._supervisor.sent(complete=self.cycle.send(words))
+        except PlantFault as error:
+            self._end(error)
+            raise
+        except BaseException:
+            self.stop()
+            raise
+        return applied
+
+    def move_to(self, motor_pos: Sequence[float], speed: float | None = None) -> Sample:
+        """Go to a posture at a speed [rad/s], `start_speed` of the bus file by default.
+
+        Raises:
+            ConfigError: the speed is not above 0 or too fast; nothing has moved.
+            PlantFault: as `exchange` and `command`; or it ends short of the posture.
+        """
+        pace = self._config.start_speed if speed is None else speed
+        check_start_speed(pace)
+        step = pace * self._config.period
+        wanted = tuple(float(value) for value in motor_pos)
+        if not all(map(math.isfinite, wanted)):
+            self.command(wanted)  # refused there, and the drives stopped
+        sample = self._sample()
+        while self._guard.applied != wanted:
+            before = self._guard.applied
+            applied = self.command(
+                [
+                    target
+                    if abs(target - last) <= step
+                    else last + (step if target > last else -step)
+                    for target, last in zip(wanted, before, strict=True)
+                ]
+            )
+            sample = self.exchange()
+            if applied == before:
+                break
+        for _ in range(2):
+            self.command(self._guard.applied)
+            sample = self.exchange()
+        self._check_arrived(wanted)
+        return sample
+
+    def _check_arrived(self, wanted: Sequence[float]) -> None:
+        applied, end = self._guard.applied, self._guard.reachable(wanted)
+        if not all(abs(a - b) < ARRIVED for a, b in zip(applied, end, strict=True)):
+            error = PlantFault(
+                "start posture",
+                f"the motors were led to {applied} rad, not to {end} rad; the move has failed",
+            )
+            self._end(error)
+            raise error
+
+    def _tick(self) -> Tick:
+        self._last = tick = self.cycle.tick()
+        self.skipped_total += tick.skipped
+        return tick
+
+    def _settling_tick(self) -> Tick:
+        tick = self._tick()
+        self._supervisor.alone()
+        return tick
+
+    def _watched_tick(self) -> Tick:
+        tick = self._tick()
+        self._supervisor.bus(tick)
+        self._supervisor.drives()
+        return tick
+
+    def _sample(self) -> Sample:
+        return sample_of(self.cycle, self._last, self._stiffness, self._guard.applied)
+
+    def _check(self, sample: Sample) -> None:
+        self._guard.check(
+            motor_pos=sample.motor_pos,
+            joint_pos=sample.link_pos,
+            spring_torque=sample.spring_torque,
+            expected_pos=self._expected[0] if self._expected else None,
+            temperature=[value for value in sample.temperature if value is not None],
+        )
+
+    def _end(self, error: PlantFault) -> None:
+        """Keep the first cause, stop all drives at once."""
+        if self.fault is None:
+            self.fault = error
+        self.stop()
+
+    def _refuse_ended(self) -> None:
+        if self.fault is not None:
+            raise self.fault
+        if self.state not in (LinkState.CYCLIC, LinkState.RUNNING):
+            raise DriveError(f"the link is {self.state.name.lower()}; start it first")
+
+    # --- the end -----------------------------------------------------------------------------
+
+    def stop(self) -> None:
+        """Quick stop of all drives in this cycle, then no power; never raises."""
+        if self.state in (LinkState.CYCLIC, LinkState.RUNNING):
+            self.state = LinkState.STOPPED
+            if not self._read_only:
+                StopLadder(self.cycle).run()
+
+    def close(self) -> None:
+        """Stop, leave the drives in pre-operational, release the channel; never raises."""
+        if self.state is LinkState.NEW:
+            return
+        try:
+            self.stop()
+        finally:
+            try:
+                self.bring_up.pre_operational()
+            except BusError as error:
+                self.cycle.bus_error = error
+            finally:
+                self._lock.release()
+                self.state = LinkState.STOPPED
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()

@@ -1,0 +1,1 @@
+"""The master's parts of a bus; `legbench.drives.link` joins them."""

@@ -1,0 +1,144 @@
+"""One drive as the cycle sees it: process data <-> angles, controlword and target; pure."""
+
+from typing import final
+
+from legbench.drives.cia402 import PowerMachine, decode_state
+from legbench.drives.codec.pdo import PdoMap
+from legbench.drives.config import (
+    CONTROLWORD,
+    POSITION_ACTUAL,
+    STATUSWORD,
+    TARGET_POSITION,
+    NodeConfig,
+)
+from legbench.drives.errors import CodecError
+from legbench.drives.objects import Key
+from legbench.drives.units import Unwrapper, wrap
+
+_STATUSWORD, _POSITION = STATUSWORD.key, POSITION_ACTUAL.key
+
+
+@final
+class AxisLink:
+    """Compiled process data of one drive.
+
+    Attributes:
+        node: its configuration.
+        machine: leads it through its states.
+        statusword: as last received.
+        target_counts: what its next RPDO says, not wrapped.
+        fresh: whether all its TPDOs have come in this cycle.
+    """
+
+    def __init__(self, node: NodeConfig) -> None:
+        self.node = node
+        self.machine = PowerMachine()
+        self.statusword = 0
+        self.target_counts = 0
+        self.motor_counts = 0
+        self.link_counts = 0
+        self._tpdos = {node.tpdo_id(pdo): PdoMap(pdo.objects) for pdo in node.tpdos}
+        self._rpdos = tuple((node.rpdo_id(pdo), PdoMap(pdo.objects)) for pdo in node.rpdos)
+        self.values: dict[Key, int] = {}
+        self._plain = self._plain_layout()
+        self._missing = set(self._tpdos)
+        self._motor = Unwrapper(node.motor.bits, 0)
+        self._link = Unwrapper(node.link.bits, 0)
+        self._link_key = node.link_object.key
+        self._known = False
+
+    def _plain_layout(self) -> bool:
+        """Whether all process data is one usual frame each way."""
+        return len(self._rpdos) == 1 and self._rpdos[0][1].entries == (CONTROLWORD, TARGET_POSITION)
+
+    @property
+    def tpdo_ids(self) -> tuple[int, ...]:
+        """COB-IDs to expect after every SYNC."""
+        return tuple(self._tpdos)
+
+    @property
+    def known(self) -> bool:
+        """Whether it has ever said where its motor is."""
+        return self._known
+
+    @property
+    def fresh(self) -> bool:
+        """Whether all process data of this cycle has come."""
+        return not self._missing
+
+    def begin_cycle(self) -> None:
+        """SYNC goes out: everything is expected again."""
+        self._missing.update(self._tpdos)
+
+    def feed(self, cob_id: int, data: bytes) -> bool:
+        """Take a TPDO; false, and nothing changed, if its length is wrong."""
+        layout = self._tpdos[cob_id]
+        try:
+            values = layout.unpack(data)
+        except CodecError:
+            return False
+        self.values.update(zip(layout.keys, values, strict=True))
+        self._missing.discard(cob_id)
+        if not self._missing:
+            self._digest()
+        return True
+
+    def _digest(self) -> None:
+        values = self.values
+        self.statusword = values[_STATUSWORD]
+        motor, link = values[_POSITION], values[self._link_key]
+        if not self._known:
+            self._find(motor)
+        self.motor_counts = self._motor.feed(motor)
+        self.link_counts = self._link.feed(link)
+
+    def _find(self, motor: int) -> None:
+        """Unwrap for the first time: the link lies within half a turn of its motor."""
+        self._motor.counts = motor
+        self._link.counts = self.node.link.to_counts(self.node.motor.to_rad(motor))
+        self._known = True
+
+    def forget(self) -> None:
+        """Positions may have jumped (homing, reset): unwrap anew."""
+        self._known = False
+
+    @property
+    def motor_pos(self) -> float:
+        """Measured angle of the motor [rad]."""
+        return self.node.motor.to_rad(self.motor_counts)
+
+    @property
+    def link_pos(self) -> float:
+        """Measured angle of the link [rad]."""
+        return self.node.link.to_rad(self.link_counts)
+
+    @property
+    def state_text(self) -> str:
+        """State in words."""
+        state = decode_state(self.statusword)
+        return "unknown state" if state is None else state.value
+
+    @property
+    def target_pos(self) -> float:
+        """What its next RPDO says [rad]."""
+        return self.node.motor.to_rad(self.target_counts)
+
+    def aim(self, motor_pos: float) -> None:
+        """Set the target [rad]."""
+        self.target_counts = self.node.motor.to_counts(motor_pos)
+
+    def aim_at_actual(self) -> None:
+        """Set the target to where the motor is."""
+        self.target_counts = self.motor_counts
+
+    def frames(self, controlword: int) -> list[tuple[int, bytes]]:
+        """RPDOs of this cycle: COB-ID and data."""
+        target = wrap(self.target_counts)
+        if self._plain:
+            cob_id, layout = self._rpdos[0]
+            return [(cob_id, layout.pack((controlword, target)))]
+        known = {CONTROLWORD.key: controlword, TARGET_POSITION.key: target, (0x6060, 0): 8}
+        return [
+            (cob_id, layout.pack([known.get(entry.key, 0) for entry in layout.entries]))
+            for cob_id, layout in self._rpdos
+        ]

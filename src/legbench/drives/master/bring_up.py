@@ -1,0 +1,267 @@
+"""From power-on to pre-operational with everything checked; nothing here enables a drive."""
+
+from collections.abc import Callable, Sequence
+from typing import final
+
+import can
+
+from legbench.drives.cia402 import (
+    POWERED,
+    Controlword,
+    Mode,
+    decode_state,
+    describe_statusword,
+)
+from legbench.drives.codec.datatypes import DataType
+from legbench.drives.codec.emcy import MEANINGS
+from legbench.drives.codec.nmt import NmtCommand, nmt_frame
+from legbench.drives.codec.sdo import Abort
+from legbench.drives.config import BusConfig, Identity, NodeConfig, Parameter
+from legbench.drives.configuration import configuration
+from legbench.drives.errors import BusError, DriveError, SdoAbortError
+from legbench.drives.master.port import Port
+from legbench.drives.master.sdo_port import SdoPort
+from legbench.drives.objects import name_of
+
+PROFILE_402 = 0x0192
+"""Low word of 1000h."""
+CSP_BIT = 1 << 7
+"""Of 6502h: cyclic synchronous position mode."""
+STOP_PATIENCE, OFF_PATIENCE = 100, 20
+"""Reads of 6041h until a drive that is found with power has stopped, 10 ms apart."""
+MODE_PATIENCE = 50
+"""Reads of 6061h until the mode must be there, 10 ms apart."""
+_MISSING = (Abort.NO_OBJECT, Abort.NO_SUB_INDEX)
+U32, I32, I8, U16 = (
+    DataType.UNSIGNED32,
+    DataType.INTEGER32,
+    DataType.INTEGER8,
+    DataType.UNSIGNED16,
+)
+
+
+@final
+class BringUp:
+    """Talks to the drives by SDO, before and between cyclic operation."""
+
+    def __init__(self, port: Port, bus: BusConfig, on_other: Callable[[can.Message], None]) -> None:
+        self._port, self._bus = port, bus
+        self._sdo = {
+            node.node_id: SdoPort(
+                port,
+                node.node_id,
+                timeout_ms=bus.sdo_timeout_ms,
+                retries=bus.sdo_retries,
+                on_other=on_other,
+            )
+            for node in bus.nodes
+        }
+
+    def sdo(self, node: NodeConfig) -> SdoPort:
+        """Access to the objects of a node."""
+        return self._sdo[node.node_id]
+
+    def identify(self, nodes: Sequence[NodeConfig] | None = None) -> None:
+        """Check that every node is the one that the bus file means (1000h, 1018h, 6502h).
+
+        Raises:
+            DriveError: a node is missing, is another one, or two are swapped.
+        """
+        nodes = self._bus.nodes if nodes is None else nodes
+        found: dict[int, Identity] = {}
+        for node in nodes:
+            sdo = self.sdo(node)
+            device = sdo.get_int(0x1000, 0, U32)
+            if device & 0xFFFF != PROFILE_402:
+                raise DriveError(
+                    f"node {node.node_id} ('{node.name}') is no CiA 402 drive: its device type is "
+                    f"{device:08X}h"
+                )
+            found[node.node_id] = self.identity(node)
+        for node in nodes:
+            self._compare(node, found)
+        for node in nodes:
+            if not self.sdo(node).get_int(0x6502, 0, U32) & CSP_BIT:
+                raise DriveError(
+                    f"node {node.node_id} ('{node.name}') knows no cyclic synchronous position mode"
+                )
+
+    def identity(self, node: NodeConfig) -> Identity:
+        """What a node says it is (1018h); raises as `SdoPort.read` does."""
+        vendor, product, revision, serial = (
+            self.sdo(node).get_int(0x1018, sub, U32) for sub in range(1, 5)
+        )
+        return Identity(vendor=vendor, product=product, revision=revision, serial=serial)
+
+    def _compare(self, node: NodeConfig, found: dict[int, Identity]) -> None:
+        wanted, there = node.identity, found[node.node_id]
+        for name in ("vendor", "product", "revision", "serial"):
+            value, real = getattr(wanted, name), getattr(there, name)
+            if value is None or value == real:
+                continue
+            hint = "correct the bus file if this is the right drive"
+            for other in self._bus.nodes:
+                at = found.get(other.node_id)
+                if name == "serial" and other is not node and at is not None and at.serial == value:
+                    hint = (
+                        f"that one is node {other.node_id}: '{node.name}' and '{other.name}' are "
+                        "swapped"
+                    )
+            raise DriveError(
+                f"node {node.node_id} ('{node.name}') has {name} {real:#x}, expected is "
+                f"{value:#x}; {hint}"
+            )
+
+    def pre_operational(self) -> None:
+        """Order all nodes into pre-operational; a drive that still moves stops (6007h).
+
+        Raises:
+            BusError: one could not be told; all others have been.
+        """
+        failed: BusError | None = None
+        for node in self._bus.nodes:
+            try:
+                self._port.send_frame(nmt_frame(NmtCommand.ENTER_PRE_OPERATIONAL, node.node_id))
+            except BusError as error:
+                failed = error
+        if failed is not None:
+            raise failed
+
+    def differences(self, node: NodeConfig) -> list[tuple[Parameter, int]]:
+        """Objects of the configuration that a drive holds otherwise, with what it holds.
+
+        The entries that switch a PDO off while it is mapped are left out.
+        """
+        final_values = {parameter.key: parameter for parameter in configuration(self._bus, node)}
+        different = []
+        for parameter in final_values.values():
+            try:
+                there = self.sdo(node).get_int(parameter.index, parameter.sub, parameter.kind)
+            except SdoAbortError as error:
+                if parameter.optional and error.code in _MISSING:
+                    continue
+                raise
+            if there != parameter.value:
+                different.append((parameter, there))
+        return different
+
+    def configure(self, node: NodeConfig) -> int:
+        """Write the configuration, reading every object back; how many.
+
+        Raises:
+            DriveError: the drive refuses, or holds another value afterwards.
+        """
+        sdo, count = self.sdo(node), 0
+        for parameter in configuration(self._bus, node):
+            if not self._write(node, parameter):
+                continue
+            there = sdo.get_int(parameter.index, parameter.sub, parameter.kind)
+            if there != parameter.value:
+                raise DriveError(
+                    f"node {node.node_id} ('{node.name}'), "
+                    f"{name_of(parameter.index, parameter.sub)}: wrote {parameter.value}, reads "
+                    f"{there}; the drive does not take this value"
+                )
+            count += 1
+        self._await_mode(node)
+        return count
+
+    def _write(self, node: NodeConfig, parameter: Parameter) -> bool:
+        """Write one object; false if the drive has none and may do without."""
+        try:
+            self.sdo(node).put(parameter.index, parameter.sub, parameter.kind, parameter.value)
+        except SdoAbortError as error:
+            if parameter.optional and error.code in _MISSING:
+                return False
+            raise
+        return True
+
+    def _await_mode(self, node: NodeConfig) -> None:
+        """6061h lags behind 6060h."""
+        timebase, mode = self._port.timebase, 0
+        for _ in range(MODE_PATIENCE):
+            mode = self.sdo(node).get_int(0x6061, 0, I8)
+            if mode == Mode.CYCLIC_SYNCHRONOUS_POSITION:
+                return
+            timebase.wait_until(timebase.now_ns() + 10_000_000)
+        raise DriveError(
+            f"node {node.node_id} ('{node.name}') stays in mode {mode}, asked for was 8; is its "
+            "halt bit set?"
+        )
+
+    def preload(self, node: NodeConfig) -> int:
+        """Set the target to where the motor is (607Ah from 6064h); the counts."""
+        sdo = self.sdo(node)
+        actual = sdo.get_int(0x6064, 0, I32)
+        sdo.put(0x607A, 0, I32, actual)
+        if sdo.get_int(0x607A, 0, I32) != actual:
+            raise DriveError(
+                f"node {node.node_id} ('{node.name}') does not take a target position by SDO"
+            )
+        return actual
+
+    def soft_limits(self, node: NodeConfig) -> tuple[int, int] | None:
+        """What the drive clamps targets to (607Dh) [counts]; none where it does not."""
+        sdo = self.sdo(node)
+        try:
+            low, high = sdo.get_int(0x607D, 1, I32), sdo.get_int(0x607D, 2, I32)
+        except SdoAbortError as error:
+            if error.code in _MISSING:
+                return None
+            raise
+        return (low, high) if low < high else None
+
+    def check_soft_limits(self, node: NodeConfig) -> None:
+        """Refuse a motor that the drive itself would pull into its range when enabled.
+
+        Raises:
+            DriveError: 6064h lies outside 607Dh, as both are read back.
+        """
+        limits = self.soft_limits(node)
+        if limits is None:
+            return
+        actual = self.sdo(node).get_int(0x6064, 0, I32)
+        if not limits[0] <= actual <= limits[1]:
+            ends = sorted(map(node.motor.to_rad, limits))
+            raise DriveError(
+                f"node {node.node_id} ('{node.name}') stands at {node.motor.to_rad(actual):.3f} "
+                f"rad ({actual} counts), outside its software limits 607Dh of [{ends[0]:.3f}, "
+                f"{ends[1]:.3f}] rad ({limits[0]} to {limits[1]} counts), to which it would jump "
+                "when enabled: move it back by hand, or correct soft_limits and offset_counts"
+            )
+
+    def temperature(self, node: NodeConfig) -> int | None:
+        """What the drive's sensor shows [0.1 deg C]; none where the bus file names no object."""
+        entry = node.temperature_object
+        return None if entry is None else self.sdo(node).get_int(entry.index, entry.sub, entry.kind)
+
+    def unpower(self) -> None:
+        """Stop drives that are found with power, by quick stop, before anything is written.
+
+        Raises:
+            DriveError: one keeps its power.
+        """
+        powered = [node for node in self._bus.nodes if self.powered(node)]
+        for word, patience in ((Controlword.QUICK_STOP, STOP_PATIENCE), (0, OFF_PATIENCE)):
+            for node in powered:
+                self.sdo(node).put(0x6040, 0, U16, word)
+            for _ in range(patience):
+                powered = [node for node in powered if self.powered(node)]
+                if not powered:
+                    break
+                self._port.timebase.wait_until(self._port.timebase.now_ns() + 10_000_000)
+        for node in powered:
+            state = describe_statusword(self.sdo(node).get_int(0x6041, 0, U16))
+            raise DriveError(
+                f"node {node.node_id} ('{node.name}') is found with power and keeps it: {state}; "
+                "end the program that leads it, or switch its power off"
+            )
+
+    def powered(self, node: NodeConfig) -> bool:
+        """Whether its motor may have torque (6041h)."""
+        return decode_state(self.sdo(node).get_int(0x6041, 0, U16)) in POWERED
+
+    def error_text(self, node: NodeConfig) -> str:
+        """Error code 603Fh in words."""
+        code = self.sdo(node).get_int(0x603F, 0, U16)
+        return f"{code:04X}h {MEANINGS.get(code, 'see the drive manual')}"

@@ -1,0 +1,74 @@
+"""One master a channel: an advisory lock that the end of the process releases."""
+
+import fcntl
+import os
+import re
+from pathlib import Path
+from typing import final
+
+from legbench.drives.errors import BusError
+
+FOLDERS = (Path("/run/lock"), Path("/tmp"))
+"""Of lock files; not the one for temporary files, which everybody may choose."""
+
+
+def _folder() -> Path:
+    return next((path for path in FOLDERS if os.access(path, os.W_OK)), FOLDERS[-1])
+
+
+@final
+class ChannelLock:
+    """Held from `acquire` to `release`, or to the end of the process, by whatever means.
+
+    Args:
+        name: of the channel, such as `socketcan-can0`; `of_channel` makes one.
+        folder: of the lock files; the same for everybody on this machine by default.
+    """
+
+    def __init__(self, name: str, folder: Path | None = None) -> None:
+        safe = re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("-") or "bus"
+        self._name = name
+        self._path = (folder or _folder()) / f"legbench-{safe}.lock"
+        self._fd: int | None = None
+
+    @classmethod
+    def of_channel(
+        cls, interface: str | None, channel: str | None, folder: Path | None = None
+    ) -> "ChannelLock":
+        """The lock of a channel before its interface is opened: opening may already disturb it.
+
+        A path is followed to the device behind it, so that no second name gets past the lock.
+        """
+        where = channel or "default"
+        if "/" in where:
+            where = os.path.realpath(where)
+        return cls(f"{interface or 'default'} {where}", folder)
+
+    def acquire(self) -> None:
+        """Take the lock.
+
+        Raises:
+            BusError: another process has it, or the lock file cannot be written.
+        """
+        try:
+            fd = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        except OSError as error:
+            raise BusError(f"{self._path}: cannot lock {self._name}: {error.strerror}") from None
+        try:
+            fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            holder = os.read(fd, 32).decode("ascii", "replace").strip() or "unknown"
+            os.close(fd)
+            raise BusError(
+                f"{self._name} already has a master, process {holder}; two masters on one bus move "
+                "the leg twice: end that one first"
+            ) from None
+        os.ftruncate(fd, 0)
+        os.write(fd, f"{os.getpid()}\n".encode())
+        self._fd = fd
+
+    def release(self) -> None:
+        """Let go; may be called twice."""
+        if self._fd is not None:
+            os.close(self._fd)
+            self._fd = None

@@ -1,0 +1,99 @@
+"""Frames over any python-can bus; whatever a driver raises becomes one `BusError`."""
+
+from collections.abc import Callable
+from typing import final
+
+import can
+
+from legbench.drives.codec.frame import Frame
+from legbench.drives.errors import BusError
+from legbench.drives.timebase import Timebase
+from legbench.errors import LegbenchError
+
+Listener = Callable[[can.Message], None]
+"""Sees every frame that is sent or received, in order."""
+HINT = "look at `ip -details link show`, at the txqueuelen and at the wiring"
+
+
+@final
+class Port:
+    """A bus with its time.
+
+    Attributes:
+        timebase: of the bus.
+        bus: for those who need the driver itself.
+    """
+
+    def __init__(
+        self, bus: can.BusABC, timebase: Timebase, listener: Listener | None = None
+    ) -> None:
+        self.bus, self.timebase = bus, timebase
+        self._listener = listener
+
+    def send(self, cob_id: int, data: bytes = b"") -> None:
+        """Send a frame.
+
+        Raises:
+            BusError: the driver did not take it.
+        """
+        message = can.Message(
+            arbitration_id=cob_id, data=data, is_extended_id=False, check=False, is_rx=False
+        )
+        try:
+            self.bus.send(message)
+        except LegbenchError:
+            raise
+        except Exception as error:  # Drivers raise what they like, a ValueError for a bad line.
+            raise BusError(f"{self.bus.channel_info}: cannot send: {error}; {HINT}") from error
+        if self._listener is not None:
+            message.timestamp = 1e-9 * self.timebase.now_ns()
+            self._tell(message)
+
+    def send_frame(self, frame: Frame) -> None:
+        """Send a frame of the codec; raises BusError."""
+        self.send(frame.cob_id, frame.data)
+
+    def receive(self, until_ns: int) -> can.Message | None:
+        """The next frame, or none until then; remote and extended frames are not for us.
+
+        Raises:
+            BusError: the driver has failed.
+        """
+        while True:
+            left = 1e-9 * (until_ns - self.timebase.now_ns())
+            try:
+                message = self.bus.recv(left if left > 0.0 else 0.0)
+            except LegbenchError:
+                raise
+            except Exception as error:
+                raise BusError(
+                    f"{self.bus.channel_info}: cannot receive: {error}; {HINT}"
+                ) from error
+            if message is None:
+                return None
+            if self._listener is not None:
+                self._tell(message)
+            if message.is_extended_id or message.is_remote_frame:
+                if left <= 0.0:
+                    return None
+                continue
+            return message
+
+    def _tell(self, message: can.Message) -> None:
+        """A listener that fails hears nothing more: no stop may depend on it."""
+        listener = self._listener
+        if listener is None:
+            return
+        try:
+            listener(message)
+        except Exception as error:
+            self._listener = None
+            raise BusError(f"{self.bus.channel_info}: a listener failed: {error}") from error
+
+    @property
+    def off_bus(self) -> bool:
+        """Whether the controller has left the bus, as far as the driver tells."""
+        try:
+            return self.bus.state is can.BusState.ERROR
+        except Exception:
+            return False

@@ -1,0 +1,115 @@
+"""Objects of one drive over a port: blocking, with time-outs and retries; not for the cycle."""
+
+from collections.abc import Callable
+from typing import final
+
+import can
+
+from legbench.drives.codec.datatypes import DataType, Value, pack, unpack
+from legbench.drives.codec.frame import SDO_REPLY_BASE, SDO_REQUEST_BASE
+from legbench.drives.codec.sdo import Abort, abort_data
+from legbench.drives.codec.sdo_client import Download, Progress, Upload
+from legbench.drives.errors import CodecError, DriveError, SdoAbortError
+from legbench.drives.master.port import Port
+from legbench.drives.objects import name_of
+
+
+def _ignore(_message: can.Message) -> None:
+    """Frames that are nobody's."""
+
+
+@final
+class SdoPort:
+    """Reads and writes the object dictionary of one node."""
+
+    def __init__(
+        self,
+        port: Port,
+        node_id: int,
+        *,
+        timeout_ms: int = 200,
+        retries: int = 3,
+        on_other: Callable[[can.Message], None] = _ignore,
+    ) -> None:
+        self._port, self.node_id = port, node_id
+        self._timeout_ns, self._retries = 1_000_000 * timeout_ms, retries
+        self._timeout_ms = timeout_ms
+        self._on_other = on_other
+
+    def read(self, index: int, sub: int = 0) -> bytes:
+        """Bytes of an object.
+
+        Raises:
+            SdoAbortError: the drive refuses.
+            DriveError: it does not answer.
+            BusError: the bus does not work.
+        """
+        transfer = self._transfer(lambda: Upload(index, sub), index, sub)
+        return transfer.result if isinstance(transfer, Upload) else b""
+
+    def write(self, index: int, sub: int, content: bytes) -> None:
+        """Write the bytes of an object; raises as `read` does."""
+        self._transfer(lambda: Download(index, sub, content), index, sub)
+
+    def get(self, index: int, sub: int, kind: DataType) -> Value:
+        """Value of an object; raises as `read` does, and DriveError for another type."""
+        content = self.read(index, sub)
+        try:
+            return unpack(kind, content)
+        except CodecError as error:
+            raise DriveError(f"node {self.node_id}, {name_of(index, sub)}: {error}") from None
+
+    def get_int(self, index: int, sub: int, kind: DataType) -> int:
+        """Value of a numeric object; raises as `get` does."""
+        value = self.get(index, sub, kind)
+        if not isinstance(value, int):
+            raise DriveError(f"node {self.node_id}, {name_of(index, sub)} is no number")
+        return value
+
+    def put(self, index: int, sub: int, kind: DataType, value: int) -> None:
+        """Write the value of an object; raises as `read` does."""
+        self.write(index, sub, pack(kind, value))
+
+    def _transfer(
+        self, begin: Callable[[], Upload | Download], index: int, sub: int
+    ) -> Upload | Download:
+        for _ in range(self._retries):
+            transfer = begin()
+            try:
+                if self._run(transfer):
+                    return transfer
+            except SdoAbortError as error:
+                if transfer.request:
+                    self._port.send(SDO_REQUEST_BASE + self.node_id, transfer.request)
+                text = f"node {self.node_id}, {name_of(index, sub)}: {error}"
+                error.args = (text,)
+                raise
+            self._port.send(
+                SDO_REQUEST_BASE + self.node_id, abort_data(Abort.TIMED_OUT, index, sub)
+            )
+        raise DriveError(
+            f"node {self.node_id} on {self._port.bus.channel_info} does not answer for "
+            f"{name_of(index, sub)} within {self._timeout_ms} ms, {self._retries} times; look at "
+            "its power, its node id, the wiring and the bitrate"
+        )
+
+    def _run(self, transfer: Upload | Download) -> bool:
+        """Whether the transfer came to its end in time."""
+        port, timebase = self._port, self._port.timebase
+        reply_id = SDO_REPLY_BASE + self.node_id
+        port.send(SDO_REQUEST_BASE + self.node_id, transfer.request)
+        until_ns = timebase.now_ns() + self._timeout_ns
+        while timebase.now_ns() < until_ns:
+            message = port.receive(until_ns)
+            if message is None:
+                return False
+            if message.arbitration_id != reply_id or message.is_error_frame:
+                self._on_other(message)
+                continue
+            progress = transfer.feed(bytes(message.data))
+            if progress is Progress.DONE:
+                return True
+            if progress is Progress.NEXT:
+                port.send(SDO_REQUEST_BASE + self.node_id, transfer.request)
+                until_ns = timebase.now_ns() + self._timeout_ns
+        return False

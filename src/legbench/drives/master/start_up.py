@@ -1,0 +1,149 @@
+"""From configured to enabled, cycle by cycle, without a jump."""
+
+from collections.abc import Callable, Sequence
+from typing import final
+
+from legbench.drives.cia402 import (
+    DriveState,
+    Goal,
+    StatusBit,
+    decode_state,
+    describe_statusword,
+)
+from legbench.drives.codec.nmt import NmtCommand, nmt_frame
+from legbench.drives.config import BusConfig
+from legbench.drives.errors import DriveError
+from legbench.drives.master.axis_link import AxisLink
+from legbench.drives.master.cycle import Cycle, Tick
+from legbench.drives.master.port import Port
+from legbench.errors import PlantFault
+
+SETTLE_PATIENCE = 2000
+"""Cycles in which process data has to become regular."""
+ENABLE_PATIENCE = 2000
+"""Cycles in which all drives have to be enabled."""
+STILL_RANGE = 0.02
+"""A motor that moves further while it is enabled is stopped [rad]."""
+IGNORE_PATIENCE = 5
+"""Cycles in which an enabled drive has to follow its target."""
+
+
+@final
+class StartUp:
+    """Leads all drives together; until one is enabled its target is where its motor is."""
+
+    def __init__(self, port: Port, cycle: Cycle, config: BusConfig, *, read_only: bool) -> None:
+        self._port, self._cycle, self._config = port, cycle, config
+        self._read_only = read_only
+
+    def settle(self, tick: Callable[[], Tick]) -> Tick:
+        """Start the nodes, wait for regular process data; raises DriveError or BusError."""
+        for node in self._config.nodes:
+            self._port.send_frame(nmt_frame(NmtCommand.START, node.node_id))
+        self._cycle.begin()
+        regular = 0
+        for _ in range(SETTLE_PATIENCE):
+            last = tick()
+            regular = regular + 1 if last.complete else 0
+            self.idle()
+            if regular >= self._config.settle_cycles:
+                self._cycle.arm()
+                return last
+        missing = [axis.node.name for axis in self._cycle.axes if not axis.fresh]
+        raise DriveError(
+            f"no regular process data within {SETTLE_PATIENCE} cycles; missing: "
+            f"{', '.join(missing) or 'now and then'}; look at the bus load and the mapping"
+        )
+
+    def idle(self) -> None:
+        """The rest of a cycle in which nothing is commanded."""
+        if self._read_only:
+            self._cycle.send_rest()
+            return
+        words: list[int | None] = []
+        for axis in self._cycle.axes:
+            if not axis.known:
+                # Where its motor is has not been said yet: any target would be a guess.
+                words.append(None)
+                continue
+            step = axis.machine.step(axis.statusword)
+            if step.state is not DriveState.OPERATION_ENABLED:
+                axis.aim_at_actual()
+            words.append(step.controlword)
+        self._cycle.send(words)
+
+    def faulted(self) -> list[AxisLink]:
+        """Drives in fault."""
+        return [
+            axis for axis in self._cycle.axes if decode_state(axis.statusword) is DriveState.FAULT
+        ]
+
+    def seek(
+        self, goal: Goal, axes: Sequence[AxisLink], tick: Callable[[], Tick], words: str
+    ) -> Tick:
+        """Lead drives to a goal, the rest stays where it is.
+
+        Raises:
+            DriveError: one does not get there; `words` say what it was to do.
+            PlantFault: as `tick`.
+        """
+        for axis in axes:
+            axis.machine.seek(goal)
+        refused: list[AxisLink] = []
+        stood = [axis.motor_pos for axis in axes]
+        ignored = 0
+        for _ in range(ENABLE_PATIENCE):
+            last = tick()
+            if goal is Goal.ENABLED:
+                ignored = ignored + 1 if any(map(_ignores, axes)) else 0
+                _check_still(axes, stood, ignored)
+            if all(_there(axis.machine.goal, axis.statusword) for axis in axes):
+                if goal is not Goal.ENABLED:
+                    for axis in axes:
+                        axis.machine.seek(Goal.DISABLED)
+                    self.idle()
+                return last
+            self.idle()
+            refused = [axis for axis in axes if axis.machine.refused]
+            if refused:
+                break
+        slow = (refused or list(axes))[0]
+        raise DriveError(
+            f"drive '{slow.node.name}' (node {slow.node.node_id}) does not {words}: "
+            f"{describe_statusword(slow.statusword)}"
+        )
+
+
+def _ignores(axis: AxisLink) -> bool:
+    """Enabled, but not led by its target."""
+    enabled = decode_state(axis.statusword) is DriveState.OPERATION_ENABLED
+    return enabled and not axis.statusword & StatusBit.FOLLOWS_COMMAND
+
+
+def _check_still(axes: Sequence[AxisLink], stood: Sequence[float], ignored: int) -> None:
+    """Nothing moves while drives are enabled; raises PlantFault."""
+    for axis, before in zip(axes, stood, strict=True):
+        who = f"drive '{axis.node.name}' (node {axis.node.node_id})"
+        moved = axis.motor_pos - before
+        if abs(moved) > STILL_RANGE:
+            raise PlantFault(
+                "moved while enabling",
+                f"{who} moved by {moved:.3f} rad while it was enabled, the limit is "
+                f"{STILL_RANGE:g} rad; look at its software limits and position offset",
+            )
+        enabled = decode_state(axis.statusword) is DriveState.OPERATION_ENABLED
+        limited = bool(axis.statusword & StatusBit.INTERNAL_LIMIT)
+        if enabled and (limited or (ignored > IGNORE_PATIENCE and _ignores(axis))):
+            raise PlantFault(
+                "command ignored",
+                f"{who} does not follow its target on enabling: "
+                f"{describe_statusword(axis.statusword)}",
+            )
+
+
+def _there(goal: Goal, statusword: int) -> bool:
+    state = decode_state(statusword)
+    if goal is Goal.ENABLED:
+        following = bool(statusword & StatusBit.FOLLOWS_COMMAND)
+        return state is DriveState.OPERATION_ENABLED and following
+    return state is DriveState.SWITCH_ON_DISABLED

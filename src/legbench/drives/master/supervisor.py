@@ -1,0 +1,104 @@
+"""What ends a run besides the limits of motion: the bus, the grid, the drives' own state."""
+
+import math
+from typing import final
+
+from legbench.drives.cia402 import StatusBit, Way, describe_statusword
+from legbench.drives.config import BusConfig
+from legbench.drives.limits import SafetyLimits
+from legbench.drives.master.cycle import Cycle, Tick
+from legbench.drives.timebase import Timebase
+from legbench.errors import PlantFault
+
+MISSING_TEMPERATURES = 3
+"""Requests in a row without an answer that end the run, where a temperature is limited."""
+
+
+@final
+class Supervisor:
+    """Looks at every cycle; raises what it finds, stops nothing itself."""
+
+    def __init__(
+        self, cycle: Cycle, config: BusConfig, limits: SafetyLimits, timebase: Timebase
+    ) -> None:
+        self._cycle, self._config, self._limits = cycle, config, limits
+        self._timebase = timebase
+        self._overruns = 0
+        self._ignored = 0
+        self._unsent = 0
+        self._watches_temperature = math.isfinite(limits.temperature)
+
+    def bus(self, tick: Tick) -> None:
+        """The controller is on the bus, and the grid is kept; raises PlantFault."""
+        self.alone()
+        self._overruns = self._overruns + tick.skipped if tick.skipped else 0
+        if self._cycle.bus_off:
+            raise PlantFault(
+                "bus off", "the controller has left the bus; check wiring and termination"
+            )
+        if self._overruns >= self._limits.overrun_cycles:
+            raise PlantFault(
+                "cycle overruns",
+                f"{self._overruns} ticks of {self._config.period_us} us missed in a row, the limit "
+                f"is {self._limits.overrun_cycles}; free the processor",
+            )
+
+    def alone(self) -> None:
+        """Nobody else leads these drives; raises PlantFault."""
+        stranger = self._cycle.stranger
+        if stranger is not None:
+            raise PlantFault(
+                "second master",
+                f"somebody else sends {stranger:03X}h, which only the master of these drives does; "
+                "unplug it, or end its program",
+            )
+
+    def sent(self, *, complete: bool) -> None:
+        """Whether the commands of a cycle have gone out; raises PlantFault."""
+        self._unsent = 0 if complete else self._unsent + 1
+        if self._unsent >= self._limits.lost_frames:
+            raise PlantFault(
+                "command not sent",
+                f"commands could not be sent for {self._unsent} cycles, the limit is "
+                f"{self._limits.lost_frames}; {self._cycle.bus_error}",
+            )
+
+    def drives(self) -> None:
+        """Every drive answers, lives, and reports no emergency; raises PlantFault."""
+        now_ns = self._timebase.now_ns()
+        if self._watches_temperature:
+            self._temperatures()
+        for watch in self._cycle.watches:
+            trouble = watch.trouble(now_ns, self._limits.lost_frames)
+            if trouble is not None:
+                cause, text = trouble
+                error = self._cycle.bus_error
+                raise PlantFault(cause, text if error is None else f"{text}; {error}")
+
+    def _temperatures(self) -> None:
+        """Every drive that is to report its temperature does."""
+        for axis, poll in zip(self._cycle.axes, self._cycle.polls, strict=True):
+            if poll.unanswered >= MISSING_TEMPERATURES:
+                raise PlantFault(
+                    "temperature",
+                    f"drive '{axis.node.name}' (node {axis.node.node_id}) has not reported its "
+                    f"temperature for {poll.unanswered} requests; its limit cannot be watched",
+                )
+
+    def states(self) -> None:
+        """Every drive is enabled and follows its target; raises PlantFault."""
+        ignored = False
+        for axis in self._cycle.axes:
+            if not axis.fresh:
+                continue
+            if axis.machine.step(axis.statusword).way is not Way.REACHED:
+                raise PlantFault(
+                    "drive not enabled",
+                    f"drive '{axis.node.name}' (node {axis.node.node_id}) left operation enabled: "
+                    f"{describe_statusword(axis.statusword)}",
+                )
+            ignored = ignored or not axis.statusword & StatusBit.FOLLOWS_COMMAND
+        self._ignored = self._ignored + 1 if ignored else 0
+        if self._ignored > self._limits.following_cycles:
+            words = "; ".join(describe_statusword(axis.statusword) for axis in self._cycle.axes)
+            raise PlantFault("command ignored", f"a drive does not follow its target: {words}")

@@ -1,0 +1,59 @@
+"""A drive's temperature, read by SDO beside the cycle, one frame now and then; pure."""
+
+from typing import final
+
+from legbench.drives.codec.datatypes import unpack
+from legbench.drives.codec.frame import SDO_REQUEST_BASE, Frame
+from legbench.drives.codec.sdo_client import Progress, Upload
+from legbench.drives.config import NodeConfig
+from legbench.drives.errors import CodecError, SdoAbortError
+
+EVERY_CYCLES = 200
+
+
+@final
+class TemperaturePoll:
+    """Asks every so many cycles; a drive that does not answer is asked again.
+
+    Attributes:
+        celsius: as last reported, none before or where the bus file names no object [deg C].
+        unanswered: requests in a row that brought no temperature.
+    """
+
+    def __init__(self, node: NodeConfig) -> None:
+        self._object = node.temperature_object
+        self._request_id = SDO_REQUEST_BASE + node.node_id
+        self._upload: Upload | None = None
+        self._waiting = False
+        self.celsius: float | None = None
+        self.unanswered = 0
+
+    def due(self, cycle: int) -> Frame | None:
+        """The request of this cycle, if it has one."""
+        if self._object is None or cycle % EVERY_CYCLES:
+            return None
+        if self._waiting:
+            self.unanswered += 1
+        self._waiting = True
+        self._upload = Upload(self._object.index, self._object.sub)
+        return Frame(self._request_id, self._upload.request)
+
+    def feed(self, data: bytes) -> None:
+        """An SDO reply of the drive."""
+        if self._upload is None or self._object is None:
+            return
+        try:
+            if self._upload.feed(data) is not Progress.DONE:
+                return
+            value = unpack(self._object.kind, self._upload.result)
+        except (SdoAbortError, CodecError):
+            self._upload = None
+            return
+        self._upload = None
+        if isinstance(value, int):
+            self.take(value)
+
+    def take(self, value: int) -> None:
+        """A reading of the object [0.1 deg C]."""
+        self.celsius = 0.1 * value
+        self._waiting, self.unanswered = False, 0

@@ -1,0 +1,89 @@
+"""What a master knows of a drive besides its process data: heartbeat, emergencies, losses; pure."""
+
+from typing import final
+
+from legbench.drives.codec.emcy import Emergency, decode_emcy
+from legbench.drives.codec.nmt import HeartbeatWatch, NmtState, decode_heartbeat
+from legbench.drives.config import BusConfig, NodeConfig
+
+HEARTBEATS = 3
+"""Overdue by so many, a drive is lost."""
+
+
+@final
+class NodeWatch:
+    """Watches one drive.
+
+    Attributes:
+        state: its NMT state, as last heard.
+        emergency: the first one since `arm`.
+        history: every emergency ever heard, the all-clear included.
+        missed: consecutive cycles without process data.
+        lost_total: all cycles without process data.
+        bad_total: process data of a wrong length.
+    """
+
+    def __init__(self, bus: BusConfig, node: NodeConfig, now_ns: int) -> None:
+        self._node = node
+        self._beat = HeartbeatWatch(1_000_000 * HEARTBEATS * bus.heartbeat_ms, now_ns)
+        self.state: NmtState | None = None
+        self.emergency: Emergency | None = None
+        self.history: list[Emergency] = []
+        self.missed = 0
+        self.lost_total = 0
+        self.bad_total = 0
+        self._rebooted = False
+
+    def arm(self, now_ns: int) -> None:
+        """From now on count: forget what was before."""
+        self._beat.feed(now_ns)
+        self.emergency, self.missed, self._rebooted = None, 0, False
+        self.lost_total = self.bad_total = 0
+        self.state = None
+
+    def hear_heartbeat(self, data: bytes, now_ns: int) -> None:
+        """Heartbeat or boot-up."""
+        state = decode_heartbeat(data)
+        if state is None:
+            return
+        self._beat.feed(now_ns)
+        self.state = state
+        if state is NmtState.BOOT_UP:
+            self._rebooted = True
+
+    def hear_emergency(self, data: bytes) -> None:
+        """Emergency."""
+        emergency = decode_emcy(self._node.node_id, data)
+        if emergency is None:
+            return
+        self.history.append(emergency)
+        if emergency.code != 0 and self.emergency is None:
+            self.emergency = emergency
+
+    def cycle(self, *, complete: bool) -> None:
+        """A cycle has passed, with its process data or without."""
+        if complete:
+            self.missed = 0
+        else:
+            self.missed += 1
+            self.lost_total += 1
+
+    def trouble(self, now_ns: int, lost_frames: int) -> tuple[str, str] | None:
+        """Cause and message of what is wrong, if anything is."""
+        who = f"drive '{self._node.name}' (node {self._node.node_id})"
+        if self.emergency is not None:
+            return "drive emergency", f"{who}: {self.emergency}"
+        if self._rebooted:
+            return "drive reset", f"{who} has started again; its configuration is gone"
+        if self.missed >= lost_frames:
+            return (
+                "process data lost",
+                f"{who} sent no process data for {self.missed} cycles, the limit is {lost_frames}",
+            )
+        if self._beat.lost(now_ns):
+            late_ms = (now_ns - self._beat.last_ns) / 1e6
+            return "heartbeat lost", f"{who}: no heartbeat for {late_ms:.0f} ms"
+        state = self.state
+        if state is NmtState.PRE_OPERATIONAL or state is NmtState.STOPPED:
+            return "drive left operational", f"{who} is {state.name.lower()}"
+        return None

@@ -1,0 +1,135 @@
+"""A bus that is opened once and closed once, with a log that may begin later."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Self, final
+
+import can
+
+from legbench.drives.bus import LockstepBus
+from legbench.drives.config import BusConfig
+from legbench.drives.limits import SafetyLimits
+from legbench.drives.link import Link
+from legbench.drives.master.bring_up import BringUp
+from legbench.drives.master.bus_log import BusLog
+from legbench.drives.master.lock import ChannelLock
+from legbench.drives.master.port import Port
+from legbench.drives.master.sdo_port import SdoPort
+from legbench.drives.open_bus import timebase_of
+from legbench.drives.realtime import Granted, ask
+from legbench.drives.timebase import SystemTime, Timebase
+
+
+@final
+class Session:
+    """Owns a bus; links, ports and logs on it end with it.
+
+    Attributes:
+        bus: the interface.
+        config: what hangs on it.
+        log: raw frames since `log_to`.
+    """
+
+    def __init__(
+        self, bus: can.BusABC, config: BusConfig, timebase: Timebase | None = None
+    ) -> None:
+        self.bus, self.config = bus, config
+        self.timebase = timebase or timebase_of(bus)
+        self.log: BusLog | None = None
+        self._links: list[Link] = []
+        self._locks: list[ChannelLock] = []
+        self._closed = False
+
+    @property
+    def virtual(self) -> bool:
+        """Whether time passes only while somebody waits for it."""
+        return isinstance(self.bus, LockstepBus)
+
+    def be_punctual(self, cpu: int | None = None) -> Granted | None:
+        """Ask the system for what a loop in real time needs; none in virtual time.
+
+        Links that are made afterwards spend the last part of every wait awake, if it was granted.
+        """
+        if self.virtual:
+            return None
+        granted = ask(cpu)
+        self.timebase = SystemTime(1000 * granted.spin_us)
+        return granted
+
+    def heard(self, message: can.Message) -> None:
+        """Every frame comes past here."""
+        if self.log is not None:
+            self.log(message)
+
+    def log_to(self, path: Path) -> None:
+        """Write every frame from now on; raises BusError if the file cannot be made."""
+        self.log = BusLog(path, str(getattr(self.bus, "channel", "can")))
+
+    def lock(self) -> ChannelLock:
+        """The lock of this channel; an emulated bus of this process has no other master."""
+        name = str(self.bus.channel_info)
+        return ChannelLock(f"{name}-{id(self.bus):x}" if self.virtual else name)
+
+    def hold(self) -> None:
+        """Take the channel for this session; raises BusError if it has a master."""
+        lock = self.lock()
+        lock.acquire()
+        self._locks.append(lock)
+
+    def port(self) -> Port:
+        """Frames in and out."""
+        return Port(self.bus, self.timebase, self.heard)
+
+    def bring_up(self) -> BringUp:
+        """SDO access to all nodes of the bus file."""
+        return BringUp(self.port(), self.config, lambda _message: None)
+
+    def sdo(self, node_id: int, *, timeout_ms: int, retries: int = 1) -> SdoPort:
+        """SDO access to any node."""
+        return SdoPort(self.port(), node_id, timeout_ms=timeout_ms, retries=retries)
+
+    def link(
+        self, limits: SafetyLimits, stiffness: Sequence[float], *, read_only: bool = False
+    ) -> Link:
+        """A cyclic link; nothing is sent yet."""
+        link = Link(
+            self.bus,
+            self.config,
+            limits,
+            stiffness=stiffness,
+            timebase=self.timebase,
+            listener=self.heard,
+            read_only=read_only,
+            lock=self.lock(),
+        )
+        self._links.append(link)
+        return link
+
+    def close(self) -> None:
+        """Stop all links, close the log, shut the bus down; may be called twice, never raises."""
+        if self._closed:
+            return
+        self._closed = True
+        for link in self._links:
+            link.close()
+        for lock in self._locks:
+            lock.release()
+        if self.log is not None:
+            self.log.close()
+        try:
+            self.bus.shutdown()
+        except (can.CanError, OSError):
+            # The drives have been told to stop; the interface itself is beyond help.
+            return
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()

@@ -1,0 +1,79 @@
+"""Encoder counts <-> radians of one axis, and positions that wrap."""
+
+import math
+from dataclasses import dataclass
+from typing import final
+
+from legbench.errors import ConfigError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AxisUnits:
+    """How an encoder counts an angle: `counts = offset + sign gear counts_per_rev angle / 2 pi`.
+
+    Raises:
+        ConfigError: a number of counts, a gear or a sign that no axis has.
+    """
+
+    counts_per_rev: int
+    """Per turn of the encoder's own shaft."""
+    gear: float = 1.0
+    """Turns of the encoder's shaft for one turn of the axis."""
+    sign: int = 1
+    """-1 for a mirrored axis."""
+    offset_counts: int = 0
+    """What the encoder shows at angle 0."""
+    bits: int = 32
+    """The position object wraps at 2^bits."""
+
+    def __post_init__(self) -> None:
+        if self.counts_per_rev <= 0:
+            raise ConfigError(f"counts_per_rev is {self.counts_per_rev}; it must be positive")
+        if not (math.isfinite(self.gear) and self.gear > 0.0):
+            raise ConfigError(f"gear is {self.gear:g}; it must be positive, the sign is 'sign'")
+        if self.sign not in (-1, 1):
+            raise ConfigError(f"sign is {self.sign}; it must be 1 or -1")
+        if self.bits not in (16, 32):
+            raise ConfigError(f"bits is {self.bits}; a position object has 16 or 32")
+
+    @property
+    def counts_per_rad(self) -> float:
+        """Signed [counts/rad]."""
+        return self.sign * self.gear * self.counts_per_rev / (2.0 * math.pi)
+
+    @property
+    def resolution(self) -> float:
+        """One count [rad]."""
+        return 1.0 / abs(self.counts_per_rad)
+
+    def to_rad(self, counts: int) -> float:
+        """Angle of a count, which may lie beyond the object's range [rad]."""
+        return (counts - self.offset_counts) / self.counts_per_rad
+
+    def to_counts(self, angle: float) -> int:
+        """Nearest count of an angle [rad], not wrapped."""
+        return self.offset_counts + round(angle * self.counts_per_rad)
+
+
+def wrap(counts: int, bits: int = 32) -> int:
+    """A count as the signed position object shows it."""
+    half = 1 << (bits - 1)
+    return (counts + half & (1 << bits) - 1) - half
+
+
+def unwrap(shown: int, near: int, bits: int = 32) -> int:
+    """The count that shows as `shown` and lies closest to `near`."""
+    return near + wrap(shown - near, bits)
+
+
+@final
+class Unwrapper:
+    """Follows a wrapping position object across its seam."""
+
+    def __init__(self, bits: int, near: int) -> None:
+        self._bits, self.counts = bits, near
+
+    def feed(self, shown: int) -> int:
+        """The unwrapped count."""
+        self.counts = unwrap(shown, self.counts, self._bits)
+        return self.counts

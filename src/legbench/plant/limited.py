@@ -1,0 +1,58 @@
+"""Safety limits around a plant that has none of its own."""
+
+from collections import deque
+from dataclasses import replace
+from typing import final
+
+import numpy as np
+
+from legbench.drives.limits import Guard, SafetyLimits
+from legbench.plant.abstract import AbstractPlant
+from legbench.signals import Command, Observation
+
+
+@final
+class LimitedPlant(AbstractPlant):
+    """Lets through what the limits allow and ends the run where they are exceeded.
+
+    The same `Guard` sits in the cyclic link of the drives, so that a run shows the same slewing
+    and the same faults on every plant. `command_pos` of a recording is the wish, `applied_pos`
+    what was let through.
+    """
+
+    def __init__(
+        self, plant: AbstractPlant, limits: SafetyLimits, *, delay_cycles: int = 0
+    ) -> None:
+        """Wrap a plant whose motors react `delay_cycles` late; it is closed with this one."""
+        self.period = plant.period
+        self._plant, self._delay = plant, delay_cycles
+        self._guard = Guard(limits, plant.period)
+        self._expected: deque[tuple[float, ...]] = deque()
+
+    def reset(self) -> Observation:
+        """Begin where the motors are."""
+        seen = self._plant.reset()
+        self._guard.start_at(seen.motor_pos.tolist())
+        self._expected = deque([self._guard.applied] * self._delay)
+        return seen
+
+    def step(self, command: Command) -> Observation:
+        """Apply what is allowed of a command over one period.
+
+        Raises:
+            PlantFault: a limit is exceeded, or the plant itself has failed.
+        """
+        applied = self._guard.command(command.motor_pos.tolist())
+        self._expected.append(applied)
+        seen = self._plant.step(replace(command, motor_pos=np.array(applied)))
+        self._guard.check(
+            motor_pos=seen.motor_pos.tolist(),
+            joint_pos=seen.joint_pos.tolist(),
+            spring_torque=seen.spring_torque.tolist(),
+            expected_pos=self._expected.popleft(),
+        )
+        return seen
+
+    def close(self) -> None:
+        """Close the plant within."""
+        self._plant.close()

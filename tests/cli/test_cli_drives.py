@@ -1,0 +1,239 @@
+"""`legbench drives` and `legbench run --plant can` as a user calls them."""
+
+import json
+import re
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from commands import Done, called
+
+from legbench import plants
+from legbench.drives.bus_file import load_bus
+from legbench.drives.config import BusConfig
+from legbench.drives.emulated.network import Network
+from legbench.drives.master.lock import ChannelLock
+from legbench.drives.session import Session
+
+HARDWARE = Path(__file__).parents[2] / "hardware"
+MODELS = Path(__file__).parents[2] / "models"
+BUS = HARDWARE / "leg.toml"
+EMULATED = ("--interface", "legbench", "--bus", BUS)
+DESIGN = ("--design", MODELS / "optimal.toml")
+
+Drives = Callable[..., Done]
+"""Calls `legbench drives` on the emulated leg."""
+
+
+@pytest.fixture
+def drives(capfd: pytest.CaptureFixture[str]):
+    def call(*arguments: str | Path) -> Done:
+        return called(capfd, "drives", *arguments, *EMULATED, *DESIGN)
+
+    return call
+
+
+def changed(folder: Path, *changes: tuple[str, str]) -> Path:
+    """The bench's files with some text replaced."""
+    shutil.copy(HARDWARE / "limits.toml", folder / "limits.toml")
+    text = BUS.read_text(encoding="utf-8")
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new, 1)
+    path = folder / "leg.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_scan_finds_both_drives_with_their_identity(drives: Drives) -> None:
+    done = drives("scan", "--last", "5", "--json")
+    assert done.status == 0, done.err
+    nodes = json.loads(done.out)["nodes"]
+    assert [(node["node_id"], node["serial"]) for node in nodes] == [(1, 1001), (2, 1002)]
+    assert nodes[0]["verdict"] == "'motor1' of the bus file"
+
+
+def test_scan_misses_a_drive_that_is_beyond_the_last_id(drives: Drives) -> None:
+    done = drives("scan", "--last", "1")
+    assert done.status == 1
+    assert "not there: 'motor2'" in done.err
+
+
+def test_status_speaks_in_words(drives: Drives) -> None:
+    done = drives("status")
+    assert done.status == 0
+    assert "motor1 (node 1): 0240h: switch on disabled, remote" in done.out
+    assert "error none, 25.0 deg C" in done.out
+
+
+def test_configure_tells_differences_and_writes_only_when_asked(drives: Drives) -> None:
+    done = drives("configure")
+    assert done.status == 1
+    assert "motor1: 60C2h:02 Interpolation time index holds -2, wanted -3" in done.out
+    done = drives("configure", "--write")
+    assert done.status == 0, done.err
+    assert re.search(r"wrote \d+ objects, read every one back\n0 objects differ", done.out)
+
+
+def test_zero_writes_offsets_and_keeps_the_comments(
+    capfd: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    path = changed(tmp_path)
+    where = ("--interface", "legbench", "--bus", path)
+    done = called(capfd, "drives", "zero", "--posture", "-0.4", "0.4", *where)
+    assert done.status == 0, done.err
+    nodes = load_bus(path).nodes
+    assert abs(nodes[0].motor.to_rad(0) + 0.4) < nodes[0].motor.resolution
+    assert abs(nodes[1].link.to_rad(0) - 0.4) < nodes[1].link.resolution
+    assert path.read_text().count("#") == BUS.read_text().count("#")
+
+
+def test_home_calls_the_present_position_zero(drives: Drives) -> None:
+    done = drives("home", "--node", "motor2", "--json")
+    assert done.status == 0, done.err
+    assert json.loads(done.out)["after_counts"] == 0
+
+
+def test_jog_moves_one_motor_and_comes_back(drives: Drives) -> None:
+    done = drives("jog", "--node", "motor1", "--by", "0.05", "--json")
+    assert done.status == 0, done.err
+    jogged = json.loads(done.out)
+    moved = [after - before for before, after in zip(*_ends(jogged), strict=True)]
+    assert moved == pytest.approx([0.05, 0.0], abs=1e-4)
+
+
+def _ends(jogged: dict[str, list[float]]) -> tuple[list[float], list[float]]:
+    return jogged["before_pos"], jogged["after_pos"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("jog", "--node", "motor3"), ("no node 'motor3'", "motor1, motor2")),
+        (("jog", "--node", "motor1", "--by", "0.5"), ("0.5 rad", "up to 0.3 rad")),
+        (("jog", "--node", "motor1", "--speed", "3"), ("3 rad/s", "up to 1 rad/s")),
+        (("home", "--node", "knee"), ("no node 'knee'",)),
+        (("home", "--node", "motor1", "--method", "99"), ("homing", "failed")),
+        (("jitter", "--cycles", "0"), ("cycles is 0",)),
+        (("emulate",), ("needs --channel",)),
+        (("monitor", "--every", "0"), ("every is 0 s",)),
+    ],
+)
+def test_actions_refuse_what_makes_no_sense(
+    drives: Drives, arguments: tuple[str, ...], words: tuple[str, ...]
+) -> None:
+    drives(*arguments).refused(*words)
+
+
+def test_jitter_in_virtual_time_is_punctual(drives: Drives, tmp_path: Path) -> None:
+    plot = tmp_path / "timing.svg"
+    done = drives("jitter", "--cycles", "200", "--plot", plot, "--json")
+    assert done.status == 0, done.err
+    told = json.loads(done.out)
+    assert told["late_us"]["max"] == 0.0
+    assert told["skipped"] == 0
+    assert told["granted"] is None
+    assert plot.stat().st_size > 1000
+
+
+def test_budget_is_the_worst_case_and_refuses_too_much(
+    drives: Drives, capfd: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    done = drives("budget", "--json")
+    assert done.status == 0
+    assert json.loads(done.out)["load"] == pytest.approx(0.568, abs=0.001)
+    slow = changed(tmp_path, ("1_000_000", "500_000"))
+    done = called(capfd, "drives", "budget", "--bus", slow)
+    assert done.status == 1
+    assert "114 % of 500000 bit/s at worst, the limit is 80 %" in done.err
+
+
+def test_monitor_sends_nothing_and_ends_by_itself(drives: Drives) -> None:
+    done = drives("monitor", "--seconds", "0.1", "--every", "0.05")
+    assert done.status == 0
+    assert done.out.count("no process data") == 4
+
+
+# --- bad input: named before anything is enabled ---------------------------------------------
+
+JUMP = ("run", "jump", "--plant", "can", "--duration", "0.05", *DESIGN)
+
+
+@pytest.mark.parametrize(
+    ("flags", "words"),
+    [
+        (("--interface", "teleport"), ("cannot open teleport", "Unknown interface")),
+        (("--interface", "socketcan", "--channel", "none0"), ("cannot open socketcan none0",)),
+        (("--interface", "legbench_unix", "--channel", "none.sock"), ("none.sock", "emulate")),
+        (("--bus", "nowhere.toml"), ("nowhere.toml: no such file",)),
+        (("--interface", "legbench", "--slew-rate", "5"), ("the drives decide",)),
+        (("--interface", "legbench", "--limits", "none.toml"), ("none.toml: no such file",)),
+    ],
+)
+def test_a_bus_that_is_not_there_is_named(
+    flags: tuple[str, ...],
+    words: tuple[str, ...],
+    capfd: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    bus = () if "--bus" in flags else ("--bus", BUS)
+    called(capfd, *JUMP, *bus, *flags, "--out", tmp_path / "runs").refused(*words)
+    assert not (tmp_path / "runs").exists()
+
+
+@pytest.mark.parametrize(
+    ("wanted", "words"),
+    [
+        ((("serial = 1002", "serial = 1009"),), ("motor2", "serial", "expected")),
+        ((("vendor = 0x0000_0123", "vendor = 0x99"),), ("motor1", "vendor", "0x99")),
+        ((("id = 2", "id = 5"),), ("node 5", "does not answer", "bitrate")),
+        (
+            (("serial = 1001", "serial = 7"), ("1002", "1001"), ("= 7", "= 1002")),
+            ("swapped",),
+        ),
+        ((("bitrate = 1_000_000", "bitrate = 250_000"),), ("250000 bit/s", "80 %")),
+        ((('name = "motor1"', "nome = 1"),), ("unknown keys", "nome")),
+        ((("id = 2", "id = 1"),), ("must differ",)),
+    ],
+)
+def test_a_bus_file_that_does_not_fit_is_named(
+    wanted: tuple[tuple[str, str], ...],
+    words: tuple[str, ...],
+    capfd: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    truth, real = load_bus(BUS), plants.emulate
+
+    def the_bench(_config: BusConfig, *rest: Any, **more: Any) -> Network:
+        """The drives are those of the bench, whatever the file says."""
+        return real(truth, *rest, **more)
+
+    monkeypatch.setattr(plants, "emulate", the_bench)
+    where = ("--bus", changed(tmp_path, *wanted), "--interface", "legbench")
+    called(capfd, *JUMP, *where, "--out", tmp_path / "runs").refused(*words)
+    assert not (tmp_path / "runs").exists()
+
+
+def test_limits_looser_than_the_design_are_refused(
+    capfd: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    path = changed(tmp_path)
+    (tmp_path / "limits.toml").write_text("motor_range = [[-3.0, 0.9], [-0.9, 1.1]]\n")
+    done = called(capfd, *JUMP, "--bus", path, "--interface", "legbench", "--out", tmp_path / "r")
+    done.refused("motor_range of axis 1", "looser", "[-2.2, 0.9] rad")
+
+
+def test_a_second_master_is_refused(
+    capfd: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = ChannelLock("one", tmp_path)
+    first.acquire()
+    monkeypatch.setattr(Session, "lock", lambda _self: ChannelLock("one", tmp_path))
+    done = called(capfd, *JUMP, *EMULATED, "--out", tmp_path / "runs")
+    first.release()
+    done.refused("already has a master")

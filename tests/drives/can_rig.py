@@ -1,0 +1,120 @@
+"""An emulated leg behind CAN frames, as the tests of the whole plant want it."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from legbench.control import AbstractController
+from legbench.design import LegDesign, load_design
+from legbench.design.setup import Setup
+from legbench.drives.bus import LockstepBus
+from legbench.drives.bus_file import load_bus, load_limits
+from legbench.drives.codec.datatypes import DataType
+from legbench.drives.codec.pdo import Mapped
+from legbench.drives.config import (
+    LINK_POSITION,
+    POSITION_ACTUAL,
+    STATUSWORD,
+    BusConfig,
+    PdoConfig,
+)
+from legbench.drives.emulated.behaviour import Behaviour
+from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.network import Network
+from legbench.drives.limits import SafetyLimits
+from legbench.drives.session import Session
+from legbench.drives.units import AxisUnits
+from legbench.experiment import (
+    USUAL_SETUP,
+    ControllerConfig,
+    Experiment,
+    make_controller,
+    targets_of,
+)
+from legbench.plant.can import CanPlant
+from legbench.plant.emulated_leg import EmulatedLeg
+from legbench.plant.start import Start
+
+ROOT = Path(__file__).parents[2]
+BUS, LIMITS = ROOT / "hardware" / "leg.toml", ROOT / "hardware" / "limits.toml"
+MS = 1_000_000
+FINE = AxisUnits(counts_per_rev=1 << 30)
+"""An encoder that resolves everything: 6e-9 rad."""
+MODE = Mapped(0x6061, 0, DataType.INTEGER8)
+
+
+def fine_bus() -> BusConfig:
+    """The bench's bus with encoders that resolve everything, and no drive's own limits."""
+    pdos = (
+        PdoConfig(number=1, objects=(STATUSWORD, POSITION_ACTUAL)),
+        PdoConfig(number=2, objects=(LINK_POSITION,)),
+    )
+    bench = load_bus(BUS)
+    nodes = tuple(
+        replace(node, motor=FINE, link=FINE, link_object=LINK_POSITION, tpdos=pdos, parameters=())
+        for node in bench.nodes
+    )
+    return replace(bench, nodes=nodes)
+
+
+def experiment(controller: ControllerConfig, duration: float = 1.0) -> Experiment:
+    """The optimal leg where its controller is at home."""
+    return Experiment(
+        design=load_design(ROOT / "models" / "optimal.toml"),
+        controller=controller,
+        setup=Setup(kind=USUAL_SETUP[type(controller)]),
+        duration=duration,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stage:
+    """What a test holds."""
+
+    plant: CanPlant
+    network: Network
+    body: EmulatedLeg
+    controller: AbstractController
+    design: LegDesign
+    start: Start
+    session: Session
+
+
+def staged(chosen: Experiment) -> tuple[AbstractController, Start]:
+    """Controller and start posture of an experiment."""
+    targets = targets_of(chosen)
+    controller = make_controller(chosen.controller, targets)
+    motor = controller.start_motor_pos
+    return controller, Start(joint_pos=targets.link_at_rest(motor), motor_pos=motor)
+
+
+@contextmanager
+def stage(
+    chosen: Experiment,
+    *,
+    config: BusConfig | None = None,
+    limits: SafetyLimits | None = None,
+    behaviours: Sequence[Behaviour] | None = None,
+    ideal: bool = False,
+) -> Iterator[Stage]:
+    """An emulated leg for an experiment, drives at its start posture."""
+    bus = config or load_bus(BUS)
+    controller, start = staged(chosen)
+    motors = [float(value) for value in start.motor_pos]
+    usual = [Behaviour.ideal(motor) if ideal else Behaviour(start_pos=motor) for motor in motors]
+    body = EmulatedLeg(chosen.design, chosen.options, start)
+    network = emulate(bus, behaviours or usual, body=body, keep_log=True)
+    session = Session(LockstepBus("leg", network=network), bus)
+    link = session.link(limits or load_limits(LIMITS), chosen.design.stiffness)
+    plant = CanPlant(session, link, start)
+    with plant:
+        yield Stage(
+            plant=plant,
+            network=network,
+            body=body,
+            controller=controller,
+            design=chosen.design,
+            start=start,
+            session=session,
+        )

@@ -1,0 +1,74 @@
+"""What lies in `hardware/` is what the code makes and prints."""
+
+import re
+import shlex
+import shutil
+from pathlib import Path
+
+import canopen
+import pytest
+from can_rig import BUS, LIMITS, ROOT
+
+from legbench.cli import main
+from legbench.design import load_design
+from legbench.drives.bus_file import load_bus
+from legbench.drives.eds import dcf_text, eds_text
+from legbench.drives.stopping import check_stopping
+from legbench.drives.wire import check_load
+from legbench.plants import limits_for
+
+HARDWARE = ROOT / "hardware"
+STEPS = re.findall(
+    r"```\n\$ (legbench [^\n]*)\n(.*?)\n```",
+    (HARDWARE / "bring-up.md").read_text(),
+    flags=re.DOTALL,
+)
+
+
+def shape(line: str) -> str:
+    """A line without its figures, which change with every run."""
+    return re.sub(r"\s+", " ", re.sub(r"TIME|[\d.e+-]*\d(?:-\d+)?", "#", line))
+
+
+def test_object_dictionaries_are_up_to_date() -> None:
+    bus = load_bus(BUS)
+    assert (HARDWARE / "legbench-drive.eds").read_text() == eds_text()
+    for node in bus.nodes:
+        assert (HARDWARE / f"{node.name}.dcf").read_text() == dcf_text(bus, node)
+
+
+def test_another_stack_reads_them() -> None:
+    node = canopen.LocalNode(1, str(HARDWARE / "motor1.dcf"))
+    for index, sub, value in ((0x1018, 4, 1001), (0x60C2, 2, -3)):
+        variable = node.object_dictionary.get_variable(index, sub)
+        assert variable is not None
+        assert variable.value == value
+
+
+@pytest.mark.parametrize("name", ["optimal", "prototype"])
+def test_bus_and_limits_fit_both_designs(name: str) -> None:
+    limits = limits_for(LIMITS, load_design(ROOT / "models" / f"{name}.toml"))
+    bus = load_bus(BUS)
+    check_stopping(bus, limits)
+    assert check_load(bus) < 0.6
+
+
+def test_there_are_ten_steps() -> None:
+    assert len(STEPS) == 11
+
+
+@pytest.mark.parametrize(("command", "told"), STEPS, ids=[command[9:30] for command, _ in STEPS])
+def test_every_step_prints_what_it_must(
+    command: str,
+    told: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    for folder in ("hardware", "models"):
+        shutil.copytree(ROOT / folder, tmp_path / folder)
+    monkeypatch.chdir(tmp_path)
+    assert main([*shlex.split(command)[1:], "--interface", "legbench"]) == 0
+    seen = capfd.readouterr()
+    lines = [line for line in (seen.err + seen.out).splitlines() if not line.startswith("speed")]
+    assert [shape(line) for line in lines] == [shape(line) for line in told.splitlines()]

@@ -1,0 +1,152 @@
+"""Master and drives in processes of their own, over AF_UNIX; bounded in time, none measured."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+from can_rig import BUS, LIMITS, ROOT
+
+from legbench.recording.repair import recover
+
+PATIENCE = 30.0
+"""Longest that anything may take on a busy machine [s]."""
+CALL = "import sys\nfrom legbench.cli import main\nsys.exit(main(sys.argv[1:]))"
+
+
+@dataclass
+class Served:
+    """Emulated drives that other processes can reach."""
+
+    folder: Path
+    process: subprocess.Popen[str]
+    seen: list[tuple[str, str]] = field(default_factory=list)
+
+    def await_state(self, state: str, count: int = 2) -> None:
+        """Read on until so many drives have come to a state."""
+        assert self.process.stdout is not None
+        found = 0
+        while found < count:
+            line = self.process.stdout.readline()
+            assert line, f"the drives ended; seen: {self.seen}"
+            told = json.loads(line)
+            self.seen.append((told["node"], told["state"]))
+            found += told["state"] == state
+
+
+def calm(folder: Path) -> Path:
+    """The bench's files, patient enough for a busy machine."""
+    text = BUS.read_text(encoding="utf-8")
+    text = text.replace("master_heartbeat_ms = 10", "master_heartbeat_ms = 200")
+    text = text.replace("heartbeat_ms = 20\n", "heartbeat_ms = 500\n", 1)
+    rpdo = '\n[[node.rpdo]]\nnumber = 1\nobjects = ["6040:00 u16", "607A:00 i32"]\n'
+    text = text.replace("\n[node.parameters]", rpdo + "deadline_ms = 1000\n\n[node.parameters]")
+    (folder / "leg.toml").write_text(text, encoding="utf-8")
+    shutil.copy(LIMITS, folder / "limits.toml")
+    loose = (folder / "limits.toml").read_text(encoding="utf-8")
+    for name in ("lost_frames", "overrun_cycles", "following_cycles"):
+        loose = "\n".join(
+            f"{name} = 3000" if line.startswith(name) else line for line in loose.splitlines()
+        )
+    (folder / "limits.toml").write_text(loose, encoding="utf-8")
+    return folder / "leg.toml"
+
+
+def started(folder: Path, *arguments: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-c", CALL, *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=folder,
+    )
+
+
+def end(process: subprocess.Popen[str]) -> None:
+    with suppress(ProcessLookupError):
+        os.kill(process.pid, signal.SIGKILL)
+    process.communicate()
+
+
+@contextmanager
+def served(folder: Path) -> Iterator[Served]:
+    """Drives over AF_UNIX that end by themselves after a while."""
+    calm(folder)
+    process = started(
+        folder,
+        *("drives", "emulate", "--bus", "leg.toml", "--channel", "leg.sock", "--bare", "--json"),
+        *("--patience", "2000", "--seconds", str(PATIENCE)),
+        *("--design", str(ROOT / "models" / "optimal.toml")),
+    )
+    try:
+        yield Served(folder, process)
+    finally:
+        end(process)
+
+
+def master(folder: Path) -> subprocess.Popen[str]:
+    return started(
+        folder,
+        *("run", "position-jump", "--plant", "can", "--bus", "leg.toml", "--duration", "25"),
+        *("--interface", "legbench_unix", "--channel", "leg.sock", "--out", "runs"),
+        *("--design", str(ROOT / "models" / "optimal.toml")),
+    )
+
+
+def run_folder(folder: Path) -> Path:
+    return next((folder / "runs").iterdir())
+
+
+def rows_on_disk(folder: Path) -> None:
+    """Wait until the recording has begun."""
+    until = time.monotonic() + PATIENCE
+    while time.monotonic() < until:
+        found = list((folder / "runs").glob("*/samples.arrows"))
+        if found and found[0].stat().st_size > 20_000:
+            return
+        time.sleep(0.02)
+    pytest.fail("no rows")
+
+
+@pytest.mark.parametrize("name", ["SIGKILL", "SIGSTOP"])
+def test_drives_stop_by_themselves_when_the_master_is_gone(name: str, tmp_path: Path) -> None:
+    with served(tmp_path) as drives:
+        drives.await_state("switch on disabled")
+        run = master(tmp_path)
+        try:
+            drives.await_state("operation enabled")
+            rows_on_disk(tmp_path)
+            os.kill(run.pid, getattr(signal, name))
+            drives.await_state("switch on disabled")
+            assert [state for _, state in drives.seen[-4:]].count("quick stop active") >= 1
+        finally:
+            end(run)
+    report = recover(run_folder(tmp_path))
+    assert report.rows_kept > 0
+
+
+def test_interrupting_the_master_stops_both_drives_and_keeps_the_run(tmp_path: Path) -> None:
+    with served(tmp_path) as drives:
+        drives.await_state("switch on disabled")
+        run = master(tmp_path)
+        try:
+            drives.await_state("operation enabled")
+            rows_on_disk(tmp_path)
+            os.kill(run.pid, signal.SIGINT)
+            drives.await_state("switch on disabled")
+            _, complaint = run.communicate(timeout=PATIENCE)
+        finally:
+            end(run)
+    assert run.returncode == 0, complaint
+    manifest = json.loads((run_folder(tmp_path) / "run.json").read_text())
+    assert manifest["status"] == "interrupted"
+    assert manifest["realtime"]["kernel"]
+    assert (run_folder(tmp_path) / "bus.log").stat().st_size > 0

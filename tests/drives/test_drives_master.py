@@ -1,0 +1,213 @@
+"""The master's smaller parts."""
+
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import can
+import pytest
+from drives_rig import LIMITS, START, STIFFNESS, config, node, rig
+
+from legbench.drives.bus import LockstepBus
+from legbench.drives.bus_file import parse_object
+from legbench.drives.codec.datatypes import DataType
+from legbench.drives.codec.pdo import Mapped
+from legbench.drives.config import LINK_POSITION, POSITION_ACTUAL, STATUSWORD, PdoConfig
+from legbench.drives.emulated.behaviour import Behaviour
+from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.faults import NodeFault, NodeFaultKind
+from legbench.drives.errors import BusError, DriveError
+from legbench.drives.link import Link
+from legbench.drives.master.bus_log import BusLog
+from legbench.drives.master.lock import ChannelLock
+from legbench.drives.open_bus import open_bus, timebase_of
+from legbench.drives.timebase import NetworkTime, SystemTime
+from legbench.errors import ConfigError, PlantFault
+
+
+def wide() -> object:
+    """Two TPDOs a drive, the link's encoder in 32 bits, and a temperature."""
+    nodes = []
+    for place in (0, 1):
+        usual = node(place)
+        nodes.append(
+            replace(
+                usual,
+                link=replace(usual.link, bits=32, counts_per_rev=1 << 24),
+                link_object=LINK_POSITION,
+                tpdos=(
+                    PdoConfig(number=1, objects=(STATUSWORD, POSITION_ACTUAL)),
+                    PdoConfig(
+                        number=3, objects=(LINK_POSITION, Mapped(0x6077, 0, DataType.INTEGER16))
+                    ),
+                ),
+                temperature_object=parse_object("2070:00 i16"),
+            )
+        )
+    return config(nodes=tuple(nodes), tpdo_deadline_us=900)
+
+
+def test_two_tpdos_a_drive_and_a_temperature(tmp_path: Path) -> None:
+    chosen = wide()
+    with rig(tmp_path, bus_config=chosen) as it:  # pyright: ignore[reportArgumentType]
+        it.link.start()
+        it.run(450)
+        it.link.command(START)
+        sample = it.link.exchange()
+        assert sample.link_pos == pytest.approx(START, abs=6e-6)
+        assert sample.temperature == (25.0, 25.0)
+
+
+def test_too_hot_a_drive_ends_the_run(tmp_path: Path) -> None:
+    chosen = wide()
+    limits = replace(LIMITS, temperature=60.0)
+    with rig(tmp_path, bus_config=chosen, limits=limits) as it:  # pyright: ignore[reportArgumentType]
+        it.link.start()
+        # The sensor alone: the drive itself has not tripped yet.
+        it.network.drives[0]._values[0x2070, 0] = 701
+        with pytest.raises(PlantFault, match=r"drive 1 is at 70\.1 deg C, the limit is 60"):
+            it.run(450)
+
+
+def test_configuration_differences_are_found_and_gone_after_configuring(tmp_path: Path) -> None:
+    with rig(tmp_path) as it:
+        up, hip = it.link.bring_up, it.config.nodes[0]
+        different = {parameter.index for parameter, _ in up.differences(hip)}
+        assert {0x1006, 0x1017, 0x6060, 0x60C2, 0x1600, 0x1A00} <= different
+        assert up.configure(hip) > 30
+        assert up.differences(hip) == []
+
+
+def test_a_drive_that_does_not_keep_a_value_is_named(tmp_path: Path) -> None:
+    with rig(tmp_path) as it:
+        drive = it.network.drives[1]
+        original = drive._store.read
+
+        def forgetful(index: int, sub: int) -> bytes:
+            return bytes(2) if index == 0x1017 else original(index, sub)
+
+        drive._sdo._read = forgetful
+        words = r"'knee'\), 1017h:00 Producer heartbeat time \[ms\]: wrote 20, reads 0"
+        with pytest.raises(DriveError, match=words):
+            it.link.open()
+
+
+def test_the_lock_dies_with_its_process(tmp_path: Path) -> None:
+    holder = (
+        "import sys, time; from pathlib import Path;"
+        "from legbench.drives.master.lock import ChannelLock;"
+        f"ChannelLock('vcan0', Path({str(tmp_path)!r})).acquire();"
+        "print('held', flush=True); time.sleep(60)"
+    )
+    with subprocess.Popen([sys.executable, "-c", holder], stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == b"held\n"
+        lock = ChannelLock("vcan0", tmp_path)
+        with pytest.raises(BusError, match=f"already has a master, process {process.pid}"):
+            lock.acquire()
+        process.kill()
+    lock.acquire()
+    lock.release()
+    lock.release()
+
+
+def test_a_bus_log_is_read_by_others_and_its_failure_is_not_ours(tmp_path: Path) -> None:
+    path = tmp_path / "bus.log"
+    with BusLog(path, "can0") as log:
+        sent = [
+            can.Message(timestamp=0.25, arbitration_id=0x80, is_extended_id=False),
+            can.Message(timestamp=0.5, arbitration_id=0x1ABCDEF, data=b"\1\2"),
+            can.Message(timestamp=1, arbitration_id=0x181, is_extended_id=False, data=bytes(8)),
+        ]
+        for message in sent:
+            log(message)
+    assert path.read_text().splitlines()[0] == "(0.250000) can0 080#"
+    found = list(can.CanutilsLogReader(path))
+    for message, back in zip(sent, found, strict=True):
+        assert message.equals(back, timestamp_delta=1e-6, check_channel=False)
+    with pytest.raises(BusError, match="cannot write a bus log: File exists"):
+        BusLog(path, "can0")
+    full = BusLog(tmp_path / "other.log", "can0")
+    full._file.close()
+    full._file = Path("/dev/full").open("w", encoding="ascii")  # noqa: SIM115
+    for _ in range(1000):
+        full(sent[0])
+    full.close()
+    assert full.error == "No space left on device"
+
+
+def test_interfaces_that_are_not_there_are_named() -> None:
+    with pytest.raises(BusError, match="cannot open nonsense can0: "):
+        open_bus(config(), interface="nonsense", channel="can0")
+    with pytest.raises(BusError, match="cannot open socketcan nowhere0: "):
+        open_bus(config(interface="socketcan", channel="nowhere0"))
+    bus = open_bus(config(), interface="virtual", channel="here")
+    assert isinstance(timebase_of(bus), SystemTime)
+    bus.shutdown()
+
+
+def test_a_bus_without_drives_names_the_first_that_is_missing(tmp_path: Path) -> None:
+    with can.Bus(interface="virtual", channel="empty") as bus:
+        quick = config(sdo_timeout_ms=5, sdo_retries=2)
+        link = Link(bus, quick, stiffness=STIFFNESS, lock=ChannelLock("empty", tmp_path))
+        words = r"node 1 on .*empty does not answer for 1000h:00 Device type within 5 ms, 2 times"
+        with pytest.raises(DriveError, match=words):
+            link.open()
+
+
+def test_time_bases_go_forward() -> None:
+    system = SystemTime(spin_ns=10_000)
+    at_ns = system.now_ns() + 300_000
+    system.wait_until(at_ns)
+    assert system.now_ns() >= at_ns
+    system.wait_until(at_ns - 1_000_000_000)
+    network = emulate(config())
+    virtual = NetworkTime(network)
+    began = time.monotonic_ns()
+    virtual.wait_until(3_000_000_000)
+    assert virtual.now_ns() == network.now_ns == 3_000_000_000
+    assert began
+    virtual.wait_until(0)
+    assert virtual.now_ns() == 3_000_000_000
+
+
+def test_one_behaviour_a_drive() -> None:
+    with pytest.raises(ConfigError, match="1 behaviours for 2 drives"):
+        emulate(config(), [Behaviour()])
+
+
+def test_a_body_that_fails_ends_the_run_with_its_cause(tmp_path: Path) -> None:
+    def body(motor: tuple[float, ...]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        if network and network[0].now_ns > 400_000_000:
+            raise PlantFault("leg straightened through", "the body is broken")
+        return motor, (0.0, 0.0)
+
+    network = []
+    with rig(tmp_path, body=body) as it:
+        network.append(it.network)
+        it.link.start()
+        with pytest.raises(PlantFault, match="the body is broken") as caught:
+            it.run(200)
+        assert caught.value.cause == "leg straightened through"
+        assert it.link.fault is caught.value
+
+
+def test_a_drive_that_is_found_enabled_is_stopped_before_it_is_configured(tmp_path: Path) -> None:
+    # The master before this one has crashed, and the drives do not watch it.
+    with rig(tmp_path) as it:
+        it.link.start()
+        for drive in it.network.drives:
+            drive._values[0x1016, 1] = 0
+            drive._values[0x1400, 5] = 0
+            drive._watches.clear()
+        it.link._lock.release()
+        again = LockstepBus("rig", network=it.network)
+        link = Link(again, it.config, LIMITS, stiffness=STIFFNESS, lock=ChannelLock("b", tmp_path))
+        before = it.angles
+        it.network.inject(NodeFault(kind=NodeFaultKind.HEARTBEAT_LOSS, node_id=1, start_ns=1 << 61))
+        link.start(clear_faults=True)
+        assert it.angles == pytest.approx(before, abs=1e-5)
+        link.close()
+        again.shutdown()
