@@ -128,10 +128,9 @@ def add_yield(
     from legbench.synthesis.report import yield_lines
     from legbench.synthesis.yields import measure_yield
 
+    scatter = tolerances_named(tolerances)
     note(f"simulating {legs} legs with all tolerances, then some with each alone")
-    result = measure_yield(
-        design, tolerances_named(tolerances), legs=legs, seed=seed, progress=progress
-    )
+    result = measure_yield(design, scatter, legs=legs, seed=seed, progress=progress)
     lines += ["", *yield_lines(result)]
     content["yield"] = asdict(result)
 

@@ -65,6 +65,8 @@ class HopArguments:
 def main(arguments: list[str]) -> int:
     """Run the command."""
     flags = parse(HopArguments, "hop", arguments)
+    if flags.basin < 0:
+        raise ConfigError(f"basin is {flags.basin} points a side; it must be 0 (none) or more")
     if flags.basin and flags.out is None:
         raise ConfigError("a basin map needs --out, the folder that it is written to")
     if flags.hops < 1:
