@@ -1,9 +1,11 @@
 """Everything that a user may get wrong: one clear line, a status, no traceback, no litter."""
 
 import json
+import os
 import re
 import shutil
 import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,7 +14,7 @@ from commands import DESIGN, MODELS, called, started
 
 from legbench.recording.reader import load
 
-TEXT = (MODELS / "optimal.toml").read_text(encoding="utf-8")
+TEXT = (MODELS / "table2.toml").read_text(encoding="utf-8")
 NO_SCREEN = ("DISPLAY", "WAYLAND_DISPLAY")
 
 
@@ -31,7 +33,7 @@ def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("length = 133", "length = 140", ("0.14 m", "0.133 m", "l2 = l1 + l3")),
         ("[thigh]", "[thigh", ("not valid TOML",)),
         ("mass = 637", "mass = 0.9", ("bars weigh 0.001302 kg", "reduced")),
-        ("inertia = 70", "inertia = 1e-14", ("MuJoCo refuses", "'optimal'")),
+        ("inertia = 70", "inertia = 1e-14", ("MuJoCo refuses", "'table2'")),
     ],
     ids=["negative mass", "lengths", "malformed", "light trunk", "tiny inertia"],
 )
@@ -51,6 +53,23 @@ def test_a_design_that_no_leg_can_have(
     kind = ("run", "jump", "--out", runs) if command == "run" else ("model", "--out", runs)
     called(capfd, *kind, "--design", path).refused(*words)
     assert not runs.exists()
+
+
+def test_a_reader_that_has_gone(tmp_path: Path) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    try:
+        done = subprocess.run(
+            [sys.executable, "-m", "legbench", "check", str(MODELS / "table2.toml"), "--no-model"],
+            stdout=writer,
+            stderr=subprocess.PIPE,
+            cwd=tmp_path,
+            timeout=60,
+            check=False,
+        )
+    finally:
+        os.close(writer)
+    assert (done.returncode, done.stderr) == (141, b"")
 
 
 def test_a_design_that_is_not_there(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

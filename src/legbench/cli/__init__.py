@@ -1,5 +1,6 @@
 """The command line: wiring only. A command's module is imported when it is called."""
 
+import os
 import sys
 from importlib import import_module
 
@@ -41,8 +42,19 @@ def main(arguments: list[str] | None = None) -> int:
     """Run a command; 0 when all went well, 1 for a refusal or a fault, 2 for wrong usage.
 
     Every `LegbenchError` becomes one line on stderr, never a traceback; so does ^C outside of a
-    run, with 130.
+    run, with 130. Nobody reading any more, as under `head`, ends it with 141 and no word.
     """
+    try:
+        try:
+            return _run(arguments)
+        finally:
+            sys.stdout.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # the interpreter flushes once more
+        return 141
+
+
+def _run(arguments: list[str] | None) -> int:
     arguments = sys.argv[1:] if arguments is None else arguments
     if not arguments or arguments[0] in ("-h", "--help", "help"):
         print(usage(), end="")
