@@ -19,5 +19,11 @@ def optimal() -> LegDesign:
 
 
 @pytest.fixture(scope="session")
+def table2() -> LegDesign:
+    """The optimal leg with the digits that the paper prints."""
+    return load_design(MODELS / "table2.toml")
+
+
+@pytest.fixture(scope="session")
 def prototype() -> LegDesign:
     return load_design(MODELS / "prototype.toml")

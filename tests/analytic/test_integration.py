@@ -83,7 +83,7 @@ def test_matched_leg_stays_on_the_radial_mode_for_twenty_periods(regime: Regime)
 
 
 def test_rounded_leg_leaves_the_mode() -> None:
-    leg = load_design(MODELS / "optimal.toml")
+    leg = load_design(MODELS / "table2.toml")
     model = LegModel.of(leg, stops=False, undamped=True)
     state, _ = HybridLeg(model).advance(standing(model, (-0.9, 0.9), pinned=True), 2.0, MOTOR)
     assert abs(state.q[0] + state.q[1]) > 1e-6

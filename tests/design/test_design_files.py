@@ -94,15 +94,28 @@ def test_declared_units_are_read_exactly(tmp_path: Path) -> None:
     assert design.total_mass == pytest.approx(1.0)
 
 
-def test_the_papers_tables(optimal: LegDesign, prototype: LegDesign) -> None:
-    assert [round(segment.mass, 3) for segment in optimal.segments] == [0.207, 0.126, 0.030]
-    assert [round(segment.mass, 3) for segment in prototype.segments] == [0.192, 0.121, 0.030]
-    assert optimal.lengths == prototype.lengths == (0.064, 0.133, 0.069)
-    for design in (optimal, prototype):
+def test_the_papers_tables(table2: LegDesign, prototype: LegDesign) -> None:
+    assert [segment.mass for segment in table2.segments] == [0.207, 0.126, 0.030]
+    assert [segment.inertia for segment in table2.segments] == [446e-6, 140e-6, 70e-6]
+    assert [segment.mass for segment in prototype.segments] == [0.192, 0.121, 0.030]
+    assert table2.lengths == prototype.lengths == (0.064, 0.133, 0.069)
+    for design in (table2, prototype):
         assert design.total_mass == pytest.approx(1.0)
         assert [segment.com for segment in design.segments] == [0.010, 0.067, 0.010]
-    assert (optimal.stiffness, prototype.stiffness) == ((3.124, 3.124), (2.3, 2.3))
+    assert (table2.stiffness, prototype.stiffness) == ((3.124, 3.124), (2.3, 2.3))
     assert prototype.damping == (0.0092, 0.0073)
+
+
+def test_the_optimal_leg_rounds_to_the_printed_table(optimal: LegDesign, table2: LegDesign) -> None:
+    """The table gives whole grams, millimetres and kg mm^2."""
+    for exact, printed in zip(optimal.segments, table2.segments, strict=True):
+        for name, unit in (("mass", 1e-3), ("length", 1e-3), ("com", 1e-3), ("inertia", 1e-6)):
+            rounded = round(getattr(exact, name) / unit)
+            assert rounded == pytest.approx(getattr(printed, name) / unit), (exact, name)
+    assert round(optimal.trunk_mass, 3) == table2.trunk_mass
+    assert optimal.stiffness == table2.stiffness
+    assert optimal.damping == table2.damping
+    assert optimal.limits == table2.limits
 
 
 @pytest.mark.parametrize(

@@ -95,7 +95,7 @@ def test_gravity_condition_is_that_of_appendix_1_in_both_supports(leg: LegDesign
 
 
 def test_printed_sign_of_equation_9_contradicts_appendix_1_and_table_2() -> None:
-    table = load_design(MODELS / "optimal.toml")
+    table = load_design(MODELS / "table2.toml")
     thigh, shank, foot = table.segments
     shank_side = shank.mass * (thigh.length - shank.com)
     printed = thigh.mass * thigh.com + foot.mass * (foot.length - foot.com) - shank_side
@@ -163,8 +163,8 @@ def test_prototype_is_judged_as_the_paper_judges_it() -> None:
 
 
 def test_standing_angle() -> None:
-    table = load_design(MODELS / "optimal.toml")
+    table = load_design(MODELS / "table2.toml")
     assert standing_angle(table, None) == 0.5 * table.limits.knee[0]
     assert 2.0 * 0.133 * np.cos(standing_angle(table, 0.2)) == pytest.approx(0.2)
-    with pytest.raises(DesignError, match=r"relaxed length is 0\.3 m; leg 'optimal' is 0\.266 m"):
+    with pytest.raises(DesignError, match=r"relaxed length is 0\.3 m; leg 'table2' is 0\.266 m"):
         standing_angle(table, 0.3)

@@ -17,7 +17,7 @@ from legbench.synthesis.sensitivity import moved, refine
 from legbench.synthesis.solve import Solution, solve
 from legbench.synthesis.trace import Trace
 
-TABLE_2 = load_design(Path(__file__).parents[2] / "models" / "optimal.toml")
+TABLE_2 = load_design(Path(__file__).parents[2] / "models" / "table2.toml")
 OPTIMUM = 0.2573
 ON_BOUNDS = {
     "relaxed_length": "upper",

@@ -103,8 +103,8 @@ class LegDesign:
         thigh, shank, foot = self.lengths
         if abs(shank - thigh - foot) > LENGTH_TOLERANCE:
             raise DesignError(
-                f"shank length is {shank:g} m but thigh + foot make {thigh + foot:g} m; the leg "
-                "needs l2 = l1 + l3 (section II-A): change one of the three"
+                f"shank length is {shank:.9g} m but thigh + foot make {thigh + foot:.9g} m; the "
+                "leg needs l2 = l1 + l3 (section II-A): change one of the three"
             )
 
     @property
