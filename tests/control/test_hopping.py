@@ -1,14 +1,19 @@
 """Eight seconds of hopping with the default settings, both legs, against the task's bounds."""
 
+from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 
+import numpy as np
 import pytest
 
 from legbench.control import JumpConfig
 from legbench.design import LegDesign
 from legbench.experiment import Experiment, record
 from legbench.metrics import Summary, summarise
+from legbench.metrics.phases import find_gait
 from legbench.recording.reader import load
+from legbench.signals import SIGNALS, Phase
 
 
 @pytest.fixture(scope="session")
@@ -40,6 +45,35 @@ def test_the_prototype_hops_as_the_paper_reports(hops: dict[str, Summary]) -> No
     assert min(summary.rating_flight) > 0.97
     assert 0.03 < summary.foot_clearance < 0.06
     assert 0.07 < summary.trunk_excursion < 0.12
+
+
+@pytest.mark.parametrize("name", ["optimal", "prototype"])
+def test_every_push_is_on_the_ground_and_every_stance_has_one(
+    hops: dict[str, Summary], name: str
+) -> None:
+    run = load(Path(hops[name].run))
+    phase, contact = run["phase"], np.asarray(run["contact"], dtype=bool)
+    pushes = np.flatnonzero((phase[1:] == Phase.PUSH) & (phase[:-1] != Phase.PUSH)) + 1
+    assert np.all(contact[pushes])
+    gait = find_gait(run)
+    begun = [
+        np.count_nonzero((first <= pushes) & (pushes < stop))
+        for first, stop in zip(gait.stance.first, gait.stance.stop, strict=True)
+    ]
+    assert len(begun) >= 10
+    assert set(begun) == {1}
+
+
+@pytest.mark.parametrize("name", ["optimal", "prototype"])
+def test_a_leg_without_truth_tells_the_same_jumps(hops: dict[str, Summary], name: str) -> None:
+    """But for the first, from rest; stances begin and end with the ground's, to milliseconds."""
+    run = load(Path(hops[name].run))
+    truth = {c for s in SIGNALS if "simulation only" in s.doc for c in s.columns}
+    columns = {key: column for key, column in run.columns.items() if key not in truth}
+    seen, told = find_gait(run), find_gait(replace(run, columns=MappingProxyType(columns)))
+    assert len(told.jumps) == len(seen.jumps) - 1
+    assert np.max(np.abs(told.stance.start[1:] - seen.stance.start[2:])) < 0.02
+    assert np.max(np.abs(told.stance.end - seen.stance.end[1:])) < 0.02
 
 
 @pytest.mark.parametrize("name", ["optimal", "prototype"])

@@ -13,7 +13,7 @@ from legbench.errors import ConfigError
 from legbench.kinematics import joint_to_modal
 from legbench.signals import Phase
 
-EARLY = JumpConfig(delay=0.01, release_time=0.02)
+EARLY = JumpConfig(delay=0.01, release_time=0.02, touchdown_time=0.005)
 RING = [Phase.PUSH, Phase.RELEASE, Phase.FLIGHT, Phase.COMPRESS]
 
 
@@ -38,6 +38,9 @@ def test_one_hop_goes_once_round_the_ring(optimal: LegDesign) -> None:
         assert leg.phase(2.0 * standing) == Phase.RELEASE or leg.phase(0.0) == Phase.FLIGHT
     assert leg.phase(0.0, 20) == Phase.FLIGHT
     assert leg.phase(0.74 * standing, 10) == Phase.FLIGHT
+    assert leg.phase(0.76 * standing, 4) == Phase.FLIGHT
+    assert leg.phase(0.74 * standing) == Phase.FLIGHT
+    assert leg.phase(0.76 * standing, 4) == Phase.FLIGHT
     assert leg.phase(0.76 * standing) == Phase.COMPRESS
     assert leg.phase(1.0 * standing) == Phase.COMPRESS
     assert leg.phase(2.5 * standing, 3) == Phase.COMPRESS
@@ -60,8 +63,24 @@ def test_a_release_is_not_touched_down_at_once(optimal: LegDesign) -> None:
     leg, standing = legs(optimal)
     leg.pull(standing, 11)
     assert leg.phase(0.1 * standing) == Phase.RELEASE
-    phases = [leg.phase(1.5 * standing) for _ in range(21)]
-    assert phases == [Phase.RELEASE] * 19 + [Phase.FLIGHT, Phase.COMPRESS]
+    phases = [leg.phase(1.5 * standing) for _ in range(26)]
+    assert phases == [Phase.RELEASE] * 19 + [Phase.FLIGHT] * 5 + [Phase.COMPRESS] * 2
+
+
+@pytest.mark.parametrize("period_ms", [20, 60, 90])
+def test_vibration_in_the_air_is_no_ground_however_large(
+    optimal: LegDesign, period_ms: int
+) -> None:
+    """It loads the springs for half a period at a time, the ground for longer."""
+    leg, standing = legs(optimal, JumpConfig(delay=0.01))
+    leg.pull(standing, 11)
+    assert leg.phase(0.1 * standing) == Phase.RELEASE
+    turns = 2.0 * np.pi / period_ms * np.arange(1000)
+    swings = [leg.phase(5.0 * standing * float(np.sin(turn))) for turn in turns]
+    assert set(swings[30:]) == {Phase.FLIGHT}
+    leg.pull(0.0)
+    assert leg.phase(0.76 * standing, 49) == Phase.FLIGHT
+    assert leg.phase(0.76 * standing) == Phase.COMPRESS
 
 
 def test_only_the_push_stretches_the_leg(optimal: LegDesign) -> None:
@@ -151,6 +170,8 @@ def test_a_leg_that_hangs_at_reset_cannot_jump(optimal: LegDesign) -> None:
         ({"apex_turn": np.nan}, r"apex_turn is nan rad"),
         ({"release_time": -1.0}, r"release_time is -1 s; it must be 0 or more"),
         ({"release_time": np.nan}, r"release_time is nan s"),
+        ({"touchdown_time": -1.0}, r"touchdown_time is -1 s; it must be 0 or more"),
+        ({"touchdown_time": np.inf}, r"touchdown_time is inf s"),
         ({"z2": 0.3}, r"set point z2 - dz2 = 0\.15 rad \(link\) puts the knee at 0\.212 rad"),
         ({"z2": 2.0}, r"set point z2 \+ dz2 = 2\.15 rad"),
     ],

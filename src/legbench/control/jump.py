@@ -6,11 +6,14 @@ ring, each with one way out:
     REST      after a while                               -> PUSH
     PUSH      unloaded, or at an upper apex on the ground -> RELEASE
     RELEASE   after a while                               -> FLIGHT
-    FLIGHT    loaded: touchdown                           -> COMPRESS
+    FLIGHT    loaded for a while: touchdown               -> COMPRESS
     COMPRESS  at the lower apex                           -> PUSH
 
 The springs' torque is the load, `-tau_z`; motor position less torque over stiffness is how far
 the leg is folded, whose maximum is the lower apex and whose minimum is the upper one.
+
+A leg in the air vibrates, and each swing may load the springs more than standing does. But it
+changes sign twice a period: only the ground loads them for longer than half of one.
 """
 
 import math
@@ -44,7 +47,10 @@ class JumpConfig:
     apex_turn: float = 0.01
     """How far z2 must have come back from its extreme to tell an apex [rad]."""
     release_time: float = 0.03
-    """Shortest time from release to the next touchdown [s]."""
+    """Shortest time from release to the next flight [s]."""
+    touchdown_time: float = 0.05
+    """How long that load must last; more than half a period of the leg's vibration in the air
+    [s]."""
 
 
 STANDING_ONLY = "the leg does not load its springs at rest; jumping needs setup 'jump' or 'ffs'"
@@ -83,8 +89,9 @@ class Jump(AbstractController):
             )
         if not 0.0 < config.apex_turn < math.inf:
             raise ConfigError(f"apex_turn is {config.apex_turn:g} rad; it must be positive")
-        if not 0.0 <= config.release_time < math.inf:
-            raise ConfigError(f"release_time is {config.release_time:g} s; it must be 0 or more")
+        for name in ("release_time", "touchdown_time"):
+            if not 0.0 <= getattr(config, name) < math.inf:
+                raise ConfigError(f"{name} is {getattr(config, name):g} s; it must be 0 or more")
         check_delay(config.delay)
         if targets.support is not Support.FOOT:
             raise ConfigError(STANDING_ONLY)
@@ -92,13 +99,23 @@ class Jump(AbstractController):
         self._folded = targets.motor_at(config.z2 + config.dz2, "z2 + dz2")
         self._stretched = targets.motor_at(config.z2 - config.dz2, "z2 - dz2")
         self._stiffness = targets.modal_stiffness()
-        self._dwell_of = _by_phase(
-            np.inf, {Phase.REST: config.delay, Phase.RELEASE: config.release_time}
-        )
         self._apex_of = _by_phase(0.0, {Phase.COMPRESS: 1.0, Phase.PUSH: -1.0})
-        self._load_sense_of = _by_phase(0.0, {Phase.FLIGHT: 1.0, Phase.PUSH: -1.0})
+        self._sense_of = _by_phase(1.0, {Phase.COMPRESS: 0.0, Phase.PUSH: -1.0})
         self._load_of = _by_phase(
-            0.0, {Phase.FLIGHT: config.touchdown_load, Phase.PUSH: config.release_load}
+            -np.inf,
+            {
+                Phase.FLIGHT: config.touchdown_load,
+                Phase.COMPRESS: 0.0,
+                Phase.PUSH: config.release_load,
+            },
+        )
+        self._dwell_of = _by_phase(
+            0.0,
+            {
+                Phase.REST: config.delay,
+                Phase.RELEASE: config.release_time,
+                Phase.FLIGHT: config.touchdown_time,
+            },
         )
         self._standing: Floats = np.ones(self._folded.shape[:-1])
         self._since: Floats = np.zeros(self._folded.shape[:-1])
@@ -125,9 +142,9 @@ class Jump(AbstractController):
         fold = self._targets.radial(observation.motor_pos) - torque / self._stiffness
         self._extreme = self._apex * np.maximum(self._apex * self._extreme, self._apex * fold)
         at_apex = self._apex * (self._extreme - fold) > self._apex_turn
-        loaded = self._load_sense * (-torque / self._standing - self._load) > 0.0
-        waited = observation.time - self._since >= self._dwell
-        leaving = at_apex | loaded | waited
+        holds = self._sense * (-torque / self._standing - self._load) > 0.0
+        self._since = np.where(holds, self._since, observation.time)
+        leaving = at_apex | (holds & (observation.time - self._since >= self._dwell))
         if leaving.any():
             self._since = np.where(leaving, observation.time, self._since)
             self._extreme = np.where(leaving, fold, self._extreme)
@@ -135,10 +152,14 @@ class Jump(AbstractController):
         return self._command
 
     def _enter(self, phase: Ints) -> None:
-        """Look up what ends each leg's phase, and make the command that goes with it."""
+        """Look up what ends each leg's phase, and make the command that goes with it.
+
+        An apex, or a load on one side of a level for a while; any load passes -inf, none passes a
+        sense of 0.
+        """
         self._phase = phase
-        self._dwell, self._apex = self._dwell_of[phase], self._apex_of[phase]
-        self._load_sense, self._load = self._load_sense_of[phase], self._load_of[phase]
+        self._apex, self._dwell = self._apex_of[phase], self._dwell_of[phase]
+        self._sense, self._load = self._sense_of[phase], self._load_of[phase]
         pushing = (phase == Phase.PUSH)[..., np.newaxis]
         motor_pos = np.where(pushing, self._stretched, self._folded)
         self._command = Command(motor_pos=motor_pos, phase=phase)

@@ -36,11 +36,20 @@ def loaded_by_contact(
     return loaded
 
 
-def states_by_controller(phase: Ints) -> Ints:
-    """STANCE, FLIGHT or UNKNOWN, row by row, from the jump controller's phases (n,)."""
+def states_by_controller(recording: Recorded) -> Ints:
+    """STANCE, FLIGHT or UNKNOWN, row by row, from the jump controller's phases (n,).
+
+    The controller calls a load ground once it has lasted for its `touchdown_time`, which the
+    manifest tells; the stance began when the load did.
+    """
+    phase, time = recording["phase"], recording.time
     states = np.full(len(phase), UNKNOWN)
     states[np.isin(phase, [Phase.COMPRESS, Phase.PUSH])] = STANCE
     states[np.isin(phase, [Phase.FLIGHT, Phase.RELEASE])] = FLIGHT
+    lasted = float(recording.manifest.get("controller", {}).get("touchdown_time", 0.0))
+    told = np.flatnonzero((phase[1:] == Phase.COMPRESS) & (phase[:-1] == Phase.FLIGHT)) + 1
+    for row, began in zip(told, np.searchsorted(time, time[told] - lasted), strict=True):
+        states[began:row][phase[began:row] == Phase.FLIGHT] = STANCE
     return states
 
 
@@ -55,7 +64,7 @@ def states_of(recording: Recorded) -> Ints:
     if terms_of(recording.manifest).setup is not SetupKind.JUMP:
         return np.full(len(recording.time), UNKNOWN)
     if not recording.has_truth:
-        return states_by_controller(recording["phase"])
+        return states_by_controller(recording)
     contact = np.asarray(recording["contact"], dtype=bool)
     loaded = loaded_by_contact(recording.time, contact, recording["foot_pos"][:, 1])
     return np.where(loaded, STANCE, FLIGHT)

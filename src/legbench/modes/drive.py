@@ -106,7 +106,7 @@ class JumpLaw(AbstractDrive):
         torque = np.asarray(design.stiffness) * (folded - rest)
         self._standing = -float(targets.radial(torque))
         self.phase, self.alarm, self.motor = Phase.FLIGHT, math.inf, self._folded
-        self._extreme = 0.0
+        self._extreme, self._loaded = 0.0, False
 
     def restart(self) -> None:
         """In flight, unloaded, settled."""
@@ -116,6 +116,8 @@ class JumpLaw(AbstractDrive):
         """The transitions out of the phase."""
         turn = self._config.apex_turn
         match self.phase:
+            case Phase.FLIGHT if self._loaded:
+                return Levels(lower=self._at_load(self._config.touchdown_load))
             case Phase.FLIGHT:
                 return Levels(upper=self._at_load(self._config.touchdown_load))
             case Phase.COMPRESS:
@@ -130,7 +132,9 @@ class JumpLaw(AbstractDrive):
         """Advance the phases."""
         match (self.phase, what):
             case (Phase.FLIGHT, Watched.RISE):
-                self._compress(value)
+                self._load(time)
+            case (Phase.FLIGHT, Watched.FALL):
+                self._enter(Phase.FLIGHT, self._folded)
             case (Phase.COMPRESS, Watched.TURN):
                 self._extreme = max(self._extreme, value)
             case (Phase.COMPRESS, Watched.FALL):
@@ -140,23 +144,27 @@ class JumpLaw(AbstractDrive):
                     self._release(time)
             case (Phase.PUSH, Watched.TURN):
                 self._extreme = min(self._extreme, value)
-            case (Phase.PUSH, Watched.FALL):
+            case (Phase.PUSH, Watched.FALL | Watched.RISE):
                 self._release(time)
-            case (Phase.PUSH, Watched.RISE):
-                self._compress(value)
             case _:
                 pass
 
     def ring(self, value: float, time: float) -> None:
-        """The release is over."""
+        """The release is over, or a load has lasted."""
+        if self._loaded:
+            self._compress(value)
+            return
         self._enter(Phase.FLIGHT, self._folded)
         if value > self._at_load(self._config.touchdown_load):
-            self._compress(value)
+            self._load(time)
 
     @property
     def settled(self) -> bool:
         """In flight, or on the way there."""
         return self.phase in (Phase.FLIGHT, Phase.RELEASE)
+
+    def _load(self, time: float) -> None:
+        self._loaded, self.alarm = True, time + self._config.touchdown_time
 
     def _compress(self, value: float) -> None:
         self._enter(Phase.COMPRESS, self._folded)
@@ -167,7 +175,7 @@ class JumpLaw(AbstractDrive):
         self.alarm = time + self._config.release_time
 
     def _enter(self, phase: Phase, motor: Pair) -> None:
-        self.phase, self.motor, self.alarm = phase, motor, math.inf
+        self.phase, self.motor, self.alarm, self._loaded = phase, motor, math.inf, False
 
     def _at_load(self, load: float) -> float:
         """The y of a load, at the present motor position."""

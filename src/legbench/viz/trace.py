@@ -100,7 +100,7 @@ def stance_of(rows: Recorded, kind: SetupKind) -> Bools:
         return np.zeros(len(rows.time), dtype=np.bool_)
     if rows.has_truth:
         return np.asarray(rows["contact"], dtype=np.bool_)
-    return states_by_controller(rows["phase"]) == STANCE
+    return states_by_controller(rows) == STANCE
 
 
 @final
