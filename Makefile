@@ -42,7 +42,8 @@ bench: $(STAMP) ## performance targets as ratios against a baseline in the same 
 	$(BIN)/python scripts/bench_drives.py
 
 models: $(STAMP) ## rewrite the golden MJCF files of models/
-	$(BIN)/python scripts/golden.py
+	@set -e; for design in models/*.toml; do \
+	  $(BIN)/legbench model --design "$$design" --out "$${design%.toml}.xml"; done
 
 clean: ## remove .venv and generated stubs, keep runs/
 	rm -rf .venv typings
