@@ -1,3 +1,4 @@
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -135,6 +136,19 @@ def test_states_change_when_they_change(hop: Recording, shown: Entities) -> None
 
 def test_ratings_are_those_of_the_metrics(hop: Recording, shown: Entities) -> None:
     ratings = rate_run(hop, terms_of(hop.manifest), find_gait(hop))
+    for name in ("stance", "flight"):
+        values = np.array(shown[f"/series/rating/{name}"]["scalars"]).ravel()
+        np.testing.assert_allclose(values, ratings[f"rating_{name}"], rtol=1e-12)
+
+
+def test_contact_that_chatters_splits_no_rating(hop: Recording, tmp_path: Path) -> None:
+    contact = np.asarray(hop["contact"], dtype=bool)
+    chatter = np.random.default_rng(8)
+    for event in np.flatnonzero(np.diff(contact))[:-1]:
+        contact[event - 4 : event + 5] = chatter.random(9) < 0.5
+    rough = replace(hop, columns={**hop.columns, "contact": contact.astype(np.int8)})
+    ratings = rate_run(rough, terms_of(hop.manifest), find_gait(rough))
+    shown = viz_rrd.temporal(write_rrd(rough, tmp_path / "rough.rrd"))
     for name in ("stance", "flight"):
         values = np.array(shown[f"/series/rating/{name}"]["scalars"]).ravel()
         np.testing.assert_allclose(values, ratings[f"rating_{name}"], rtol=1e-12)

@@ -43,14 +43,14 @@ class Publisher:
         self._others = tuple(others)
         self._tracer = Tracer(facts)
         self._laid_out = False
-        self._plots = Plots(stream, facts)
+        self._plots, self._rating = Plots(stream, facts), Rating(stream, facts)
         self._sections = (
             self._plots,
             Leg2D(stream, facts),
             Scene(stream, facts),
             States(stream, facts),
             Series(stream),
-            Rating(stream, facts),
+            self._rating,
         )
         self.describe(facts)
 
@@ -85,3 +85,4 @@ class Publisher:
             ghost.push()
             self._plots.overlay(other.key, ghost.trace, other.colour)
         self._plots.finish()
+        self._rating.finish()

@@ -1,5 +1,6 @@
 """The rating P^r while a run goes on: one value at the end of each period or phase."""
 
+from dataclasses import dataclass
 from typing import final
 
 import numpy as np
@@ -8,6 +9,7 @@ from legbench.design.setup import SUPPORTS
 from legbench.design.statics import Support
 from legbench.metrics.rating import alignment, deflection
 from legbench.metrics.rows import runs_of
+from legbench.metrics.stance import STANCE
 from legbench.signals import Floats
 from legbench.viz import style
 from legbench.viz._rerun import rr
@@ -15,9 +17,30 @@ from legbench.viz.facts import Facts
 from legbench.viz.trace import Trace
 
 SHORTEST = 15
-"""Stretches of fewer rows are contact chatter and have no rating."""
+"""Stretches of fewer rows are contact chatter and belong to the stretch around them."""
 ORIGIN = "/series/rating"
 LANES = {"period": style.ACCENT, "stance": style.STANCE, "flight": style.FLIGHT}
+
+
+@dataclass(slots=True)
+class Stretch:
+    """Rows of one period or phase that have been seen so far."""
+
+    key: int
+    time: float
+    """Of its first row [s]."""
+    rows: int
+    rated: int
+    """Rows that have a direction."""
+    total: float
+    """Of their alignments."""
+
+    def add(self, more: "Stretch | None") -> None:
+        """Rows that turned out to belong to it."""
+        if more is not None:
+            self.rows += more.rows
+            self.rated += more.rated
+            self.total += more.total
 
 
 @final
@@ -28,8 +51,11 @@ class Rating:
         self._stream = stream
         self._terms = facts.terms
         self._jumps = facts.jumps
-        self._key: int | None = None
-        self._sum, self._rows = 0.0, 0
+        self._now: Stretch | None = None
+        self._next: Stretch | None = None
+        """What may be the stretch after it, or chatter."""
+        self._gap: Stretch | None = None
+        """Between contacts of which none has lasted."""
         self._whole = False
         for name in ("flight", "stance") if facts.jumps else ("period",):
             looks = rr.SeriesLines(
@@ -45,13 +71,44 @@ class Rating:
         motor = trace.rows["motor_pos"]
         runs = runs_of(trace.stance.astype(np.int64) if self._jumps else trace.period)
         for first, stop, key in zip(runs.first, runs.stop, runs.value.tolist(), strict=True):
-            if key != self._key:
-                self._close(float(trace.time[first]))
-                self._whole = self._key is not None
-                self._key, self._sum, self._rows = key, 0.0, 0
             values = self._alignment(trace.joint[first:stop], motor[first:stop], key)
-            self._sum += float(np.nansum(values))
-            self._rows += int(np.isfinite(values).sum())
+            rated, total = int(np.isfinite(values).sum()), float(np.nansum(values))
+            time = float(trace.time[first])
+            self._take(Stretch(key, time, int(stop - first), rated, total))
+
+    def finish(self) -> None:
+        """The run is over: what had begun may have been longer than what was seen of it."""
+        if self._now is not None and self._next is not None:
+            self._close(self._now, self._next.time)
+
+    def _take(self, rows: Stretch) -> None:
+        """Rows of one kind, in the order of `metrics.stance`: gaps are filled, then contacts."""
+        if self._now is None:
+            self._now = rows
+        elif self._next is None and rows.key == self._now.key:
+            self._now.add(rows)
+        elif self._next is None:
+            self._next = rows
+        elif rows.key == self._next.key:
+            self._next.add(self._gap)
+            self._next.add(rows)
+            self._gap = None
+        elif self._jumps and self._next.key == STANCE:
+            if self._gap is None:
+                self._gap = rows
+            else:
+                self._gap.add(rows)
+        else:
+            self._now.add(self._next)
+            self._now.add(rows)
+            self._next = None
+        if self._next is not None and self._next.rows >= SHORTEST:
+            self._close(self._now, self._next.time)
+            self._now, self._next, self._gap, self._whole = self._next, self._gap, None, True
+        elif self._gap is not None and self._gap.rows >= SHORTEST:
+            self._now.add(self._next)
+            self._now.add(self._gap)
+            self._next = self._gap = None
 
     def _alignment(self, joint: Floats, motor: Floats, key: int) -> Floats:
         terms = self._terms
@@ -59,10 +116,10 @@ class Rating:
         support = Support.NONE if flies else SUPPORTS[terms.setup]
         return alignment(deflection(terms.design, joint, motor, support, terms.reference))
 
-    def _close(self, time: float) -> None:
-        if not self._whole or self._rows < SHORTEST or self._key is None:
+    def _close(self, stretch: Stretch, time: float) -> None:
+        if not self._whole or stretch.rated < SHORTEST:
             return
-        name = ("flight", "stance")[self._key] if self._jumps else "period"
+        name = ("flight", "stance")[stretch.key] if self._jumps else "period"
         index = [rr.TimeColumn("t", duration=[time])]
-        value = rr.Scalars.columns(scalars=[self._sum / self._rows])
+        value = rr.Scalars.columns(scalars=[stretch.total / stretch.rated])
         self._stream.send_columns(f"{ORIGIN}/{name}", index, value)
