@@ -31,6 +31,7 @@ from legbench.modes.hop import (
     FixedPoint,
     apex_of,
     derivative,
+    differences,
     fixed_point,
     return_map,
     settle,
@@ -84,6 +85,33 @@ def test_the_periodic_hop_repeats_and_draws_its_neighbours(
     apexes = settle(leg, law, Apex.of(point.apex.vector() + 10.0 * away), 20)
     gaps = [np.max(np.abs(apex.vector() - point.apex.vector())) for apex in apexes]
     assert gaps[20] < 0.05 * gaps[0]
+
+
+def test_the_derivative_of_the_map_is_its_differences(
+    leg: TaylorLeg, law: JumpLaw, point: FixedPoint
+) -> None:
+    exact = derivative(leg, law, point.apex)
+    assert np.allclose(exact, differences(leg, law, point.apex), rtol=0.0, atol=1e-6)
+    aside = Apex.of(point.apex.vector() + 0.1 * UNITS)
+    assert np.allclose(
+        derivative(leg, law, aside), differences(leg, law, aside), rtol=0.0, atol=1e-6
+    )
+
+
+def test_a_hop_keeps_three_numbers_of_six(point: FixedPoint) -> None:
+    sizes = np.abs(point.multipliers)
+    assert np.all(sizes[:3] > 0.1)
+    # The standing leg has four numbers, and lift-off is one condition on them. Differences leave
+    # 1e-9 of the other three.
+    assert np.all(sizes[3:] < 1e-12)
+
+
+def test_the_derivative_of_a_passive_hop_with_impact_is_its_differences(exact: TaylorLeg) -> None:
+    q = HELD.motor
+    base = exact.model.mass_centre_from_hip(q)[1] - exact.model.foot_from_hip(q)[1]
+    start = Apex(height=base + 0.05, speed=0.1, z1=0.05, z2=0.6, dz1=0.2, dz2=0.5)
+    slope = derivative(exact, HELD, start)
+    assert np.allclose(slope, differences(exact, HELD, start), rtol=1e-5, atol=1e-5)
 
 
 def test_the_sampled_controller_hops_as_its_continuous_limit(point: FixedPoint) -> None:

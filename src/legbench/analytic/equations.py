@@ -4,6 +4,9 @@ Every function takes its elementary functions from `ops` and its angles one by o
 lines run on floats (`SCALAR`), on batches of any shape (`ARRAY`), on complex numbers for exact
 derivatives (`COMPLEX`), and on the expressions from which `taylor` compiles its integrators.
 A pair is `(component 1, component 2)` or `(forward, up)`.
+
+Constants stand outside the products of what moves: `h (s a)`, not `h s a`. The compiler then sees
+that several equations share a product, and products are what a Taylor series costs.
 """
 
 import cmath
@@ -47,20 +50,21 @@ def damped(torque: Pair, damping: Pair, v: Pair) -> Pair:
 
 def pair_bias(ops: Ops, terms: PairTerms, q: Pair, v: Pair) -> Pair:
     """`C(q, qdot) qdot + g(q)` of Appendix I [N m]."""
-    swirl = terms.coupling * ops.sin(q[0] - q[1])
+    swirl = ops.sin(q[0] - q[1])
     return (
-        swirl * v[1] * v[1] + terms.moment[0] * ops.sin(q[0]),
-        -swirl * v[0] * v[0] + terms.moment[1] * ops.sin(q[1]),
+        terms.coupling * (swirl * (v[1] * v[1])) + terms.moment[0] * ops.sin(q[0]),
+        -terms.coupling * (swirl * (v[0] * v[0])) + terms.moment[1] * ops.sin(q[1]),
     )
 
 
 def pair_solve(ops: Ops, terms: PairTerms, q: Pair, right: Pair) -> Pair:
     """`M(q)^-1 right` for the inertia matrix of Appendix I, by Cramer's rule."""
-    mixed = terms.coupling * ops.cos(q[0] - q[1])
-    determinant = terms.inertia[0] * terms.inertia[1] - mixed * mixed
+    (i1, i2), mixed = terms.inertia, terms.coupling
+    cosine = ops.cos(q[0] - q[1])
+    determinant = i1 * i2 - mixed * mixed * (cosine * cosine)
     return (
-        (terms.inertia[1] * right[0] - mixed * right[1]) / determinant,
-        (terms.inertia[0] * right[1] - mixed * right[0]) / determinant,
+        (i2 * right[0] - mixed * (cosine * right[1])) / determinant,
+        (i1 * right[1] - mixed * (cosine * right[0])) / determinant,
     )
 
 
@@ -105,10 +109,13 @@ def sweep_rate(ops: Ops, q: Pair, v: Pair, along: Pair) -> Pair:
 
 
 def sweep_acceleration(ops: Ops, q: Pair, v: Pair, a: Pair, along: Pair) -> Pair:
-    """Second time derivative of `sweep`: `dir'' = -dir`."""
-    turning = sweep_rate(ops, q, a, along)
-    centripetal = sweep(ops, q, (along[0] * v[0] * v[0], along[1] * v[1] * v[1]))
-    return turning[0] - centripetal[0], turning[1] - centripetal[1]
+    """Second time derivative of `sweep`: `dir'(q_i) a_i - dir(q_i) v_i^2`."""
+    s1, c1, s2, c2 = ops.sin(q[0]), ops.cos(q[0]), ops.sin(q[1]), ops.cos(q[1])
+    square_1, square_2 = v[0] * v[0], v[1] * v[1]
+    return (
+        along[0] * (c1 * a[0] - s1 * square_1) + along[1] * (c2 * a[1] - s2 * square_2),
+        along[0] * (s1 * a[0] + c1 * square_1) + along[1] * (s2 * a[1] + c2 * square_2),
+    )
 
 
 def flight_acceleration(

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.integrate import OdeSolver
 from scipy.optimize import root_scalar
 
-from legbench.analytic.equations import SCALAR, Pair, touchdown_rates
+from legbench.analytic.equations import Pair, touchdown_rates
 from legbench.analytic.model import LegModel
 from legbench.analytic.smooth import Accuracy, Rates, steps
 from legbench.analytic.state import LegState, Regime, Transition
@@ -103,18 +103,27 @@ def hold(model: LegModel, motor: Pair, q: Pair, v: Pair) -> float:
 
 def overdue(model: LegModel, state: LegState, motor: Pair) -> bool:
     """Whether a leg cannot stay in its regime: a new command, or an event nobody looked for."""
+    q, v = state.q, state.v
     if state.regime is Regime.STANCE:
-        return hold(model, motor, state.q, state.v) < 0.0
-    height = state.trunk_pos[1] + model.foot_from_hip(state.q)[1]
-    falling = state.trunk_vel[1] + model.foot_vel_from_hip(state.q, state.v)[1]
-    return height <= 0.0 and falling < 0.0
+        return model.stance_force(motor, q, v)[1] < 0.0 < model.released_rise(motor, q, v)
+    if state.trunk_pos[1] + model.foot_from_hip(q)[1] > 0.0:
+        return False
+    return state.trunk_vel[1] + model.foot_vel_from_hip(q, v)[1] < 0.0
 
 
 def switch(model: LegModel, state: LegState) -> LegState:
     """The leg on the other side of its event."""
-    if state.regime is Regime.STANCE:
-        return replace(state, regime=Regime.FLIGHT, since=state.time)
-    return land(model, state)
+    if state.regime is not Regime.STANCE:
+        return land(model, state)
+    return LegState(
+        time=state.time,
+        regime=Regime.FLIGHT,
+        q=state.q,
+        v=state.v,
+        trunk_pos=state.trunk_pos,
+        trunk_vel=state.trunk_vel,
+        since=state.time,
+    )
 
 
 def land(model: LegModel, state: LegState) -> LegState:
@@ -122,12 +131,14 @@ def land(model: LegModel, state: LegState) -> LegState:
     q, v = state.q, state.v
     relative = model.foot_vel_from_hip(q, v)
     foot_vel = state.trunk_vel[0] + relative[0], state.trunk_vel[1] + relative[1]
-    after = touchdown_rates(SCALAR, model.stance, model.floating, q, v, foot_vel)
+    after = touchdown_rates(model.ops, model.stance, model.floating, q, v, foot_vel)
     relative = model.foot_vel_from_hip(q, after)
-    return replace(
-        state,
+    return LegState(
+        time=state.time,
         regime=Regime.STANCE,
+        q=q,
         v=after,
+        trunk_pos=state.trunk_pos,
         trunk_vel=(-relative[0], -relative[1]),
         since=state.time,
     )

@@ -48,6 +48,8 @@ class LegModel:
     """[N m s/rad]"""
     stops: tuple[Stop, ...]
     """Empty: joints turn freely, through the straight leg too."""
+    ops: Ops = SCALAR
+    """The kind of numbers that the methods work on."""
 
     @classmethod
     def of(
@@ -85,52 +87,52 @@ class LegModel:
 
     def stance_acceleration(self, motor: Pair, q: Pair, v: Pair) -> Pair:
         """Of q1 and q2 while the foot stands [rad/s^2]."""
-        return pair_acceleration(SCALAR, self.stance, q, v, self.torque(motor, q, v))
+        return pair_acceleration(self.ops, self.stance, q, v, self.torque(motor, q, v))
 
     def hanging_acceleration(self, motor: Pair, q: Pair, v: Pair) -> Pair:
         """Of q1 and q2 while the trunk is held [rad/s^2]."""
-        return pair_acceleration(SCALAR, self.hanging, q, v, self.torque(motor, q, v))
+        return pair_acceleration(self.ops, self.hanging, q, v, self.torque(motor, q, v))
 
     def flight_acceleration(self, motor: Pair, q: Pair, v: Pair) -> tuple[Pair, Pair]:
         """Of trunk [m/s^2] and of q1, q2 [rad/s^2] while nothing touches the ground."""
         torque = self.torque(motor, q, v)
-        return flight_acceleration(SCALAR, self.floating, self.falling, q, v, torque)
+        return flight_acceleration(self.ops, self.floating, self.falling, q, v, torque)
 
     def stance_force(self, motor: Pair, q: Pair, v: Pair) -> Pair:
         """Ground on foot (forward, up) while the foot stands [N]."""
         a = self.stance_acceleration(motor, q, v)
-        return contact_force(SCALAR, self.floating, q, v, a)
+        return contact_force(self.ops, self.floating, q, v, a)
 
     def released_rise(self, motor: Pair, q: Pair, v: Pair) -> float:
         """Upward acceleration that the standing foot would have if it were let go [m/s^2]."""
         torque = self.torque(motor, q, v)
-        return free_foot_acceleration(SCALAR, self.floating, self.falling, q, v, torque)[1]
+        return free_foot_acceleration(self.ops, self.floating, self.falling, q, v, torque)[1]
 
-    def foot_from_hip(self, q: Pair, ops: Ops = SCALAR) -> Pair:
+    def foot_from_hip(self, q: Pair) -> Pair:
         """Foot tip seen from the hip (forward, up) [m]."""
-        return sweep(ops, q, (self.floating.reach, self.floating.reach))
+        return sweep(self.ops, q, (self.floating.reach, self.floating.reach))
 
-    def foot_vel_from_hip(self, q: Pair, v: Pair, ops: Ops = SCALAR) -> Pair:
+    def foot_vel_from_hip(self, q: Pair, v: Pair) -> Pair:
         """Velocity of the foot tip seen from the hip [m/s]."""
-        return sweep_rate(ops, q, v, (self.floating.reach, self.floating.reach))
+        return sweep_rate(self.ops, q, v, (self.floating.reach, self.floating.reach))
 
-    def mass_centre_from_hip(self, q: Pair, ops: Ops = SCALAR) -> Pair:
+    def mass_centre_from_hip(self, q: Pair) -> Pair:
         """Centre of mass seen from the hip [m]."""
-        moved = sweep(ops, q, self.floating.first)
+        moved = sweep(self.ops, q, self.floating.first)
         return moved[0] / self.floating.mass, moved[1] / self.floating.mass
 
-    def mass_centre_vel_from_hip(self, q: Pair, v: Pair, ops: Ops = SCALAR) -> Pair:
+    def mass_centre_vel_from_hip(self, q: Pair, v: Pair) -> Pair:
         """Velocity of the centre of mass seen from the hip [m/s]."""
-        moved = sweep_rate(ops, q, v, self.floating.first)
+        moved = sweep_rate(self.ops, q, v, self.floating.first)
         return moved[0] / self.floating.mass, moved[1] / self.floating.mass
 
     def spring_energy(self, motor: Pair, q: Pair) -> Term:
         """Stored in the series springs [J]."""
         return spring_energy(self.stiffness, motor, q)
 
-    def pair_energy(self, terms: PairTerms, q: Pair, v: Pair, ops: Ops = SCALAR) -> Pair:
+    def pair_energy(self, terms: PairTerms, q: Pair, v: Pair) -> Pair:
         """Gravity's potential and kinetic energy of a leg whose foot or trunk is held [J]."""
-        return pair_potential(ops, terms, q), pair_kinetic(ops, terms, q, v)
+        return pair_potential(self.ops, terms, q), pair_kinetic(self.ops, terms, q, v)
 
     def floating_energy(self, height: Term, hip_vel: Pair, q: Pair, v: Pair) -> Pair:
         """Potential over the ground and kinetic energy of the free leg, hip at `height` [J].
@@ -142,5 +144,5 @@ class LegModel:
         inner = self.mass_centre_vel_from_hip(q, v)
         moved = hip_vel[0] + inner[0], hip_vel[1] + inner[1]
         kinetic = 0.5 * mass * (moved[0] * moved[0] + moved[1] * moved[1])
-        kinetic += pair_kinetic(SCALAR, self.falling, q, v)
+        kinetic += pair_kinetic(self.ops, self.falling, q, v)
         return mass * self.floating.gravity * (height + centre[1]), kinetic

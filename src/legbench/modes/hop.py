@@ -11,6 +11,7 @@ from enum import StrEnum
 
 import numpy as np
 
+from legbench.analytic.dual import gradient, seeds
 from legbench.analytic.equations import Pair
 from legbench.analytic.hybrid import switch
 from legbench.analytic.model import LegModel
@@ -208,14 +209,34 @@ class FixedPoint:
         return abs(self.multipliers[0]) < 1.0
 
 
-DIFFERENCE = 1e-6
-"""Of the central differences, times the unit of each number."""
 UNITS = np.array([0.01, 0.1, 0.1, 0.1, 1.0, 1.0])
 """Sizes that count as large: [m, m/s, rad, rad, rad/s, rad/s]."""
+DIFFERENCE = 1e-6
+"""Of central differences, times the unit of each number."""
+
+Derivative = Callable[[TaylorLeg, AbstractDrive, Apex], Floats]
+"""Of the map at an apex (6, 6), in `UNITS`."""
 
 
 def derivative(leg: TaylorLeg, drive: AbstractDrive, at: Apex) -> Floats:
-    """Of the map, by central differences on the fast path (6, 6), in `UNITS`.
+    """Of the map, exact, from the variational equations (6, 6), in `UNITS`.
+
+    The hop is followed on dual numbers; the drive must make its levels and alarms of what it is
+    told by sums and products. Not for a touchdown without speed, where the map is not smooth.
+
+    Raises:
+        ConfigError: the hop does not return to an apex.
+    """
+    start = Apex(**dict(zip(NAMES, seeds(at.vector()), strict=True)))
+    done = return_map(leg.varied, drive, start)
+    if done.after is None:
+        raise _lost(at, done)
+    rows = [gradient(getattr(done.after, name)) for name in NAMES]
+    return np.stack(rows) * UNITS / UNITS[:, np.newaxis]
+
+
+def differences(leg: TaylorLeg, drive: AbstractDrive, at: Apex) -> Floats:
+    """The same by central differences, which are defined where the map is not smooth, too.
 
     Raises:
         ConfigError: a neighbour does not return to an apex.
@@ -234,11 +255,17 @@ def derivative(leg: TaylorLeg, drive: AbstractDrive, at: Apex) -> Floats:
 def _mapped(leg: TaylorLeg, drive: AbstractDrive, at: Apex) -> Floats:
     done = return_map(leg, drive, at)
     if done.after is None:
-        raise ConfigError(f"the hop from {at} does not return: it ended as '{done.ending}'")
+        raise _lost(at, done)
     return done.after.vector()
 
 
-def fixed_point(leg: TaylorLeg, drive: AbstractDrive, guess: Apex) -> FixedPoint:
+def _lost(at: Apex, done: Hop) -> ConfigError:
+    return ConfigError(f"the hop from {at} does not return: it ended as '{done.ending}'")
+
+
+def fixed_point(
+    leg: TaylorLeg, drive: AbstractDrive, guess: Apex, slope_of: Derivative = derivative
+) -> FixedPoint:
     """Newton's method on the return map, with least squares where the map is neutral.
 
     Raises:
@@ -249,7 +276,7 @@ def fixed_point(leg: TaylorLeg, drive: AbstractDrive, guess: Apex) -> FixedPoint
     for _ in range(25):
         if np.max(np.abs(wrong / UNITS)) < 1e-10:
             break
-        slope = derivative(leg, drive, Apex.of(at)) - np.eye(6)
+        slope = slope_of(leg, drive, Apex.of(at)) - np.eye(6)
         change = np.linalg.lstsq(slope, wrong / UNITS, rcond=1e-7)[0] * UNITS
         share = min(1.0, 0.5 / float(np.max(np.abs(change / UNITS)) + 1e-300))
         at = at - share * change
@@ -261,7 +288,7 @@ def fixed_point(leg: TaylorLeg, drive: AbstractDrive, guess: Apex) -> FixedPoint
             f"{residual:.2g}; start it from a hop that is closer to one"
         )
     apex = Apex.of(at)
-    values = np.linalg.eigvals(derivative(leg, drive, apex))
+    values = np.linalg.eigvals(slope_of(leg, drive, apex))
     values = values[np.argsort(-np.abs(values))]
     return FixedPoint(
         apex=apex,

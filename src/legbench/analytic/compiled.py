@@ -1,0 +1,261 @@
+"""The equations of one regime as a Taylor integrator with events.
+
+The state is (q1, q2, v1, v2) in every regime: the leg turns about a point that does not depend on
+its angles, the centre of mass on its parabola in flight, the foot in stance, the held trunk.
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any, final
+
+from legbench.analytic._heyoka import SYMBOLS
+from legbench.analytic._heyoka import heyoka as hy
+from legbench.analytic.dual import DUAL
+from legbench.analytic.equations import (
+    Pair,
+    contact_force,
+    free_foot_acceleration,
+    pair_acceleration,
+    sweep,
+    sweep_rate,
+)
+from legbench.analytic.model import LegModel
+from legbench.analytic.state import LegState, Regime
+from legbench.analytic.variation import Variation
+from legbench.errors import PlantFault
+
+RISING, FALLING = hy.event_direction.positive, hy.event_direction.negative
+EITHER = hy.event_direction.any
+TIME_LIMIT = int(hy.taylor_outcome.time_limit)
+NEVER = 1e6
+"""A level that no probe reaches [rad]."""
+COOLDOWN = 1e-8
+"""For which an event does not repeat itself; long against rounding, short against a leg [s]."""
+TIE = 1e-6
+"""On the radial mode force and released acceleration vanish together, up to rounding [m/s^2, N]."""
+AT_STOP = 1e-12
+"""Depth that may be rounding: the speed then says whether the stop is touched [rad]."""
+MAX_EVENTS = 10_000
+"""That one go may step over [-]."""
+MAX_STEPS = 100_000
+"""In one go: a leg takes a hundred a second, one that runs away any number [-]."""
+MOTOR, FALL, UPPER, LOWER, TURNS, STOPS = 0, 2, 4, 5, 6, 7
+"""Places of the parameters: two motor positions, height and rise of the falling centre of mass,
+two levels, whether turning counts (of a leg at rest the probe would turn all the time), a switch
+for each stop."""
+FORCE = 0
+"""Place of the event that the contact force vanishes, first of the two conditions of lift-off."""
+
+
+class Watched(IntEnum):
+    """What can end an integration."""
+
+    CONTACT = 0
+    """Touchdown or lift-off."""
+    RISE = 1
+    """The probe rises through the upper level."""
+    FALL = 2
+    """The probe falls through the lower level."""
+    TURN = 3
+    """The probe turns round."""
+    STOP = 4
+    """A joint meets or leaves a stop; taken care of within."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Levels:
+    """At which values of the probe to stop [rad]; and whether where it turns."""
+
+    upper: float = NEVER
+    lower: float = -NEVER
+    turns: bool = False
+
+
+SILENT = Levels()
+
+
+@final
+class Compiled:
+    """The integrator of one regime, and what its events mean."""
+
+    def __init__(
+        self, model: LegModel, regime: Regime, probe: Pair | None, tolerance: float
+    ) -> None:
+        self._model, self._regime = model, regime
+        self._along, self._falls = _steady_point(model, regime)
+        self._last: LegState | None = None
+        self._motor: Pair = (0.0, 0.0)
+        self._began, self._point, self._drift = 0.0, (0.0, 0.0), (0.0, 0.0)
+        self._until, self._event = 0.0, None
+        q, v = hy.make_vars("q1", "q2"), hy.make_vars("v1", "v2")
+        a, ground = _equations(model, regime, q, v)
+        system = [(q[0], v[0]), (q[1], v[1]), (v[0], a[0]), (v[1], a[1])]
+        events = [
+            *ground,
+            *(() if probe is None else _probed(probe, q, v)),
+            *((Watched.STOP, stop.depth(q), EITHER) for stop in model.stops),
+        ]
+        self._events = [kind for kind, _, _ in events]
+        varied = model.ops is DUAL
+        self.integrator: Any = hy.taylor_adaptive(
+            hy.var_ode_sys(system, hy.var_args.vars) if varied else system,
+            [0.0] * len(system),
+            t_events=[
+                hy.t_event(value, direction=direction, cooldown=COOLDOWN)
+                for _, value, direction in events
+            ],
+            tol=tolerance,
+            fast_math=True,  # a third faster, and no digit of the result the worse
+            compact_mode=varied,  # five times slower, but compiled in a second instead of ten
+        )
+        pars = int(self.integrator.pars.size)
+        self._settable = min(STOPS, pars)  # no levels if nobody looks
+        self._variation: Variation | None = None
+        if varied:
+            values = [value for _, value, _ in events]
+            self._variation = Variation(self.integrator, system, values, pars)
+
+    def load(self, state: LegState) -> None:
+        """Start from a state, or go on where the integrator stopped if it is that state."""
+        integrator, model = self.integrator, self._model
+        if state is not self._last:
+            integrator.state[:4] = (*state.q, *state.v)
+            if self._events:
+                integrator.reset_cooldowns()
+            for index, stop in enumerate(model.stops):
+                depth = stop.depth(state.q)
+                touched = depth > AT_STOP or (depth > -AT_STOP and stop.speed(state.v) > 0.0)
+                integrator.pars[STOPS + index] = float(touched)
+        elif self._variation is None:
+            return
+        integrator.time = 0.0
+        self._began = state.time
+        x, z = sweep(model.ops, state.q, self._along)
+        self._point = state.trunk_pos[0] + x, state.trunk_pos[1] + z
+        if self._falls:
+            x, z = sweep_rate(model.ops, state.q, state.v, self._along)
+            self._drift = state.trunk_vel[0] + x, state.trunk_vel[1] + z
+        if self._variation is not None:
+            self._variation.begin([*state.q, *state.v])
+
+    def set(self, motor: Pair, levels: Levels) -> None:
+        """Hold the motors, lay the levels."""
+        rise = (self._point[1], self._drift[1])
+        values = (*motor, *rise, levels.upper, levels.lower, float(levels.turns))
+        self._motor = motor
+        self.integrator.pars[: self._settable] = values[: self._settable]
+        if self._variation is not None:
+            self._variation.set(list(values[: self._settable]))
+
+    def go(self, until: float, *, contact: bool) -> Watched | None:
+        """Integrate to `until` or to the next event that matters."""
+        integrator = self.integrator
+        self._until, self._event = until - self._began, None
+        end = float(self._until)
+        for _ in range(MAX_EVENTS):
+            outcome = int(integrator.propagate_until(end, max_steps=MAX_STEPS)[0])
+            if outcome == TIME_LIMIT:
+                return None
+            event = -outcome - 1
+            if not 0 <= event < len(self._events):
+                break
+            what = self._events[event]
+            if what is Watched.STOP:
+                self._switch_stop(event - self._events.index(Watched.STOP))
+            elif what is not Watched.CONTACT or (contact and self._lets_go(event)):
+                self._event = event
+                return what
+        raise PlantFault(
+            "integration failed",
+            f"integration failed at t = {self._began + integrator.time:.6f} s: the state runs away "
+            "or chatters",
+        )
+
+    def _lets_go(self, event: int) -> bool:
+        """Whether the event of one condition of lift-off finds the other one fulfilled."""
+        if self._regime is not Regime.STANCE:
+            return True
+        q1, q2, v1, v2 = self.integrator.state[:4].tolist()
+        if event == FORCE:
+            return self._model.released_rise(self._motor, (q1, q2), (v1, v2)) > -TIE
+        return self._model.stance_force(self._motor, (q1, q2), (v1, v2))[1] < TIE
+
+    def _switch_stop(self, index: int) -> None:
+        v1, v2 = self.integrator.state[2:4].tolist()
+        entering = self._model.stops[index].speed((v1, v2)) > 0.0
+        self.integrator.pars[STOPS + index] = float(entering)
+
+    def read(self, state: LegState) -> LegState:
+        """The state reached, with what the regime of `state` does not change."""
+        if self._variation is None:
+            elapsed = float(self.integrator.time)
+            q1, q2, v1, v2 = self.integrator.state.tolist()
+        else:
+            elapsed, (q1, q2, v1, v2) = self._variation.end(self._until, self._event)
+        q, v = (q1, q2), (v1, v2)
+        (x, z), (dx, dz) = self._point, self._drift
+        if self._falls:
+            fallen = self._falls * elapsed
+            x, z = x + dx * elapsed, z + (dz - 0.5 * fallen) * elapsed
+            dz = dz - fallen
+        ops, along = self._model.ops, self._along
+        inner, inner_vel = sweep(ops, q, along), sweep_rate(ops, q, v, along)
+        self._last = LegState(
+            time=self._began + elapsed,
+            regime=state.regime,
+            q=q,
+            v=v,
+            trunk_pos=(x - inner[0], z - inner[1]),
+            trunk_vel=(dx - inner_vel[0], dz - inner_vel[1]),
+            since=state.since,
+        )
+        return self._last
+
+
+def _steady_point(model: LegModel, regime: Regime) -> tuple[Pair, float]:
+    """Where it lies along the angles, seen from the hip [m], and how fast it falls [m/s^2]."""
+    match regime:
+        case Regime.FLIGHT:
+            mass, first = model.floating.mass, model.floating.first
+            return (first[0] / mass, first[1] / mass), model.floating.gravity
+        case Regime.STANCE:
+            return (model.floating.reach, model.floating.reach), 0.0
+        case _:
+            return (0.0, 0.0), 0.0
+
+
+def _equations(model: LegModel, regime: Regime, q: Any, v: Any) -> tuple[Pair, list[Any]]:
+    """Accelerations of the angles, and the contact's events.
+
+    Lift-off has two conditions, and the event of either may come last (see `hybrid`).
+    """
+    torque = model.smooth_torque((hy.par[MOTOR], hy.par[MOTOR + 1]), q, v)
+    for index, stop in enumerate(model.stops):
+        push = stop.torque(hy.par[STOPS + index] * stop.force(SYMBOLS, q, v))
+        torque = torque[0] + push[0], torque[1] + push[1]
+    floating, falling = model.floating, model.falling
+    match regime:
+        case Regime.FLIGHT:
+            (first, second), gravity = _steady_point(model, regime)
+            foot = sweep(SYMBOLS, q, (floating.reach - first, floating.reach - second))[1]
+            fallen = hy.par[FALL + 1] * hy.time - 0.5 * gravity * (hy.time * hy.time)
+            height = hy.par[FALL] + fallen + foot
+            a = pair_acceleration(SYMBOLS, falling, q, v, torque)
+            return a, [(Watched.CONTACT, height, FALLING)]
+        case Regime.STANCE:
+            a = pair_acceleration(SYMBOLS, model.stance, q, v, torque)
+            force = contact_force(SYMBOLS, floating, q, v, a)[1]
+            released = free_foot_acceleration(SYMBOLS, floating, falling, q, v, torque)[1]
+            return a, [(Watched.CONTACT, force, FALLING), (Watched.CONTACT, released, RISING)]
+        case _:
+            return pair_acceleration(SYMBOLS, model.hanging, q, v, torque), []
+
+
+def _probed(probe: Pair, q: Any, v: Any) -> list[Any]:
+    reading, rate = (probe[0] * x[0] + probe[1] * x[1] for x in (q, v))
+    turning = hy.par[TURNS] * rate + (1.0 - hy.par[TURNS])
+    return [
+        (Watched.RISE, reading - hy.par[UPPER], RISING),
+        (Watched.FALL, reading - hy.par[LOWER], FALLING),
+        (Watched.TURN, turning, EITHER),
+    ]
