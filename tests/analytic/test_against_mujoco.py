@@ -62,6 +62,18 @@ def test_reduced_linkage_converges_to_the_equations(kind: SetupKind) -> None:
     assert slope(STEPS, errors) > 1.9
 
 
+@pytest.mark.parametrize(("kind", "bound"), [("hfts", 6e-4), ("vfts", 6e-4), ("ffs", 4e-3)])
+def test_a_knee_swings_into_the_same_stop(kind: str, bound: float) -> None:
+    """But for the inertia in the impedance: the simulator takes that of a reference posture."""
+    setup, posture = Setup(kind=SetupKind(kind)), np.array([-0.32, 0.32])
+    start = Start(joint_pos=posture, motor_pos=motor_holding(DESIGN, posture, setup.support))
+    motor = motor_holding(DESIGN, np.array([-0.13, 0.11]), setup.support)
+    wanted = rollout(AnalyticPlant(DESIGN, setup, start, accuracy=FINE), motor)
+    assert np.min(wanted[:, 1] - wanted[:, 0]) < DESIGN.limits.knee[0] - 0.08
+    reduced = Linkage(kind=LinkageKind.REDUCED)
+    assert np.max(np.abs(rollout(simulated(setup, start, reduced, 2.5e-4), motor) - wanted)) < bound
+
+
 @pytest.mark.parametrize("kind", FIXED)
 def test_bars_converge_to_the_equations_as_their_mass_vanishes(kind: SetupKind) -> None:
     setup, start, motor = case(kind)

@@ -118,14 +118,36 @@ def test_order_of_convergence(
 def test_stops_hold_the_knee_and_take_its_energy() -> None:
     leg = load_design(MODELS / "prototype.toml")
     model = LegModel.of(leg, undamped=True)
-    start = flying(model, (-0.4, 0.4), (20.0, -20.0), (0.0, 2.0), (0.0, 0.0))
+    start = flying(model, (-0.4, 0.4), (5.0, -5.0), (0.0, 2.0), (0.0, 0.0))
     hybrid, state, deepest = HybridLeg(model), start, 1.0
-    first = energy(model, start, (-0.4, 0.4))
+    left = [energy(model, start, (-0.2, 0.2))]
     for tick in range(1, 61):
-        state, _ = hybrid.advance(state, 0.001 * tick, (-0.4, 0.4))
+        state, _ = hybrid.advance(state, 0.001 * tick, (-0.2, 0.2))
         deepest = min(deepest, state.q[1] - state.q[0])
-    assert 0.2 < deepest < leg.limits.knee[0]
-    assert energy(model, state, (-0.4, 0.4)) < first - 0.03
+        left.append(energy(model, state, (-0.2, 0.2)))
+    assert 0.05 < deepest < leg.limits.knee[0]
+    assert np.max(np.diff(left)) < 1e-9
+    assert left[-1] < left[0] - 0.03
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3])
+def test_a_stopped_joint_comes_back_at_the_acceleration_that_the_law_gives(angle: float) -> None:
+    """`(1 - d) a0 + d (b dp/dt + k p)`, and never a pull."""
+    leg = load_design(MODELS / "prototype.toml")
+    model, free = LegModel.of(leg), LegModel.of(leg, stops=False)
+    rng = np.random.default_rng(9)
+    acting = 0
+    for _ in range(200):
+        half = 0.5 * (leg.limits.knee[0] - rng.uniform(0.0, 0.2))
+        q, v = (angle - half, angle + half), tuple(rng.uniform(-5.0, 5.0, 2).tolist())
+        motor = tuple(rng.uniform(-1.0, 1.0, 2).tolist())
+        depth, speed = leg.limits.knee[0] - 2.0 * half, v[0] - v[1]
+        a1, a2 = model.hanging_acceleration(motor, q, v)
+        b1, b2 = free.hanging_acceleration(motor, q, v)
+        wanted = 0.05 * (b2 - b1) + 2.0 * speed / 0.02 + depth / 0.02**2
+        assert a2 - a1 == pytest.approx(max(wanted, b2 - b1), rel=1e-9)
+        acting += wanted > b2 - b1
+    assert 50 < acting < 190
 
 
 def test_a_runaway_is_a_fault_and_not_a_traceback() -> None:

@@ -73,7 +73,7 @@ def test_variational_equations_are_complex_steps_through_the_flow(
 
     def rates(_time: float, y: Floats) -> list[complex]:
         q1, q2, v1, v2 = y.tolist()
-        torque = EXACT.smooth_torque(MOTOR, (q1, q2), (v1, v2))
+        torque = EXACT.torque(MOTOR, (q1, q2), (v1, v2))
         a = equations.pair_acceleration(equations.COMPLEX, terms, (q1, q2), (v1, v2), torque)
         return [v1, v2, *a]
 

@@ -4,6 +4,7 @@ The state is (q1, q2, v1, v2) in every regime: the leg turns about a point that 
 its angles, the centre of mass on its parabola in flight, the foot in stance, the held trunk.
 """
 
+import math
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any, final
@@ -16,11 +17,13 @@ from legbench.analytic.equations import (
     contact_force,
     free_foot_acceleration,
     pair_acceleration,
+    pair_solve,
     sweep,
     sweep_rate,
 )
 from legbench.analytic.model import LegModel
 from legbench.analytic.state import LegState, Regime
+from legbench.analytic.terms import PairTerms
 from legbench.analytic.variation import Variation
 from legbench.errors import PlantFault
 
@@ -35,14 +38,16 @@ TIE = 1e-6
 """On the radial mode force and released acceleration vanish together, up to rounding [m/s^2, N]."""
 AT_STOP = 1e-12
 """Depth that may be rounding: the speed then says whether the stop is touched [rad]."""
+NOWHERE: Pair = (math.nan, math.nan)
+"""Motors that have yet to be set; equal to none."""
 MAX_EVENTS = 10_000
 """That one go may step over [-]."""
 MAX_STEPS = 100_000
 """In one go: a leg takes a hundred a second, one that runs away any number [-]."""
 MOTOR, FALL, UPPER, LOWER, TURNS, STOPS = 0, 2, 4, 5, 6, 7
 """Places of the parameters: two motor positions, height and rise of the falling centre of mass,
-two levels, whether turning counts (of a leg at rest the probe would turn all the time), a switch
-for each stop."""
+two levels, whether turning counts (of a leg at rest the probe would turn all the time), and for
+each stop whether its joint is beyond the limit and whether it pushes."""
 FORCE = 0
 """Place of the event that the contact force vanishes, first of the two conditions of lift-off."""
 
@@ -59,7 +64,7 @@ class Watched(IntEnum):
     TURN = 3
     """The probe turns round."""
     STOP = 4
-    """A joint meets or leaves a stop; taken care of within."""
+    """A joint meets or leaves a limit, or its stop begins or ends to push."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,18 +88,15 @@ class Compiled:
     ) -> None:
         self._model, self._regime = model, regime
         self._along, self._falls = _steady_point(model, regime)
+        self._terms = _terms(model, regime)
         self._last: LegState | None = None
-        self._motor: Pair = (0.0, 0.0)
+        self._motor = NOWHERE
         self._began, self._point, self._drift = 0.0, (0.0, 0.0), (0.0, 0.0)
         self._until, self._event = 0.0, None
         q, v = hy.make_vars("q1", "q2"), hy.make_vars("v1", "v2")
-        a, ground = _equations(model, regime, q, v)
+        a, ground, stops = _equations(model, regime, q, v)
         system = [(q[0], v[0]), (q[1], v[1]), (v[0], a[0]), (v[1], a[1])]
-        events = [
-            *ground,
-            *(() if probe is None else _probed(probe, q, v)),
-            *((Watched.STOP, stop.depth(q), EITHER) for stop in model.stops),
-        ]
+        events = [*ground, *(() if probe is None else _probed(probe, q, v)), *stops]
         self._events = [kind for kind, _, _ in events]
         varied = model.ops is DUAL
         self.integrator: Any = hy.taylor_adaptive(
@@ -124,8 +126,9 @@ class Compiled:
                 integrator.reset_cooldowns()
             for index, stop in enumerate(model.stops):
                 depth = stop.depth(state.q)
-                touched = depth > AT_STOP or (depth > -AT_STOP and stop.speed(state.v) > 0.0)
-                integrator.pars[STOPS + index] = float(touched)
+                beyond = depth > AT_STOP or (depth > -AT_STOP and stop.speed(state.v) > 0.0)
+                integrator.pars[STOPS + 2 * index] = float(beyond)
+            self._motor = NOWHERE
         elif self._variation is None:
             return
         integrator.time = 0.0
@@ -142,8 +145,10 @@ class Compiled:
         """Hold the motors, lay the levels."""
         rise = (self._point[1], self._drift[1])
         values = (*motor, *rise, levels.upper, levels.lower, float(levels.turns))
-        self._motor = motor
         self.integrator.pars[: self._settable] = values[: self._settable]
+        if motor != self._motor:
+            self._motor = motor
+            self._push()
         if self._variation is not None:
             self._variation.set(list(values[: self._settable]))
 
@@ -160,11 +165,10 @@ class Compiled:
             if not 0 <= event < len(self._events):
                 break
             what = self._events[event]
-            if what is Watched.STOP:
-                self._switch_stop(event - self._events.index(Watched.STOP))
-            elif what is not Watched.CONTACT or (contact and self._lets_go(event)):
-                self._event = event
-                return what
+            if what is Watched.CONTACT and not (contact and self._lets_go(event)):
+                continue
+            self._event = event
+            return what
         raise PlantFault(
             "integration failed",
             f"integration failed at t = {self._began + integrator.time:.6f} s: the state runs away "
@@ -180,10 +184,29 @@ class Compiled:
             return self._model.released_rise(self._motor, (q1, q2), (v1, v2)) > -TIE
         return self._model.stance_force(self._motor, (q1, q2), (v1, v2))[1] < TIE
 
-    def _switch_stop(self, index: int) -> None:
+    def switch_stop(self) -> None:
+        """Let the stop act whose event has just ended the integration."""
+        if self._event is None or self._events[self._event] is not Watched.STOP:
+            return
+        index, pushing = divmod(self._event - self._events.index(Watched.STOP), 2)
+        place = STOPS + 2 * index
+        if pushing:
+            self.integrator.pars[place + 1] = 1.0 - self.integrator.pars[place + 1]
+            return
         v1, v2 = self.integrator.state[2:4].tolist()
-        entering = self._model.stops[index].speed((v1, v2)) > 0.0
-        self.integrator.pars[STOPS + index] = float(entering)
+        self.integrator.pars[place] = float(self._model.stops[index].speed((v1, v2)) > 0.0)
+        self._push()
+
+    def _push(self) -> None:
+        """Let those stops push of which the law asks it."""
+        pars = self.integrator.pars
+        beyond = (pars[STOPS::2] > 0.0).tolist()
+        if any(beyond):
+            q1, q2, v1, v2 = self.integrator.state[:4].tolist()
+            forces, _ = self._model.pushed(self._terms, self._motor, (q1, q2), (v1, v2), beyond)
+            pars[STOPS + 1 :: 2] = [float(force > 0.0) for force in forces]
+        else:
+            pars[STOPS + 1 :: 2] = 0.0
 
     def read(self, state: LegState) -> LegState:
         """The state reached, with what the regime of `state` does not change."""
@@ -224,31 +247,67 @@ def _steady_point(model: LegModel, regime: Regime) -> tuple[Pair, float]:
             return (0.0, 0.0), 0.0
 
 
-def _equations(model: LegModel, regime: Regime, q: Any, v: Any) -> tuple[Pair, list[Any]]:
-    """Accelerations of the angles, and the contact's events.
+def _terms(model: LegModel, regime: Regime) -> PairTerms:
+    """How the angles turn about the steady point."""
+    match regime:
+        case Regime.FLIGHT:
+            return model.falling
+        case Regime.STANCE:
+            return model.stance
+        case _:
+            return model.hanging
+
+
+def _equations(
+    model: LegModel, regime: Regime, q: Any, v: Any
+) -> tuple[Pair, list[Any], list[Any]]:
+    """Accelerations of the angles, events of the contact, events of the stops.
 
     Lift-off has two conditions, and the event of either may come last (see `hybrid`).
     """
-    torque = model.smooth_torque((hy.par[MOTOR], hy.par[MOTOR + 1]), q, v)
+    torque = model.torque((hy.par[MOTOR], hy.par[MOTOR + 1]), q, v)
+    floating = model.floating
+    a, stops = _stopped(model, _terms(model, regime), q, v, torque)
+    ground: list[Any] = []
+    if regime is Regime.FLIGHT:
+        (first, second), gravity = _steady_point(model, regime)
+        foot = sweep(SYMBOLS, q, (floating.reach - first, floating.reach - second))[1]
+        fallen = hy.par[FALL + 1] * hy.time - 0.5 * gravity * (hy.time * hy.time)
+        ground = [(Watched.CONTACT, hy.par[FALL] + fallen + foot, FALLING)]
+    elif regime is Regime.STANCE:
+        force = contact_force(SYMBOLS, floating, q, v, a)[1]
+        free = _let_go(model, q, v, torque)
+        released = free_foot_acceleration(SYMBOLS, floating, q, v, free)[1]
+        ground = [(Watched.CONTACT, force, FALLING), (Watched.CONTACT, released, RISING)]
+    return a, ground, stops
+
+
+def _stopped(
+    model: LegModel, terms: PairTerms, q: Any, v: Any, torque: Pair
+) -> tuple[Pair, list[Any]]:
+    """Accelerations with the stops that push (`analytic.stops.pushes`), and the stops' events."""
+    a = pair_acceleration(SYMBOLS, terms, q, v, torque)
+    events = []
     for index, stop in enumerate(model.stops):
-        push = stop.torque(hy.par[STOPS + index] * stop.force(SYMBOLS, q, v))
-        torque = torque[0] + push[0], torque[1] + push[1]
-    floating, falling = model.floating, model.falling
-    match regime:
-        case Regime.FLIGHT:
-            (first, second), gravity = _steady_point(model, regime)
-            foot = sweep(SYMBOLS, q, (floating.reach - first, floating.reach - second))[1]
-            fallen = hy.par[FALL + 1] * hy.time - 0.5 * gravity * (hy.time * hy.time)
-            height = hy.par[FALL] + fallen + foot
-            a = pair_acceleration(SYMBOLS, falling, q, v, torque)
-            return a, [(Watched.CONTACT, height, FALLING)]
-        case Regime.STANCE:
-            a = pair_acceleration(SYMBOLS, model.stance, q, v, torque)
-            force = contact_force(SYMBOLS, floating, q, v, a)[1]
-            released = free_foot_acceleration(SYMBOLS, floating, falling, q, v, torque)[1]
-            return a, [(Watched.CONTACT, force, FALLING), (Watched.CONTACT, released, RISING)]
-        case _:
-            return pair_acceleration(SYMBOLS, model.hanging, q, v, torque), []
+        beyond, pushing = (hy.par[STOPS + 2 * index + place] for place in (0, 1))
+        answer = pair_solve(SYMBOLS, terms, q, stop.normal)
+        push = stop.push(q, v, a, answer)
+        a = a[0] + pushing * push * answer[0], a[1] + pushing * push * answer[1]
+        events += [
+            (Watched.STOP, stop.depth(q), EITHER),
+            (Watched.STOP, beyond * push + (1.0 - beyond), EITHER),
+        ]
+    return a, events
+
+
+def _let_go(model: LegModel, q: Any, v: Any, torque: Pair) -> Pair:
+    """Accelerations that the standing leg would have in the air; there other stops may push."""
+    a = pair_acceleration(SYMBOLS, model.falling, q, v, torque)
+    for index, stop in enumerate(model.stops):
+        answer = pair_solve(SYMBOLS, model.falling, q, stop.normal)
+        push = hy.par[STOPS + 2 * index] * hy.relu(stop.push(q, v, a, answer))
+        a = a[0] + push * answer[0], a[1] + push * answer[1]
+    return a
 
 
 def _probed(probe: Pair, q: Any, v: Any) -> list[Any]:

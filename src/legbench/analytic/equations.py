@@ -118,18 +118,14 @@ def sweep_acceleration(ops: Ops, q: Pair, v: Pair, a: Pair, along: Pair) -> Pair
     )
 
 
-def flight_acceleration(
-    ops: Ops, terms: FloatingTerms, falling: PairTerms, q: Pair, v: Pair, torque: Pair
-) -> tuple[Pair, Pair]:
-    """Accelerations of trunk [m/s^2] and angles [rad/s^2] of the floating leg without contact.
+def trunk_acceleration(ops: Ops, terms: FloatingTerms, q: Pair, v: Pair, a: Pair) -> Pair:
+    """Of the trunk while nothing touches the ground (forward, up) [m/s^2].
 
-    The trunk is eliminated: seen from the falling centre of mass the angles move as in eq. (1)
-    without gravity (`falling`), and `m (a_t + g) + d^2/dt^2 sum_i first_i dir(q_i) = 0` gives
-    the trunk.
+    Seen from the falling centre of mass the angles move as in eq. (1) without gravity; their
+    accelerations `a` give the trunk by `m (a_t + g) + d^2/dt^2 sum_i first_i dir(q_i) = 0`.
     """
-    a = pair_acceleration(ops, falling, q, v, torque)
     inner = sweep_acceleration(ops, q, v, a, terms.first)
-    return (-inner[0] / terms.mass, -inner[1] / terms.mass - terms.gravity), a
+    return -inner[0] / terms.mass, -inner[1] / terms.mass - terms.gravity
 
 
 def contact_force(ops: Ops, terms: FloatingTerms, q: Pair, v: Pair, a: Pair) -> Pair:
@@ -141,11 +137,9 @@ def contact_force(ops: Ops, terms: FloatingTerms, q: Pair, v: Pair, a: Pair) -> 
     return inertial[0], inertial[1] + terms.mass * terms.gravity
 
 
-def free_foot_acceleration(
-    ops: Ops, terms: FloatingTerms, falling: PairTerms, q: Pair, v: Pair, torque: Pair
-) -> Pair:
-    """Of the foot tip if nothing held it (forward, up) [m/s^2]."""
-    trunk, a = flight_acceleration(ops, terms, falling, q, v, torque)
+def free_foot_acceleration(ops: Ops, terms: FloatingTerms, q: Pair, v: Pair, a: Pair) -> Pair:
+    """Of the foot tip if nothing held it (forward, up) [m/s^2]; the angles accelerate by `a`."""
+    trunk = trunk_acceleration(ops, terms, q, v, a)
     inner = sweep_acceleration(ops, q, v, a, (terms.reach, terms.reach))
     return trunk[0] + inner[0], trunk[1] + inner[1]
 

@@ -1,5 +1,6 @@
 """A design as the equations see it, under the conditions of a setup."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from legbench.analytic.equations import (
@@ -9,7 +10,6 @@ from legbench.analytic.equations import (
     Term,
     contact_force,
     damped,
-    flight_acceleration,
     free_foot_acceleration,
     pair_acceleration,
     pair_kinetic,
@@ -18,8 +18,9 @@ from legbench.analytic.equations import (
     spring_torque,
     sweep,
     sweep_rate,
+    trunk_acceleration,
 )
-from legbench.analytic.stops import Stop, make_stops, stop_torque
+from legbench.analytic.stops import Stop, make_stops, pushes
 from legbench.analytic.terms import (
     Bars,
     FloatingTerms,
@@ -70,33 +71,39 @@ class LegModel:
             falling=floating.falling(),
             stiffness=design.stiffness,
             damping=(0.0, 0.0) if undamped else design.damping,
-            stops=make_stops(floating, design.limits) if stops else (),
+            stops=make_stops(design.limits) if stops else (),
         )
 
     def torque(self, motor: Pair, q: Pair, v: Pair) -> Pair:
-        """Springs, dampers and touched stops on q1 and q2 of one leg [N m]."""
-        torque = self.smooth_torque(motor, q, v)
-        if not self.stops:
-            return torque
-        stop = stop_torque(self.stops, q, v)
-        return torque[0] + stop[0], torque[1] + stop[1]
-
-    def smooth_torque(self, motor: Pair, q: Pair, v: Pair) -> Pair:
-        """Springs and dampers alone; for every kind of number [N m]."""
+        """Springs and dampers on q1 and q2 [N m]."""
         return damped(spring_torque(self.stiffness, motor, q), self.damping, v)
+
+    def acceleration(self, terms: PairTerms, motor: Pair, q: Pair, v: Pair) -> Pair:
+        """Of q1 and q2 of one leg, turning as `terms` say, joint stops included [rad/s^2]."""
+        beyond = [stop.depth(q) > 0.0 for stop in self.stops]
+        if any(beyond):
+            return self.pushed(terms, motor, q, v, beyond)[1]
+        return pair_acceleration(self.ops, terms, q, v, self.torque(motor, q, v))
+
+    def pushed(
+        self, terms: PairTerms, motor: Pair, q: Pair, v: Pair, beyond: Sequence[bool]
+    ) -> tuple[list[float], Pair]:
+        """Torque of each stop [N m], of those that are touched, and the accelerations it leaves."""
+        a = pair_acceleration(self.ops, terms, q, v, self.torque(motor, q, v))
+        return pushes(self.ops, terms, self.stops, beyond, q, v, a)
 
     def stance_acceleration(self, motor: Pair, q: Pair, v: Pair) -> Pair:
         """Of q1 and q2 while the foot stands [rad/s^2]."""
-        return pair_acceleration(self.ops, self.stance, q, v, self.torque(motor, q, v))
+        return self.acceleration(self.stance, motor, q, v)
 
     def hanging_acceleration(self, motor: Pair, q: Pair, v: Pair) -> Pair:
         """Of q1 and q2 while the trunk is held [rad/s^2]."""
-        return pair_acceleration(self.ops, self.hanging, q, v, self.torque(motor, q, v))
+        return self.acceleration(self.hanging, motor, q, v)
 
     def flight_acceleration(self, motor: Pair, q: Pair, v: Pair) -> tuple[Pair, Pair]:
         """Of trunk [m/s^2] and of q1, q2 [rad/s^2] while nothing touches the ground."""
-        torque = self.torque(motor, q, v)
-        return flight_acceleration(self.ops, self.floating, self.falling, q, v, torque)
+        a = self.acceleration(self.falling, motor, q, v)
+        return trunk_acceleration(self.ops, self.floating, q, v, a), a
 
     def stance_force(self, motor: Pair, q: Pair, v: Pair) -> Pair:
         """Ground on foot (forward, up) while the foot stands [N]."""
@@ -105,8 +112,8 @@ class LegModel:
 
     def released_rise(self, motor: Pair, q: Pair, v: Pair) -> float:
         """Upward acceleration that the standing foot would have if it were let go [m/s^2]."""
-        torque = self.torque(motor, q, v)
-        return free_foot_acceleration(self.ops, self.floating, self.falling, q, v, torque)[1]
+        a = self.acceleration(self.falling, motor, q, v)
+        return free_foot_acceleration(self.ops, self.floating, q, v, a)[1]
 
     def foot_from_hip(self, q: Pair) -> Pair:
         """Foot tip seen from the hip (forward, up) [m]."""

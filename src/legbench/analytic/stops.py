@@ -1,26 +1,30 @@
-"""Joint stops: rubber that pushes back, never pulls.
+"""Joint stops: soft rubber that pushes back, never pulls, by the law of the simulation.
 
-`F = k p (s + sqrt(1 + s^2))` with the depth p and `s = chi dp/dt / 2`: nearly `k p (1 + chi
-dp/dt)` on the way in, as Hunt and Crossley have it, and positive on the way out. Unlike a spring
-beside a damper it starts from zero, so an integrator meets a kink and not a jump. The stiffness
-is that of a 20 ms time constant with the inertia that the knee of the free leg shows at its stop.
+A joint that is `p` beyond its limit and would turn back at the acceleration `a0` if nothing
+stopped it, turns back at `a1 = (1 - d) a0 + d (b dp/dt + k p)`, if that takes a push. With
+`b = 2 / (d T)` and `k = 1 / (d T^2)` the joint returns critically damped with the time constant T
+(MuJoCo's manual, "Solver parameters": solref (T, 1), solimp of one impedance d).
+
+The push begins and ends with a jump, so whoever integrates has to find both ends. Stops that are
+touched together act one after the other, each on the acceleration that the one before has left.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from legbench.analytic.equations import SCALAR, Ops, Pair, Term
-from legbench.analytic.terms import FloatingTerms
+from legbench.analytic.equations import Ops, Pair, Term, pair_solve
+from legbench.analytic.terms import PairTerms
 from legbench.design import Limits
 
 TIME_CONSTANT = 0.02
-"""As that of the simulation's stops [s]."""
-CHI = 1.0
-"""Damping of the rubber [s/rad]."""
+"""[s]"""
+IMPEDANCE = 0.95
+"""Share of the acceleration that is the stop's, not the leg's own [-]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stop:
-    """One end of a joint's range; depth is `sign (side - angle)`, side the limit."""
+    """One end of a joint's range; depth is `sign (limit - angle)`."""
 
     sign: float
     """1 for the lower end, -1 for the upper one."""
@@ -28,8 +32,11 @@ class Stop:
     """[rad]"""
     on: Pair
     """How the joint's angle is made of q1 and q2."""
-    stiffness: float
-    """[N m/rad]"""
+
+    @property
+    def normal(self) -> Pair:
+        """Torque on q1 and q2 of a unit push away from the limit."""
+        return self.sign * self.on[0], self.sign * self.on[1]
 
     def depth(self, q: Pair) -> Term:
         """How far beyond the limit [rad]; negative within the range."""
@@ -39,38 +46,53 @@ class Stop:
         """Rate of the depth [rad/s]."""
         return -self.sign * (self.on[0] * v[0] + self.on[1] * v[1])
 
-    def force(self, ops: Ops, q: Pair, v: Pair) -> Term:
-        """Torque on the joint, away from the limit, if the stop is touched [N m]."""
-        s = 0.5 * CHI * self.speed(v)
-        return self.stiffness * self.depth(q) * (s + ops.sqrt(1.0 + s * s))
+    def push(self, q: Pair, v: Pair, a: Pair, answer: Pair) -> Term:
+        """Torque that the law asks for, of a joint beyond its limit; below zero there is none.
 
-    def torque(self, force: Term) -> Pair:
-        """What a force on the joint is on q1 and q2 [N m]."""
-        return self.sign * self.on[0] * force, self.sign * self.on[1] * force
+        Args:
+            q: angles [rad].
+            v: their rates [rad/s].
+            a: their accelerations without this stop [rad/s^2].
+            answer: `M^-1 normal`, what a unit push adds to them [rad/s^2 / N m].
+        """
+        n1, n2 = self.normal
+        back = 2.0 / TIME_CONSTANT * self.speed(v) + self.depth(q) / TIME_CONSTANT**2
+        return (back - IMPEDANCE * (n1 * a[0] + n2 * a[1])) / (n1 * answer[0] + n2 * answer[1])
 
 
-def make_stops(terms: FloatingTerms, limits: Limits) -> tuple[Stop, ...]:
+def make_stops(limits: Limits) -> tuple[Stop, ...]:
     """Stops of knee and hip, lower and upper end each."""
-    free = terms.falling()
-    determinant = free.inertia[0] * free.inertia[1] - free.coupling**2
-    knee = determinant / (free.inertia[0] + free.inertia[1] + 2.0 * free.coupling)
-    stiffness = abs(knee) / TIME_CONSTANT**2
     joints: tuple[tuple[Pair, tuple[float, float]], ...] = (
         ((-1.0, 1.0), limits.knee),
         ((1.0, 0.0), limits.hip),
     )
     return tuple(
-        Stop(sign=sign, limit=limit, on=on, stiffness=stiffness)
+        Stop(sign=sign, limit=limit, on=on)
         for on, ends in joints
         for sign, limit in zip((1.0, -1.0), ends, strict=True)
     )
 
 
-def stop_torque(stops: tuple[Stop, ...], q: Pair, v: Pair) -> Pair:
-    """Torque of all stops on q1 and q2 of one leg (floats) [N m]."""
-    total = (0.0, 0.0)
-    for stop in stops:
-        if stop.depth(q) > 0.0:
-            torque = stop.torque(stop.force(SCALAR, q, v))
-            total = total[0] + torque[0], total[1] + torque[1]
-    return total
+def pushes(
+    ops: Ops,
+    terms: PairTerms,
+    stops: Sequence[Stop],
+    beyond: Sequence[bool],
+    q: Pair,
+    v: Pair,
+    a: Pair,
+) -> tuple[list[float], Pair]:
+    """Torque of each stop, zero if it does not act [N m]; the accelerations they leave [rad/s^2].
+
+    Of one leg whose angles accelerate by `a` without stops, and of those that its joints are
+    `beyond`.
+    """
+    found = []
+    for stop, past in zip(stops, beyond, strict=True):
+        force = 0.0
+        if past:
+            answer = pair_solve(ops, terms, q, stop.normal)
+            force = max(stop.push(q, v, a, answer), 0.0)
+            a = a[0] + answer[0] * force, a[1] + answer[1] * force
+        found.append(force)
+    return found, a

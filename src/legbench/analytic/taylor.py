@@ -7,14 +7,14 @@ tenth of a millisecond at an error near rounding. `varied` is the same leg on du
 from dataclasses import replace
 from typing import final
 
-from legbench.analytic.compiled import SILENT, Compiled, Levels, Watched
+from legbench.analytic.compiled import MAX_EVENTS, SILENT, Compiled, Levels, Watched
 from legbench.analytic.dual import DUAL
 from legbench.analytic.equations import Pair
 from legbench.analytic.hybrid import overdue, switch
 from legbench.analytic.model import LegModel
 from legbench.analytic.smooth import Accuracy
 from legbench.analytic.state import LegState, Regime, Transition
-from legbench.errors import ConfigError
+from legbench.errors import ConfigError, PlantFault
 
 __all__ = ["SILENT", "Levels", "TaylorLeg", "Watched"]
 
@@ -86,6 +86,19 @@ class TaylorLeg:
         Raises:
             PlantFault: the integration failed.
         """
+        for _ in range(MAX_EVENTS):
+            state, what = self._piece(state, until, motor, levels)
+            if what is not Watched.STOP:
+                return state, what
+            self._leg(state.regime).switch_stop()
+        raise PlantFault(
+            "integration failed", f"integration failed at t = {state.time:.6f} s: a stop chatters"
+        )
+
+    def _piece(
+        self, state: LegState, until: float, motor: Pair, levels: Levels
+    ) -> tuple[LegState, Watched | None]:
+        """As `watch`, but no further than a stop's next event."""
         leg = self._leg(state.regime)
         leg.load(state)
         leg.set(motor, levels)

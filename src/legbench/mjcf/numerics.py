@@ -33,8 +33,8 @@ class Numerics:
     contact_solref: tuple[float, float] = (0.001, 1.0)
     contact_solimp: tuple[float, float, float, float, float] = (0.9, 0.95, 0.001, 0.5, 2.0)
     stop_solref: tuple[float, float] = (0.02, 1.0)
-    """Joint stops: soft rubber."""
-    stop_solimp: tuple[float, float, float, float, float] = (0.9, 0.95, 0.001, 0.5, 2.0)
+    """Joint stops: soft rubber, as `legbench.analytic.stops`."""
+    stop_solimp: tuple[float, float, float, float, float] = (0.95, 0.95, 0.001, 0.5, 2.0)
     iterations: int = 50
     tolerance: float = 1e-12
 
