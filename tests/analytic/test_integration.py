@@ -144,7 +144,7 @@ def test_a_stopped_joint_comes_back_at_the_acceleration_that_the_law_gives(angle
         depth, speed = leg.limits.knee[0] - 2.0 * half, v[0] - v[1]
         a1, a2 = model.hanging_acceleration(motor, q, v)
         b1, b2 = free.hanging_acceleration(motor, q, v)
-        wanted = 0.05 * (b2 - b1) + 2.0 * speed / 0.02 + depth / 0.02**2
+        wanted = 0.05 * (b2 - b1) + 2.0 * speed / 0.01 + depth / 0.01**2
         assert a2 - a1 == pytest.approx(max(wanted, b2 - b1), rel=1e-9)
         acting += wanted > b2 - b1
     assert 50 < acting < 190

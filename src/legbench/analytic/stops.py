@@ -16,7 +16,7 @@ from legbench.analytic.equations import Ops, Pair, Term, pair_solve
 from legbench.analytic.terms import PairTerms
 from legbench.design import Limits
 
-TIME_CONSTANT = 0.02
+TIME_CONSTANT = 0.01
 """[s]"""
 IMPEDANCE = 0.95
 """Share of the acceleration that is the stop's, not the leg's own [-]."""

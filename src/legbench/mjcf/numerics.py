@@ -32,7 +32,7 @@ class Numerics:
     loop_solimp: tuple[float, float, float, float, float] = (0.9999, 0.9999, 0.001, 0.5, 2.0)
     contact_solref: tuple[float, float] = (0.001, 1.0)
     contact_solimp: tuple[float, float, float, float, float] = (0.9, 0.95, 0.001, 0.5, 2.0)
-    stop_solref: tuple[float, float] = (0.02, 1.0)
+    stop_solref: tuple[float, float] = (0.01, 1.0)
     """Joint stops: soft rubber, as `legbench.analytic.stops`."""
     stop_solimp: tuple[float, float, float, float, float] = (0.95, 0.95, 0.001, 0.5, 2.0)
     iterations: int = 50
