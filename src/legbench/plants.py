@@ -13,9 +13,11 @@ from legbench.drives.config import BusConfig
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.build import emulate
 from legbench.drives.emulated.faults import Fault
+from legbench.drives.errors import BusError
 from legbench.drives.limits import UNLIMITED, Range, SafetyLimits
 from legbench.drives.link import Link
-from legbench.drives.open_bus import open_bus
+from legbench.drives.master.lock import ChannelLock
+from legbench.drives.open_bus import adapter_of, open_bus
 from legbench.drives.session import Session
 from legbench.drives.stopping import check_stopping
 from legbench.errors import ConfigError, LegbenchError
@@ -245,22 +247,34 @@ def _open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
     )
 
 
-def open_session(config: BusConfig, choice: CanChoice, leg: Leg | None = None) -> Session:
+def open_session(
+    config: BusConfig, choice: CanChoice, leg: Leg | None = None, *, leads: bool = True
+) -> Session:
     """Open the bus of a choice; with interface `legbench` the emulated leg in this process.
 
-    Without a leg the emulated drives have nothing on their shafts.
+    The channel is locked before its adapter is touched: opening a serial one resets it under a
+    program that uses it. Whoever only reads locks no channel that others may share.
+
+    Args:
+        config: the bus file.
+        choice: which bus.
+        leg: on the shafts of emulated drives; nothing by default.
+        leads: or only reads.
 
     Raises:
-        BusError: the interface is not there or is down.
+        BusError: the interface is not there, is down, or has a master.
     """
     if not choice.is_virtual(config):
-        bus = open_bus(
-            config,
-            interface=choice.interface,
-            channel=choice.channel,
-            bitrate=choice.bitrate,
-        )
-        return Session(bus, config)
+        adapter = adapter_of(config, interface=choice.interface, channel=choice.channel)
+        lock = ChannelLock.of_channel(adapter.interface, adapter.channel)
+        if leads or not adapter.shared:
+            lock.acquire()
+        try:
+            bus = open_bus(config, adapter, bitrate=choice.bitrate)
+        except BusError:
+            lock.release()
+            raise
+        return Session(bus, config, lock=lock)
     if leg is None:
         return Session(LockstepBus("leg", network=emulate(config)), config)
     motors = [float(value) for value in leg.start.motor_pos]

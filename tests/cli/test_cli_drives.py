@@ -15,7 +15,6 @@ from legbench.drives.bus_file import load_bus
 from legbench.drives.config import BusConfig
 from legbench.drives.emulated.network import Network
 from legbench.drives.master.lock import ChannelLock
-from legbench.drives.session import Session
 
 HARDWARE = Path(__file__).parents[2] / "hardware"
 MODELS = Path(__file__).parents[2] / "models"
@@ -228,12 +227,38 @@ def test_limits_looser_than_the_design_are_refused(
     done.refused("motor_range of axis 1", "looser", "[-2.2, 0.9] rad")
 
 
-def test_a_second_master_is_refused(
-    capfd: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    "command",
+    [
+        JUMP[:-2],
+        ("drives", "configure", "--write"),
+        ("drives", "zero", "--posture", "0", "0"),
+        ("drives", "home", "--node", "motor1"),
+        ("drives", "jog", "--node", "motor1"),
+        ("drives", "jitter"),
+    ],
+    ids=lambda command: command[1],
+)
+def test_a_second_master_is_refused_before_it_opens_anything(
+    command: tuple[str, ...], capfd: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    first = ChannelLock("one", tmp_path)
+    # Nobody serves there: whoever opened it would say so.
+    where = ("--interface", "legbench_unix", "--channel", str(tmp_path / "leg.sock"))
+    first = ChannelLock.of_channel(where[1], where[3])
     first.acquire()
-    monkeypatch.setattr(Session, "lock", lambda _self: ChannelLock("one", tmp_path))
-    done = called(capfd, *JUMP, *EMULATED, "--out", tmp_path / "runs")
+    done = called(capfd, *command, "--bus", BUS, *where, *DESIGN)
     first.release()
-    done.refused("already has a master")
+    done.refused("already has a master, process", "end that one first")
+
+
+@pytest.mark.parametrize("command", ["scan", "status", "configure", "monitor"])
+@pytest.mark.parametrize("interface", ["legbench_unix", "slcan"])
+def test_a_reader_shares_a_channel_but_not_a_serial_adapter(
+    interface: str, command: str, capfd: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    where = ("--interface", interface, "--channel", str(tmp_path / "leg"))
+    first = ChannelLock.of_channel(interface, where[3])
+    first.acquire()
+    done = called(capfd, "drives", command, "--bus", BUS, *where, *DESIGN)
+    first.release()
+    done.refused("already has a master" if interface == "slcan" else "cannot open legbench_unix")

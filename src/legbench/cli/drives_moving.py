@@ -53,7 +53,7 @@ class Configure:
         from legbench.commissioning.configure import differences, write
 
         written = 0
-        with bench.session() as session:
+        with bench.session(leads=self.write) as session:
             if self.write:
                 written = write(session)
             different = differences(session)
@@ -83,7 +83,7 @@ class Zero:
         """Measure, print, write the offsets into the bus file."""
         from legbench.commissioning.zero import measure, write
 
-        with bench.session() as session:
+        with bench.session(leads=True) as session:
             zeros = measure(session, self.posture)
         path = None if self.dry_run else write(bench.bus, zeros, self.out)
         if bench.json:
@@ -114,7 +114,7 @@ class Home:
         """Home and print the counts before and after."""
         from legbench.commissioning.home import home
 
-        with interrupted_by_signals(), bench.session() as session:
+        with interrupted_by_signals(), bench.session(leads=True) as session:
             homed = home(session, _node(session, self.node), self.method, timeout=self.timeout)
         if bench.json:
             print_json(asdict(homed))
@@ -145,7 +145,7 @@ class Jog:
 
         design = bench.leg()
         limits = limits_for(bench.limits or bench.bus.parent / LIMITS_NAME, design)
-        with interrupted_by_signals(), bench.session() as session:
+        with interrupted_by_signals(), bench.session(leads=True) as session:
             jogged = jog(
                 session,
                 limits,

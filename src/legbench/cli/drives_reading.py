@@ -50,9 +50,9 @@ class Bench:
         """The design; raises DesignError."""
         return load_design(self.design)
 
-    def session(self) -> AbstractContextManager[Session]:
-        """The bus, open; raises ConfigError, BusError."""
-        return open_session(self.config(), self.choice)
+    def session(self, *, leads: bool) -> AbstractContextManager[Session]:
+        """The bus, open, its channel locked by whoever leads; raises ConfigError, BusError."""
+        return open_session(self.config(), self.choice, leads=leads)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,7 +66,7 @@ class Scan:
         """Print every node; 1 if a node of the bus file is not there."""
         from legbench.commissioning.scan import scan
 
-        with bench.session() as session:
+        with bench.session(leads=False) as session:
             found = list(scan(session, self.last))
             names = {f"'{node.name}' of the bus file" for node in session.config.nodes}
         if bench.json:
@@ -92,7 +92,7 @@ class Status:
         """Print state, mode, error and encoders of every drive."""
         from legbench.commissioning.status import status
 
-        with bench.session() as session:
+        with bench.session(leads=False) as session:
             nodes = status(session)
         if bench.json:
             print_json({"nodes": [asdict(node) for node in nodes]})
@@ -125,7 +125,7 @@ class Jitter:
 
         if self.cycles < 1:
             raise ConfigError(f"cycles is {self.cycles}; it must be 1 or more")
-        with bench.session() as session:
+        with bench.session(leads=True) as session:
             granted = session.be_punctual(self.cpu)
             timing = measure(session, bench.leg().stiffness, self.cycles)
         table = timing.table()

@@ -60,7 +60,7 @@ class Emulate:
         def serve_at(network: Network) -> UnixServer | BusServer:
             if bench.interface in (None, UNIX):
                 return UnixServer(network, Path(channel))
-            return BusServer(network, open_session(config, bench.choice).bus)
+            return BusServer(network, open_session(config, bench.choice, leads=False).bus)
 
         def ready() -> None:
             interface = bench.interface or UNIX
@@ -103,7 +103,7 @@ class Monitor:
         _check_time("seconds", self.seconds)
         _check_time("every", self.every)
         in_place = sys.stdout.isatty() and not bench.json
-        with bench.session() as session:
+        with bench.session(leads=False) as session:
             seconds = min(self.seconds, 1e9)
             for count, (at, lines) in enumerate(
                 monitor(session, seconds=seconds, every=self.every)

@@ -1,48 +1,83 @@
 """A python-can bus from a bus file and flags, its failures named."""
 
+from dataclasses import dataclass
+
 import can
+from can.util import load_config
 
 from legbench.drives.bus import LockstepBus
 from legbench.drives.config import BusConfig
 from legbench.drives.errors import BusError
 from legbench.drives.timebase import SystemTime, Timebase
 
+SHARED = ("legbench", "legbench_unix", "socketcan", "socketcand", "udp_multicast", "virtual")
+"""Interfaces that serve any number of programs; any other adapter serves one."""
 
-def open_bus(
-    config: BusConfig,
-    *,
-    interface: str | None = None,
-    channel: str | None = None,
-    bitrate: int | None = None,
-    **options: object,
-) -> can.BusABC:
-    """Open an interface; flags go before the bus file, python-can's own configuration fills in.
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Adapter:
+    """Where a bus is reached."""
+
+    interface: str
+    """python-can's name."""
+    channel: str | None
+
+    @property
+    def shared(self) -> bool:
+        """Whether a program may listen beside another one."""
+        return self.interface in SHARED
+
+
+def adapter_of(
+    config: BusConfig, *, interface: str | None = None, channel: str | None = None
+) -> Adapter:
+    """Flags go before the bus file, python-can's own configuration fills in; opens nothing.
+
+    Raises:
+        BusError: nobody says which interface.
+    """
+    given = {"interface": interface or config.interface, "channel": channel or config.channel}
+    if None in given.values():
+        try:
+            found = load_config(config={key: value for key, value in given.items() if value})
+        except (can.CanError, OSError, ImportError, ValueError) as error:
+            raise _named(given["interface"], given["channel"], error) from error
+        given = {key: value or found.get(key) for key, value in given.items()}
+    if given["interface"] is None:
+        raise _named(None, given["channel"], ValueError("no interface is given"))
+    where = given["channel"]
+    return Adapter(interface=given["interface"], channel=None if where is None else str(where))
+
+
+def open_bus(config: BusConfig, adapter: Adapter, *, bitrate: int | None = None) -> can.BusABC:
+    """Open an adapter.
 
     Args:
         config: the bus file.
-        interface: python-can's name, such as `socketcan`, `slcan` or `legbench`.
-        channel: such as `can0`.
-        bitrate: [bit/s]; SocketCAN's is set with `ip link`, not here.
-        options: of the driver.
+        adapter: to open.
+        bitrate: that of the bus file by default; SocketCAN's is set with `ip link`, not here
+            [bit/s].
 
     Raises:
         BusError: no such interface or channel, or it is down.
     """
-    chosen = interface or config.interface
-    where = channel or config.channel
     given = {
-        "interface": chosen,
-        "channel": where,
+        "interface": adapter.interface,
+        "channel": adapter.channel,
         "bitrate": bitrate or config.bitrate,
-        **options,
     }
     try:
         return can.Bus(**{key: value for key, value in given.items() if value is not None})  # pyright: ignore[reportArgumentType]
     except (can.CanError, OSError, ImportError, ValueError) as error:
-        raise BusError(
-            f"cannot open {chosen or 'the default interface'} {where or ''}: {error}; interfaces "
-            "are those of python-can, 'legbench' is the emulated leg"
-        ) from error
+        raise _named(adapter.interface, adapter.channel, error) from error
+
+
+def _named(interface: str | None, channel: str | None, error: Exception) -> BusError:
+    where = f"{interface or 'the default interface'} {channel or ''}".strip()
+    return BusError(
+        f"cannot open {where}: {error}; interfaces are those of python-can, 'legbench' is the "
+        "emulated leg"
+    )
 
 
 def timebase_of(bus: can.BusABC, spin_ns: int = 0) -> Timebase:

@@ -32,13 +32,26 @@ class Session:
     """
 
     def __init__(
-        self, bus: can.BusABC, config: BusConfig, timebase: Timebase | None = None
+        self,
+        bus: can.BusABC,
+        config: BusConfig,
+        timebase: Timebase | None = None,
+        *,
+        lock: ChannelLock | None = None,
     ) -> None:
+        """Own a bus.
+
+        Args:
+            bus: shut down in the end.
+            config: what hangs on it.
+            timebase: that of the bus by default.
+            lock: of its channel, which this session releases if it is held already.
+        """
         self.bus, self.config = bus, config
         self.timebase = timebase or timebase_of(bus)
         self.log: BusLog | None = None
         self._links: list[Link] = []
-        self._locks: list[ChannelLock] = []
+        self._lock = lock or self._lock_of_bus()
         self._closed = False
 
     @property
@@ -66,16 +79,15 @@ class Session:
         """Write every frame from now on; raises BusError if the file cannot be made."""
         self.log = BusLog(path, str(getattr(self.bus, "channel", "can")))
 
-    def lock(self) -> ChannelLock:
-        """The lock of this channel; an emulated bus of this process has no other master."""
+    def _lock_of_bus(self) -> ChannelLock:
+        """An emulated bus of this process has no other master."""
         name = str(self.bus.channel_info)
         return ChannelLock(f"{name}-{id(self.bus):x}" if self.virtual else name)
 
     def hold(self) -> None:
         """Take the channel for this session; raises BusError if it has a master."""
-        lock = self.lock()
-        lock.acquire()
-        self._locks.append(lock)
+        if not self._lock.held:
+            self._lock.acquire()
 
     def port(self) -> Port:
         """Frames in and out."""
@@ -101,7 +113,7 @@ class Session:
             timebase=self.timebase,
             listener=self.heard,
             read_only=read_only,
-            lock=self.lock(),
+            lock=self._lock,
         )
         self._links.append(link)
         return link
@@ -113,8 +125,6 @@ class Session:
         self._closed = True
         for link in self._links:
             link.close()
-        for lock in self._locks:
-            lock.release()
         if self.log is not None:
             self.log.close()
         try:
@@ -123,6 +133,8 @@ class Session:
             # The drives have been told to stop; the interface itself is beyond help, whatever it
             # raises: a serial adapter has a ValueError for a garbled line.
             return
+        finally:
+            self._lock.release()
 
     def __enter__(self) -> Self:
         return self
