@@ -13,6 +13,7 @@ from legbench.drives.config import BusConfig
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.build import emulate
 from legbench.drives.emulated.faults import Fault
+from legbench.drives.emulated.network import Network
 from legbench.drives.errors import BusError
 from legbench.drives.limits import UNLIMITED, Range, SafetyLimits
 from legbench.drives.link import Link
@@ -20,6 +21,7 @@ from legbench.drives.master.lock import ChannelLock
 from legbench.drives.open_bus import adapter_of, open_bus
 from legbench.drives.session import Session
 from legbench.drives.stopping import check_stopping
+from legbench.drives.wire import check_load
 from legbench.errors import ConfigError, LegbenchError
 from legbench.mjcf import BuildOptions
 from legbench.plant.abstract import AbstractPlant
@@ -213,6 +215,7 @@ def _open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
         raise ConfigError(f"{choice.bus}: {len(config.nodes)} nodes; a leg has 2")
     if config.period != PERIOD:
         raise ConfigError(f"{choice.bus}: period_us is {config.period_us}; runs need 1000")
+    check_load(config.at(choice.bitrate))
     limits = limits_for(choice.limits or choice.bus.parent / LIMITS_NAME, leg.design)
     check_stopping(config, limits)
     if not choice.is_virtual(config):
@@ -270,18 +273,24 @@ def open_session(
         if leads or not adapter.shared:
             lock.acquire()
         try:
-            bus = open_bus(config, adapter, bitrate=choice.bitrate)
+            bus = open_bus(config.at(choice.bitrate), adapter)
         except BusError:
             lock.release()
             raise
-        return Session(bus, config, lock=lock)
+        return Session(bus, config.at(choice.bitrate), lock=lock)
+    network = _emulated(config, choice, leg)
+    bus = LockstepBus("leg", network=network, bitrate=choice.bitrate)
+    return Session(bus, config.at(choice.bitrate))
+
+
+def _emulated(config: BusConfig, choice: CanChoice, leg: Leg | None) -> Network:
+    """The emulated leg; its drives run at the bitrate of the bus file, whatever is asked for."""
     if leg is None:
-        return Session(LockstepBus("leg", network=emulate(config)), config)
+        return emulate(config)
     motors = [float(value) for value in leg.start.motor_pos]
-    network = emulate(
+    return emulate(
         config,
         [Behaviour(start_pos=motor) for motor in motors],
         body=EmulatedLeg(leg.design, leg.options, leg.start),
         faults=choice.faults,
     )
-    return Session(LockstepBus("leg", network=network), config)

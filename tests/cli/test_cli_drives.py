@@ -262,3 +262,36 @@ def test_a_reader_shares_a_channel_but_not_a_serial_adapter(
     done = called(capfd, "drives", command, "--bus", BUS, *where, *DESIGN)
     first.release()
     done.refused("already has a master" if interface == "slcan" else "cannot open legbench_unix")
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("run", "jump", "--plant", "can", "--duration", "0.05"),
+        ("drives", "scan"),
+        ("drives", "status"),
+        ("drives", "configure"),
+        ("drives", "jog", "--node", "motor1"),
+    ],
+    ids=lambda command: command[1],
+)
+def test_a_wrong_bitrate_is_named(
+    command: tuple[str, ...],
+    capfd: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = called(capfd, *command, *EMULATED, *DESIGN, "--bitrate", "750000")
+    done.refused("750000 bit/s is asked for", "the bus file says 1000000 bit/s", "error frames")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_bitrate_that_is_too_slow_is_refused_before_a_bus_is_opened(
+    capfd: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    for command in (JUMP[:-2], ("drives", "budget")):
+        done = called(capfd, *command, "--bus", BUS, *DESIGN, "--bitrate", "500000")
+        assert done.status == 1
+        assert "114 % of 500000 bit/s" in done.err
+        assert "the bus file says 1000000 bit/s" in done.err

@@ -80,7 +80,10 @@ class Scan:
                 )
         missing = sorted(names - {node.verdict for node in found})
         for verdict in missing:
-            note(f"not there: {verdict}; look at its power, its wiring and the bitrate")
+            note(
+                f"not there: {verdict}; look at its power, its wiring and the bitrate, "
+                f"{session.config.bitrate_text}"
+            )
         return 1 if missing else 0
 
 
@@ -163,7 +166,7 @@ class Budget:
         """Print every frame; raises ConfigError above 80 %."""
         from legbench.drives.wire import MAX_LOAD, bus_load, check_load, schedule
 
-        config = bench.config()
+        config = bench.config().at(bench.bitrate)
         entries, load = schedule(config), bus_load(config)
         if bench.json:
             print_json(

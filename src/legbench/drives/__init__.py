@@ -7,7 +7,7 @@ What a program needs:
 
     config = bus_file.load_bus(path)                  # BusConfig; load_limits(path): SafetyLimits
     adapter = open_bus.adapter_of(config, interface=, channel=)          # python-can's conventions
-    bus = open_bus.open_bus(config, adapter, bitrate=)                   # any can.BusABC
+    bus = open_bus.open_bus(config, adapter)                             # any can.BusABC
     with link.Link(bus, config, limits, stiffness=(k1, k2), read_only=, listener=) as it:
         sample = it.start(clear_faults=)    # lock, identity, configuration, settle, enable: Sample
         sample = it.move_to(posture, speed)             # guarded, before the first real cycle

@@ -49,14 +49,8 @@ def adapter_of(
     return Adapter(interface=given["interface"], channel=None if where is None else str(where))
 
 
-def open_bus(config: BusConfig, adapter: Adapter, *, bitrate: int | None = None) -> can.BusABC:
-    """Open an adapter.
-
-    Args:
-        config: the bus file.
-        adapter: to open.
-        bitrate: that of the bus file by default; SocketCAN's is set with `ip link`, not here
-            [bit/s].
+def open_bus(config: BusConfig, adapter: Adapter) -> can.BusABC:
+    """Open an adapter at the bitrate of a bus; SocketCAN's is set with `ip link`, not here.
 
     Raises:
         BusError: no such interface or channel, or it is down.
@@ -64,7 +58,7 @@ def open_bus(config: BusConfig, adapter: Adapter, *, bitrate: int | None = None)
     given = {
         "interface": adapter.interface,
         "channel": adapter.channel,
-        "bitrate": bitrate or config.bitrate,
+        "bitrate": config.bitrate,
     }
     try:
         return can.Bus(**{key: value for key, value in given.items() if value is not None})  # pyright: ignore[reportArgumentType]

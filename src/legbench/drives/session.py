@@ -15,7 +15,6 @@ from legbench.drives.master.bring_up import BringUp
 from legbench.drives.master.bus_log import BusLog
 from legbench.drives.master.lock import ChannelLock
 from legbench.drives.master.port import Port
-from legbench.drives.master.sdo_port import SdoPort
 from legbench.drives.open_bus import timebase_of
 from legbench.drives.realtime import Granted, ask
 from legbench.drives.timebase import SystemTime, Timebase
@@ -96,10 +95,6 @@ class Session:
     def bring_up(self) -> BringUp:
         """SDO access to all nodes of the bus file."""
         return BringUp(self.port(), self.config, lambda _message: None)
-
-    def sdo(self, node_id: int, *, timeout_ms: int, retries: int = 1) -> SdoPort:
-        """SDO access to any node."""
-        return SdoPort(self.port(), node_id, timeout_ms=timeout_ms, retries=retries)
 
     def link(
         self, limits: SafetyLimits, stiffness: Sequence[float], *, read_only: bool = False

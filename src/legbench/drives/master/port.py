@@ -22,6 +22,7 @@ class Port:
     Attributes:
         timebase: of the bus.
         bus: for those who need the driver itself.
+        error_frames: heard so far.
     """
 
     def __init__(
@@ -29,6 +30,7 @@ class Port:
     ) -> None:
         self.bus, self.timebase = bus, timebase
         self._listener = listener
+        self.error_frames = 0
 
     def send(self, cob_id: int, data: bytes = b"") -> None:
         """Send a frame.
@@ -73,7 +75,9 @@ class Port:
                 return None
             if self._listener is not None:
                 self._tell(message)
-            if message.is_extended_id or message.is_remote_frame:
+            if message.is_error_frame:
+                self.error_frames += 1
+            elif message.is_extended_id or message.is_remote_frame:
                 if left <= 0.0:
                     return None
                 continue
