@@ -117,6 +117,7 @@ def _ends(jogged: dict[str, list[float]]) -> tuple[list[float], list[float]]:
         (("home", "--node", "motor1", "--method", "99"), ("homing", "failed")),
         (("jitter", "--cycles", "0"), ("cycles is 0",)),
         (("emulate",), ("needs --channel",)),
+        (("emulate", "--serve", "slcan"), ("--interface legbench", "give one of the two")),
         (("monitor", "--every", "0"), ("every is 0 s",)),
     ],
 )

@@ -1,4 +1,6 @@
-"""Master and drives in processes of their own, over AF_UNIX; bounded in time, none measured."""
+"""Master and drives in processes of their own, over AF_UNIX and over a terminal; bounded in time,
+none measured.
+"""
 
 import json
 import os
@@ -77,12 +79,13 @@ def end(process: subprocess.Popen[str]) -> None:
 
 
 @contextmanager
-def served(folder: Path) -> Iterator[Served]:
+def served(folder: Path, *how: str) -> Iterator[Served]:
     """Drives over AF_UNIX that end by themselves after a while."""
     calm(folder)
     process = started(
         folder,
         *("drives", "emulate", "--bus", "leg.toml", "--channel", "leg.sock", "--bare", "--json"),
+        *how,
         *("--patience", "2000", "--seconds", str(PATIENCE)),
         *("--design", str(ROOT / "models" / "optimal.toml")),
     )
@@ -150,3 +153,25 @@ def test_interrupting_the_master_stops_both_drives_and_keeps_the_run(tmp_path: P
     assert manifest["status"] == "interrupted"
     assert manifest["realtime"]["kernel"]
     assert (run_folder(tmp_path) / "bus.log").stat().st_size > 0
+
+
+def test_a_run_over_the_slcan_of_python_can(tmp_path: Path) -> None:
+    with served(tmp_path, "--serve", "slcan") as drives:
+        drives.await_state("switch on disabled")
+        run = started(
+            tmp_path,
+            *("run", "position-jump", "--plant", "can", "--bus", "leg.toml", "--duration", "0.3"),
+            *("--interface", "slcan", "--channel", "leg.sock", "--bitrate", "1000000"),
+            *("--design", str(ROOT / "models" / "optimal.toml"), "--out", "runs"),
+        )
+        try:
+            drives.await_state("operation enabled")
+            drives.await_state("switch on disabled")
+            _, complaint = run.communicate(timeout=PATIENCE)
+        finally:
+            end(run)
+    assert run.returncode == 0, complaint
+    manifest = json.loads((run_folder(tmp_path) / "run.json").read_text())
+    assert (manifest["status"], manifest["bus"]["interface"]) == ("complete", "slcan")
+    log = (run_folder(tmp_path) / "bus.log").read_text(encoding="ascii")
+    assert all(f" {cob_id}#" in log for cob_id in ("080", "181", "182", "201", "202"))

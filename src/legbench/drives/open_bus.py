@@ -1,6 +1,9 @@
 """A python-can bus from a bus file and flags, its failures named."""
 
+import os
 from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
 
 import can
 from can.util import load_config
@@ -10,6 +13,9 @@ from legbench.drives.config import BusConfig
 from legbench.drives.errors import BusError
 from legbench.drives.timebase import SystemTime, Timebase
 
+SLCAN = "slcan"
+TERMINALS = "/dev/pts/"
+"""Of pseudo terminals on Linux."""
 SHARED = ("legbench", "legbench_unix", "socketcan", "socketcand", "udp_multicast", "virtual")
 """Interfaces that serve any number of programs; any other adapter serves one."""
 
@@ -60,10 +66,21 @@ def open_bus(config: BusConfig, adapter: Adapter) -> can.BusABC:
         "channel": adapter.channel,
         "bitrate": config.bitrate,
     }
+    given = {key: value for key, value in given.items() if value is not None}
     try:
-        return can.Bus(**{key: value for key, value in given.items() if value is not None})  # pyright: ignore[reportArgumentType]
+        return _slcan(given) if adapter.interface == SLCAN else can.Bus(**given)  # pyright: ignore[reportArgumentType]
     except (can.CanError, OSError, ImportError, ValueError) as error:
         raise _named(adapter.interface, adapter.channel, error) from error
+
+
+def _slcan(given: dict[str, object]) -> can.BusABC:
+    """Imported late: without pyserial python-can warns of it."""
+    options: dict[str, Any] = {**load_config(config=given)}
+    del options["interface"]
+    if os.path.realpath(str(options["channel"])).startswith(TERMINALS):
+        # A real adapter needs two seconds to boot after it has been opened.
+        options.setdefault("sleep_after_open", 0.0)
+    return import_module("legbench.drives.slcan_bus").SlcanBus(**options)
 
 
 def _named(interface: str | None, channel: str | None, error: Exception) -> BusError:
