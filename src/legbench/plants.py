@@ -137,6 +137,7 @@ class OpenPlant:
         return {
             "bus": {
                 "skipped_cycles": self.link.skipped_total,
+                "silent_cycles": cycle.silent_total,
                 "late_frames": cycle.late_frames,
                 "error_frames": cycle.error_frames,
                 "lost_cycles": [watch.lost_total for watch in cycle.watches],

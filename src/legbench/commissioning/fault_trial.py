@@ -10,6 +10,7 @@ from legbench.drives.bus_file import load_bus, load_limits
 from legbench.drives.cia402 import DriveState
 from legbench.drives.config import BusConfig
 from legbench.drives.emulated.faults import (
+    FOREVER_NS,
     Babble,
     Fault,
     FrameFault,
@@ -80,9 +81,11 @@ class Result:
         return quiet and self.excess <= 0.0 and self.intact
 
 
-def _frame(kind: FrameFaultKind, cob_id: int | None, *, brief: bool = False, **how: int) -> Fault:
-    end = {"end_ns": STRIKE_NS + BRIEF_NS} if brief else {}
-    return FrameFault(kind=kind, cob_id=cob_id, start_ns=STRIKE_NS, **end, **how)
+def _frame(
+    kind: FrameFaultKind, cob_id: int | None, *, until_ns: int = FOREVER_NS, **how: int
+) -> Fault:
+    end_ns = STRIKE_NS + until_ns
+    return FrameFault(kind=kind, cob_id=cob_id, start_ns=STRIKE_NS, end_ns=end_ns, **how)
 
 
 def _node(kind: NodeFaultKind, node_id: int) -> Fault:
@@ -101,7 +104,7 @@ TRIALS = (
     Trial(name="answers of a drive dropped", faults=(_frame(_F.DROP, 0x181),), cause=LOST),
     Trial(
         name="answers dropped for 2 cycles",
-        faults=(_frame(_F.DROP, 0x181, brief=True),),
+        faults=(_frame(_F.DROP, 0x181, until_ns=BRIEF_NS),),
     ),
     Trial(name="SYNC dropped", faults=(_frame(_F.DROP, 0x080),), cause=LOST),
     Trial(name="commands of a drive dropped", faults=(_frame(_F.DROP, 0x202),), cause=EMERGENCY),
@@ -113,9 +116,23 @@ TRIALS = (
         cause=LOST,
     ),
     Trial(
+        name="answers 0.7 ms late",
+        faults=(_frame(_F.DELAY, 0x181, delay_ns=700_000),),
+        cause=LOST,
+    ),
+    Trial(
         name="answers 1 ms late",
         faults=(_frame(_F.DELAY, 0x181, delay_ns=1_000_000),),
         cause=LOST,
+    ),
+    Trial(
+        name="answers 2 ms late",
+        faults=(_frame(_F.DELAY, 0x182, delay_ns=2_000_000),),
+        cause=LOST,
+    ),
+    Trial(
+        name="answers of one cycle 1 ms late",
+        faults=(_frame(_F.DELAY, 0x181, until_ns=MS, delay_ns=1_000_000),),
     ),
     Trial(
         name="answers doubled",
@@ -168,7 +185,8 @@ def try_fault(trial: Trial, bus_file: Path, design: LegDesign, out: Path) -> Res
         opened.start_log(writer.path)
         outcome = _run(trial, opened, chosen, writer, network)
         strike_ns = network.now_ns if trial.gone or trial.interrupted else STRIKE_NS
-        reaction_ns = round(1e9 * (opened.began or 0.0)) + outcome.cycles * MS
+        ticks = outcome.cycles + opened.events()["bus"]["skipped_cycles"]
+        reaction_ns = round(1e9 * (opened.began or 0.0)) + ticks * MS
         if trial.gone:
             reaction_ns = _wait_for_drives(network)
         opened.plant.close()

@@ -60,7 +60,7 @@ class Link:
     Attributes:
         state: how far it has come.
         fault: the first fault; what ended the link.
-        skipped_total: ticks missed since the start.
+        skipped_total: ticks without SYNC since the start.
     """
 
     def __init__(
@@ -104,7 +104,7 @@ class Link:
         self.skipped_total = 0
         self._supervisor = Supervisor(self.cycle, config, self._limits, self._port.timebase)
         self._start_up = StartUp(self._port, self.cycle, config, read_only=read_only)
-        self._last = Tick(0, 0, 0, False)
+        self._last = Tick(0, 0, 0, 0, False)
         self._expected: list[tuple[float, ...]] = []
 
     # --- before anything moves ---------------------------------------------------------------

@@ -1,4 +1,9 @@
-"""The cycle itself: grid, SYNC, process data until a deadline, RPDOs; no policy, no limits."""
+"""The cycle itself: grid, SYNC, process data until a deadline, RPDOs; no policy, no limits.
+
+CAN frames carry no number: an answer that is a whole cycle late looks like the next one. So SYNC
+never goes out while an answer to the last one may be on its way. If one has not come by the next
+tick, that tick is silent: without a SYNC, whatever comes answers an earlier one.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,14 +20,12 @@ from legbench.drives.codec.frame import (
     SYNC_ID,
 )
 from legbench.drives.codec.nmt import NmtState, heartbeat_frame
-from legbench.drives.codec.pdo import PdoMap
 from legbench.drives.config import BusConfig
 from legbench.drives.errors import BusError
 from legbench.drives.master.axis_link import AxisLink
 from legbench.drives.master.port import Port
 from legbench.drives.master.temperature import TemperaturePoll
 from legbench.drives.master.watch import NodeWatch
-from legbench.drives.wire import plain_bits
 
 ERROR_FRAME_BUS_OFF = 0x40
 """Class of a SocketCAN error frame: this controller has left the bus."""
@@ -37,7 +40,9 @@ class Tick:
     late_ns: int
     """After its place on the grid."""
     skipped: int
-    """Ticks that were missed before it."""
+    """Ticks without SYNC before it, for whatever reason."""
+    silent: int
+    """Of these, ticks that were left out on purpose."""
     complete: bool
     """All process data came before the deadline."""
 
@@ -54,6 +59,8 @@ class Cycle:
         stranger: identifier of a frame that only this master may send, and another one did.
         error_frames: heard so far.
         late_frames: process data that came after its deadline.
+        silent_total: ticks that were left out to find late answers.
+        stopping: from now on SYNC goes out at every tick, because a stop waits for it.
     """
 
     def __init__(self, port: Port, config: BusConfig) -> None:
@@ -67,6 +74,8 @@ class Cycle:
         self.stranger: int | None = None
         self.error_frames = 0
         self.late_frames = 0
+        self.silent_total = 0
+        self.stopping = False
         self._tpdos = {cob: axis for axis in self.axes for cob in axis.tpdo_ids}
         self._expected = len(self._tpdos)
         self._ours = frozenset(
@@ -83,14 +92,10 @@ class Cycle:
         self._deadline_ns = 1000 * config.tpdo_deadline_us
         self._beat = heartbeat_frame(config.master_id, NmtState.OPERATIONAL)
         self._beat_cycles = max(1, 1000 * config.master_heartbeat_ms // config.period_us)
-        smallest = min(PdoMap(pdo.objects).size for node in config.nodes for pdo in node.tpdos)
-        bits = plain_bits(0) + plain_bits(smallest)
-        self._soonest_ns = 1_000_000_000 * bits // config.bitrate
         self._due_ns = 0
         self._count = 0
-        self._complete = True
         self._owed: set[int] = set()
-        self._early: set[int] = set()
+        """Process data that has not come, and may still."""
 
     def begin(self) -> None:
         """Lay the grid: the next tick is one period from now, on a whole period."""
@@ -112,26 +117,40 @@ class Cycle:
         # Up to half a period late SYNC still goes out; beyond, it would crowd the next one.
         skipped = max(0, (late_ns + self._period_ns // 2) // self._period_ns)
         self._due_ns += skipped * self._period_ns
-        due_ns = self._due_ns
-        timebase.wait_until(due_ns)
+        timebase.wait_until(self._due_ns)
         self.bus_error = None
         self._drain()
+        silent = 0
+        if self._owed and not self.stopping:
+            silent = 1
+            self._keep_silent()
+        due_ns = self._due_ns
         for axis in self.axes:
             axis.begin_cycle()
         sync_ns = timebase.now_ns()
         missing = self._expected
         try:
             self._port.send(SYNC_ID)
-            missing = self._gather(sync_ns + self._deadline_ns)
         except BusError as error:
             self._failed(error)
-        self._complete = missing == 0
-        self._remember()
+        else:
+            missing = self._gather(sync_ns + self._deadline_ns)
         for axis, watch in zip(self.axes, self.watches, strict=True):
             watch.cycle(complete=axis.fresh)
         self._due_ns = due_ns + self._period_ns
         self._count += 1
-        return Tick(sync_ns, sync_ns - due_ns, skipped, self._complete)
+        return Tick(sync_ns, sync_ns - due_ns, skipped + silent, silent, missing == 0)
+
+    def _keep_silent(self) -> None:
+        """Let this tick pass, so that a late answer cannot be taken for one to the next SYNC."""
+        self.silent_total += 1
+        for axis, watch in zip(self.axes, self.watches, strict=True):
+            if not self._owed.isdisjoint(axis.tpdo_ids):
+                watch.cycle(complete=False)
+        self._due_ns += self._period_ns
+        self._port.timebase.wait_until(self._due_ns)
+        self._drain()
+        self._owed.clear()
 
     def send(self, controlwords: Sequence[int | None]) -> bool:
         """Send the RPDOs of all drives; they act at the next SYNC. False: the bus failed.
@@ -190,47 +209,28 @@ class Cycle:
     def _gather(self, until_ns: int) -> int:
         """Take frames until all process data is there or the deadline; how many are missing."""
         missing, receive, tpdos = self._expected, self._port.receive, self._tpdos
-        soonest_ns = until_ns - self._deadline_ns + self._soonest_ns
-        while missing:
-            message = receive(until_ns)
-            if message is None:
-                break
-            axis = tpdos.get(message.arbitration_id)
-            if axis is None or message.is_error_frame:
-                self.other(message)
-                if self._port.timebase.now_ns() >= until_ns:
+        self._owed.update(tpdos)
+        try:
+            while missing:
+                message = receive(until_ns)
+                if message is None:
                     break
-                continue
-            if self._owed and self._stale(message.arbitration_id, soonest_ns):
-                continue
-            before = axis.fresh
-            if not axis.feed(message.arbitration_id, bytes(message.data)):
-                self._by_node[axis.node.node_id].bad_total += 1
-            elif not before and axis.fresh:
-                missing -= len(axis.tpdo_ids)
+                cob_id = message.arbitration_id
+                axis = tpdos.get(cob_id)
+                if axis is None or message.is_error_frame:
+                    self.other(message)
+                    if self._port.timebase.now_ns() >= until_ns:
+                        break
+                    continue
+                self._owed.discard(cob_id)
+                before = axis.fresh
+                if not axis.feed(cob_id, bytes(message.data)):
+                    self._by_node[axis.node.node_id].bad_total += 1
+                elif not before and axis.fresh:
+                    missing -= len(axis.tpdo_ids)
+        except BusError as error:
+            self._failed(error)
         return missing
-
-    def _stale(self, cob_id: int, soonest_ns: int) -> bool:
-        """Whether a frame owed by the last cycle came sooner than an answer to this SYNC can."""
-        if cob_id not in self._owed or self._port.timebase.now_ns() >= soonest_ns:
-            return False
-        self._owed.discard(cob_id)
-        self._early.add(cob_id)
-        self.late_frames += 1
-        return True
-
-    def _remember(self) -> None:
-        """Which frames of this cycle may still come.
-
-        A bus without the wire's timing answers sooner than a wire: a frame that was refused for
-        that is not refused again.
-        """
-        if self._complete:
-            self._owed.clear()
-        else:
-            missing = {cob for cob, axis in self._tpdos.items() if not axis.fresh}
-            self._owed = missing - self._early
-        self._early.clear()
 
     def _drain(self) -> None:
         """Before SYNC: what has come by now is late or a copy, and must not pass for new."""

@@ -15,7 +15,7 @@ class Sample:
     late_ns: int
     """After its place on the grid."""
     skipped: int
-    """Ticks that were missed just before."""
+    """Ticks without SYNC just before."""
     motor_pos: tuple[float, ...]
     """[rad]"""
     link_pos: tuple[float, ...]

@@ -18,7 +18,8 @@ class NodeWatch:
         state: its NMT state, as last heard.
         emergency: the first one since `arm`.
         history: every emergency ever heard, the all-clear included.
-        missed: consecutive cycles without process data.
+        missed: cycles without process data since two in a row had theirs: every second answer is
+            no answer, and may be an old one.
         lost_total: all cycles without process data.
         bad_total: process data of a wrong length.
     """
@@ -33,6 +34,7 @@ class NodeWatch:
         self.lost_total = 0
         self.bad_total = 0
         self._rebooted = False
+        self._well = True
 
     def arm(self, now_ns: int) -> None:
         """From now on count: forget what was before."""
@@ -63,8 +65,11 @@ class NodeWatch:
     def cycle(self, *, complete: bool) -> None:
         """A cycle has passed, with its process data or without."""
         if complete:
-            self.missed = 0
+            if self._well:
+                self.missed = 0
+            self._well = True
         else:
+            self._well = False
             self.missed += 1
             self.lost_total += 1
 
