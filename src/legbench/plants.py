@@ -221,7 +221,7 @@ def _open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
     check_stopping(config, limits)
     if not choice.is_virtual(config):
         limits.require_complete()
-    session = open_session(config, choice, leg)
+    session = open_session(config, choice, leg, leads=not choice.read_only)
     granted = session.be_punctual()
     try:
         link = session.link(limits, leg.design.stiffness, read_only=choice.read_only)
@@ -285,13 +285,17 @@ def open_session(
 
 
 def _emulated(config: BusConfig, choice: CanChoice, leg: Leg | None) -> Network:
-    """The emulated leg; its drives run at the bitrate of the bus file, whatever is asked for."""
+    """The emulated leg; its drives run at the bitrate of the bus file, whatever is asked for.
+
+    For those who only look its drives have kept their configuration: nobody may write it.
+    """
     if leg is None:
-        return emulate(config)
+        return emulate(config, configured=choice.read_only)
     motors = [float(value) for value in leg.start.motor_pos]
     return emulate(
         config,
         [Behaviour(start_pos=motor) for motor in motors],
         body=EmulatedLeg(leg.design, leg.options, leg.start),
         faults=choice.faults,
+        configured=choice.read_only,
     )

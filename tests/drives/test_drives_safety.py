@@ -7,7 +7,7 @@ from pathlib import Path
 
 import can
 import pytest
-from drives_rig import LIMITS, MS, START, STIFFNESS, Rig, config, rig
+from drives_rig import LIMITS, MS, START, Rig, config, rig
 
 from legbench.drives.bus_file import bus_from_mapping
 from legbench.drives.cia402 import Controlword, DriveState, Goal, PowerMachine, decode_state
@@ -508,42 +508,3 @@ def test_a_bus_log_may_be_closed_twice(tmp_path: Path) -> None:
     log.close()
     log.close()
     assert log.error is None
-
-
-def test_read_only_writes_nothing_to_drives_that_are_configured(tmp_path: Path) -> None:
-    with rig(tmp_path) as it:
-        it.link.open()
-        before = it.network.now_ns
-        look = Link(
-            it.bus,
-            it.config,
-            LIMITS,
-            stiffness=STIFFNESS,
-            read_only=True,
-            lock=ChannelLock("look", tmp_path),
-        )
-        with look:
-            look.start()
-            written = [
-                frame
-                for at_ns, frame in it.network.log or []
-                if at_ns > before
-                and frame.cob_id in (0x601, 0x602)
-                and frame.data[0] & 0xE0 == 0x20
-            ]
-            assert written == []
-            it.network.inject(
-                FrameFault(kind=FrameFaultKind.DROP, cob_id=0x181, start_ns=it.network.now_ns)
-            )
-            with pytest.raises(PlantFault, match=r"'hip' .* sent no process data for 3 cycles"):
-                observe(look, 20)
-        assert it.words() == []
-
-
-def test_read_only_does_not_change_a_drive_that_has_power(tmp_path: Path) -> None:
-    with rig(tmp_path, read_only=True) as it:
-        it.network.advance(20 * MS)
-        it.network.drives[1].axis.power.state = OE
-        with pytest.raises(DriveError, match=r"'knee' \(node 2\) has power and is not configured"):
-            it.link.open()
-        assert it.words() == []

@@ -1,7 +1,7 @@
 """`legbench drives scan|status|jitter|budget`: looking, never enabling."""
 
 from contextlib import AbstractContextManager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -50,9 +50,10 @@ class Bench:
         """The design; raises DesignError."""
         return load_design(self.design)
 
-    def session(self, *, leads: bool) -> AbstractContextManager[Session]:
+    def session(self, *, leads: bool, read_only: bool = False) -> AbstractContextManager[Session]:
         """The bus, open, its channel locked by whoever leads; raises ConfigError, BusError."""
-        return open_session(self.config(), self.choice, leads=leads)
+        choice = replace(self.choice, read_only=read_only)
+        return open_session(self.config(), choice, leads=leads)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,7 +129,7 @@ class Jitter:
 
         if self.cycles < 1:
             raise ConfigError(f"cycles is {self.cycles}; it must be 1 or more")
-        with bench.session(leads=True) as session:
+        with bench.session(leads=True, read_only=True) as session:
             granted = session.be_punctual(self.cpu)
             timing = measure(session, bench.leg().stiffness, self.cycles)
         table = timing.table()

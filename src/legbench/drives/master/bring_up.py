@@ -155,6 +155,22 @@ class BringUp:
                 different.append((parameter, there))
         return different
 
+    def refuse_differences(self) -> None:
+        """For a master that may not configure; raises DriveError for the first drive that differs.
+
+        Process data that is mapped otherwise would be read as what it is not.
+        """
+        for node in self._bus.nodes:
+            different = self.differences(node)
+            if different:
+                parameter, there = different[0]
+                raise DriveError(
+                    f"node {node.node_id} ('{node.name}') holds {len(different)} objects otherwise "
+                    f"than the bus file, first {name_of(parameter.index, parameter.sub)}: {there}, "
+                    f"wanted {parameter.value}; read-only changes no drive: run `legbench drives "
+                    "configure --write` first"
+                )
+
     def configure(self, node: NodeConfig) -> int:
         """Write the configuration, reading every object back; how many.
 

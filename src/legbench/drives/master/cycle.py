@@ -78,7 +78,7 @@ class Cycle:
         self.stopping = False
         self._tpdos = {cob: axis for axis in self.axes for cob in axis.tpdo_ids}
         self._expected = len(self._tpdos)
-        self._ours = frozenset(
+        self._masters = self._ours = frozenset(
             {NMT_ID, SYNC_ID, HEARTBEAT_BASE + config.master_id}
             | {node.rpdo_id(pdo) for node in config.nodes for pdo in node.rpdos}
         )
@@ -140,6 +140,53 @@ class Cycle:
         self._due_ns = due_ns + self._period_ns
         self._count += 1
         return Tick(sync_ns, sync_ns - due_ns, skipped + silent, silent, missing == 0)
+
+    def hears_sync(self, until_ns: int) -> bool:
+        """Whether another master sends SYNC by then; from its first one on this one may `follow`.
+
+        Raises:
+            BusError: the bus has failed.
+        """
+        self._ours = frozenset[int]()
+        heard = self._await_sync(until_ns) is not None
+        if not heard:
+            self._ours = self._masters
+        return heard
+
+    def follow(self) -> Tick:
+        """Wait for the SYNC of another master, gather process data; nothing is sent."""
+        timebase, last_ns = self._port.timebase, self._due_ns
+        self.bus_error = None
+        missing, skipped = self._expected, 0
+        sync_ns = None
+        try:
+            sync_ns = self._await_sync(timebase.now_ns() + 2 * self._period_ns)
+        except BusError as error:
+            self._failed(error)
+        for axis in self.axes:
+            axis.begin_cycle()
+        if sync_ns is not None:
+            skipped = max(0, round((sync_ns - last_ns) / self._period_ns) - 1)
+            missing = self._gather(sync_ns + self._deadline_ns)
+        self._due_ns = sync_ns or last_ns
+        for axis, watch in zip(self.axes, self.watches, strict=True):
+            watch.cycle(complete=axis.fresh)
+        return Tick(sync_ns or timebase.now_ns(), 0, skipped, 0, missing == 0)
+
+    def _await_sync(self, until_ns: int) -> int | None:
+        """When the SYNC of another master came; none by then [ns]."""
+        now_ns = self._port.timebase.now_ns
+        while now_ns() < until_ns:
+            message = self._port.receive(until_ns)
+            if message is None:
+                break
+            if message.arbitration_id == SYNC_ID and not message.is_error_frame:
+                return now_ns()
+            if message.arbitration_id in self._tpdos and not message.is_error_frame:
+                self.late_frames += 1
+            else:
+                self.other(message)
+        return None
 
     def _keep_silent(self) -> None:
         """Let this tick pass, so that a late answer cannot be taken for one to the next SYNC."""

@@ -6,7 +6,8 @@ from typing import final
 import can
 
 from legbench.drives.codec.frame import Frame
-from legbench.drives.errors import BusError
+from legbench.drives.errors import BusError, DriveError
+from legbench.drives.master.read_only import MaySend
 from legbench.drives.timebase import Timebase
 from legbench.errors import LegbenchError
 
@@ -23,6 +24,7 @@ class Port:
         timebase: of the bus.
         bus: for those who need the driver itself.
         error_frames: heard so far.
+        may_send: asked before every frame, where not all may go out.
     """
 
     def __init__(
@@ -31,13 +33,17 @@ class Port:
         self.bus, self.timebase = bus, timebase
         self._listener = listener
         self.error_frames = 0
+        self.may_send: MaySend | None = None
 
     def send(self, cob_id: int, data: bytes = b"") -> None:
         """Send a frame.
 
         Raises:
             BusError: the driver did not take it.
+            DriveError: it may not be sent, in read-only.
         """
+        if self.may_send is not None and not self.may_send(cob_id, data):
+            raise DriveError(f"read-only: {cob_id:03X}#{data.hex().upper()} is not sent")
         message = can.Message(
             arbitration_id=cob_id, data=data, is_extended_id=False, check=False, is_rx=False
         )
