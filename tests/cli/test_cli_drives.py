@@ -15,6 +15,8 @@ from legbench.drives.bus_file import load_bus
 from legbench.drives.config import BusConfig
 from legbench.drives.emulated.network import Network
 from legbench.drives.master.lock import ChannelLock
+from legbench.drives.realtime import Granted
+from legbench.drives.session import Session
 
 HARDWARE = Path(__file__).parents[2] / "hardware"
 MODELS = Path(__file__).parents[2] / "models"
@@ -92,7 +94,8 @@ def test_zero_writes_offsets_and_keeps_the_comments(
 def test_home_calls_the_present_position_zero(drives: Drives) -> None:
     done = drives("home", "--node", "motor2", "--json")
     assert done.status == 0, done.err
-    assert json.loads(done.out)["after_counts"] == 0
+    told = json.loads(done.out)
+    assert (told["after_counts"], told["granted"]) == (0, None)
 
 
 def test_jog_moves_one_motor_and_comes_back(drives: Drives) -> None:
@@ -101,6 +104,23 @@ def test_jog_moves_one_motor_and_comes_back(drives: Drives) -> None:
     jogged = json.loads(done.out)
     moved = [after - before for before, after in zip(*_ends(jogged), strict=True)]
     assert moved == pytest.approx([0.05, 0.0], abs=1e-4)
+    assert jogged["granted"] is None
+
+
+@pytest.mark.parametrize(
+    "command", [("home", "--node", "motor1"), ("jog", "--node", "motor1")], ids=lambda it: it[0]
+)
+def test_what_moves_asks_for_real_time_and_says_what_was_granted(
+    command: tuple[str, ...], drives: Drives, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    granted = Granted(
+        fifo="refused (no)", mlockall="granted", affinity="", spin_us=0, kernel="", preemption=""
+    )
+    monkeypatch.setattr(Session, "be_punctual", lambda _session: granted)
+    done = drives(*command)
+    assert done.status == 0, done.err
+    assert "SCHED_FIFO refused (no); locked memory granted" in done.err
+    assert json.loads(drives(*command, "--json").out)["granted"]["fifo"] == "refused (no)"
 
 
 def _ends(jogged: dict[str, list[float]]) -> tuple[list[float], list[float]]:

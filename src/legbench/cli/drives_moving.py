@@ -11,10 +11,17 @@ from types import FrameType
 from legbench.cli.drives_reading import Bench
 from legbench.cli.output import note, print_json
 from legbench.drives.config import NodeConfig
+from legbench.drives.realtime import Granted
 from legbench.drives.session import Session
 from legbench.errors import ConfigError
 from legbench.loop import STOP_SIGNALS
 from legbench.plants import LIMITS_NAME, limits_for
+
+
+def tell(granted: Granted | None) -> None:
+    """What the system granted to those who move motors; in virtual time nothing was asked."""
+    if granted is not None:
+        note(f"SCHED_FIFO {granted.fifo}; locked memory {granted.mlockall}")
 
 
 @contextmanager
@@ -115,10 +122,12 @@ class Home:
         from legbench.commissioning.home import home
 
         with interrupted_by_signals(), bench.session(leads=True) as session:
+            granted = session.be_punctual()
             homed = home(session, _node(session, self.node), self.method, timeout=self.timeout)
         if bench.json:
-            print_json(asdict(homed))
+            print_json({**asdict(homed), "granted": granted and asdict(granted)})
         else:
+            tell(granted)
             print(
                 f"{homed.node}: method {homed.method}, {homed.before_counts} counts before, "
                 f"{homed.after_counts} after"
@@ -146,6 +155,7 @@ class Jog:
         design = bench.leg()
         limits = limits_for(bench.limits or bench.bus.parent / LIMITS_NAME, design)
         with interrupted_by_signals(), bench.session(leads=True) as session:
+            granted = session.be_punctual()
             jogged = jog(
                 session,
                 limits,
@@ -156,8 +166,9 @@ class Jog:
                 back=not self.stay,
             )
         if bench.json:
-            print_json(asdict(jogged))
+            print_json({**asdict(jogged), "granted": granted and asdict(granted)})
             return 0
+        tell(granted)
         note("enabled where they stood; quick stop at the end")
         for place, (before, after) in enumerate(
             zip(jogged.before_pos, jogged.after_pos, strict=True), start=1

@@ -1,7 +1,11 @@
 """One fault in mid-jump on the emulated leg, and what came of it."""
 
+import os
+import signal
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Protocol
 
 from legbench.control import JumpConfig
 from legbench.design import LegDesign
@@ -55,6 +59,25 @@ class Trial:
     """The master itself stops without a word, as by SIGKILL or SIGSTOP."""
     interrupted: bool = False
     """^C."""
+    viewer: bool = False
+    """The live view of the run is frozen, by SIGSTOP."""
+
+
+class View(Protocol):
+    """A live view of a run, in a process of its own."""
+
+    @property
+    def pid(self) -> int:
+        """Of the process."""
+        ...
+
+    def stop(self) -> None:
+        """End it."""
+        ...
+
+
+StartView = Callable[[Path], View]
+"""Opens a view of the run in a folder."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,6 +96,8 @@ class Result:
     intact: bool
     """Every row is in the recording, which says how it ended."""
     lost_cycles: int
+    run: Path
+    """Its recording."""
 
     @property
     def safe(self) -> bool:
@@ -164,10 +189,13 @@ TRIALS = (
     Trial(name="over-temperature", faults=(_node(_N.OVER_TEMPERATURE, 2),), cause=EMERGENCY),
     Trial(name="master killed or frozen", gone=True, cause="master gone"),
     Trial(name="^C", interrupted=True),
+    Trial(name="the viewer hangs", viewer=True),
 )
 
 
-def try_fault(trial: Trial, bus_file: Path, design: LegDesign, out: Path) -> Result:
+def try_fault(
+    trial: Trial, bus_file: Path, design: LegDesign, out: Path, start_view: StartView | None = None
+) -> Result:
     """Jump on the emulated leg, let the fault strike, see what is left.
 
     Raises:
@@ -183,7 +211,13 @@ def try_fault(trial: Trial, bus_file: Path, design: LegDesign, out: Path) -> Res
     network = _network(opened)
     with opened.plant, RunWriter.create(out, opened.manifest, name="trial") as writer:
         opened.start_log(writer.path)
-        outcome = _run(trial, opened, chosen, writer, network)
+        view = None if start_view is None or not trial.viewer else start_view(writer.path)
+        try:
+            outcome = _run(trial, opened, chosen, writer, network, view)
+        finally:
+            if view is not None:
+                view.stop()
+                os.kill(view.pid, signal.SIGCONT)
         strike_ns = network.now_ns if trial.gone or trial.interrupted else STRIKE_NS
         ticks = outcome.cycles + opened.events()["bus"]["skipped_cycles"]
         reaction_ns = round(1e9 * (opened.began or 0.0)) + ticks * MS
@@ -204,6 +238,7 @@ def try_fault(trial: Trial, bus_file: Path, design: LegDesign, out: Path) -> Res
         excess=_excess(writer.path / BUS_LOG, config, limits),
         intact=intact and found.manifest["cause"] == outcome.cause,
         lost_cycles=max(opened.events()["bus"]["lost_cycles"]),
+        run=writer.path,
     )
 
 
@@ -215,13 +250,22 @@ def _network(opened: OpenPlant) -> Network:
 
 
 def _run(
-    trial: Trial, opened: OpenPlant, chosen: Experiment, writer: RunWriter, network: Network
+    trial: Trial,
+    opened: OpenPlant,
+    chosen: Experiment,
+    writer: RunWriter,
+    network: Network,
+    view: View | None,
 ) -> Outcome:
     stop = StopFlag()
 
     def watch(_done: int, _total: int) -> None:
-        if (trial.gone or trial.interrupted) and network.now_ns >= STRIKE_NS:
+        if network.now_ns < STRIKE_NS:
+            return
+        if trial.gone or trial.interrupted:
             stop.set()
+        if view is not None:
+            os.kill(view.pid, signal.SIGSTOP)
 
     controller = make_controller(chosen.controller, targets_of(chosen))
     outcome = run(opened.plant, controller, CYCLES, sink=writer, stop=stop, progress=watch)
