@@ -1,6 +1,7 @@
 """An answer that is late never passes for new, whatever it says and however late it is."""
 
 import random
+import struct
 from collections.abc import Callable
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import pytest
 from drives_rig import LIMITS, MS, START, Rig, config, rig
 
 from legbench.drives.cia402 import DriveState
+from legbench.drives.codec.frame import Frame
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.faults import FrameFault, FrameFaultKind
 from legbench.errors import PlantFault
@@ -127,3 +129,21 @@ def test_a_stop_waits_for_no_late_answer(tmp_path: Path) -> None:
         syncs = [at for at, frame in it.network.log or [] if frame.cob_id == 0x080 and at > before]
         assert syncs[0] // MS == before // MS + 1
         assert it.link.cycle.silent_total == 0
+
+
+def test_a_late_answer_behind_a_frame_of_others_is_found_too(tmp_path: Path) -> None:
+    with rig(tmp_path) as it:
+        it.link.start()
+        it.run(5)
+        other = it.network.attach()
+        it.network.advance(it.network.now_ns // MS * MS + 700_000)
+        old = it.link.cycle.axes[1].motor_counts + 5000
+        for frame in (
+            Frame(0x1234567, b"x", extended=True),
+            Frame(0x123, remote=True),
+            Frame(KNEE, struct.pack("<Hih", 0x1237, old, 0)),
+        ):
+            it.network.send(other, frame)
+        it.link.exchange()
+        assert it.link.cycle.late_frames == 1
+        assert it.link.cycle.axes[1].motor_counts != old

@@ -216,7 +216,7 @@ def test_a_listener_that_fails_hears_nothing_more_and_stops_nothing(tmp_path: Pa
         def full(_message: can.Message) -> None:
             raise RuntimeError("no more room")
 
-        it.link._port._listener = full
+        it.link.tell(full)
         it.run(20)
         it.link.stop()
         assert it.states == [SO, SO]

@@ -148,7 +148,7 @@ def _build(
     known = {
         field.name: field
         for field in fields(kind)  # pyright: ignore[reportArgumentType]
-        if NOT_IN_FILES not in field.metadata
+        if field.init and NOT_IN_FILES not in field.metadata
     }
     unknown = sorted(set(given) - set(known))
     if unknown:

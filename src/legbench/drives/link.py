@@ -114,6 +114,10 @@ class Link:
         self._holds = False
         self.listening = False
 
+    def tell(self, listener: Listener) -> None:
+        """Show every frame to a listener from now on."""
+        self._port.listener = listener
+
     # --- before anything moves ---------------------------------------------------------------
 
     def open(self) -> None:

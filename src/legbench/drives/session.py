@@ -69,14 +69,11 @@ class Session:
         self.timebase = SystemTime(1000 * granted.spin_us)
         return granted
 
-    def heard(self, message: can.Message) -> None:
-        """Every frame comes past here."""
-        if self.log is not None:
-            self.log(message)
-
     def log_to(self, path: Path) -> None:
-        """Write every frame from now on; raises BusError if the file cannot be made."""
+        """Write every frame of all links from now on; raises BusError if there can be no file."""
         self.log = BusLog(path, str(getattr(self.bus, "channel", "can")))
+        for link in self._links:
+            link.tell(self.log)
 
     def _lock_of_bus(self) -> ChannelLock:
         """An emulated bus of this process has no other master."""
@@ -90,7 +87,7 @@ class Session:
 
     def port(self) -> Port:
         """Frames in and out."""
-        return Port(self.bus, self.timebase, self.heard)
+        return Port(self.bus, self.timebase, self.log)
 
     def bring_up(self) -> BringUp:
         """SDO access to all nodes of the bus file."""
@@ -106,7 +103,7 @@ class Session:
             limits,
             stiffness=stiffness,
             timebase=self.timebase,
-            listener=self.heard,
+            listener=self.log,
             read_only=read_only,
             lock=self._lock,
         )

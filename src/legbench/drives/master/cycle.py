@@ -6,8 +6,7 @@ tick, that tick is silent: without a SYNC, whatever comes answers an earlier one
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import final
+from typing import NamedTuple, final
 
 import can
 
@@ -31,8 +30,7 @@ ERROR_FRAME_BUS_OFF = 0x40
 """Class of a SocketCAN error frame: this controller has left the bus."""
 
 
-@dataclass(frozen=True, slots=True)
-class Tick:
+class Tick(NamedTuple):
     """When a cycle began."""
 
     time_ns: int
@@ -96,6 +94,7 @@ class Cycle:
         self._count = 0
         self._owed: set[int] = set()
         """Process data that has not come, and may still."""
+        self._sync = port.message(SYNC_ID)
 
     def begin(self) -> None:
         """Lay the grid: the next tick is one period from now, on a whole period."""
@@ -130,7 +129,7 @@ class Cycle:
         sync_ns = timebase.now_ns()
         missing = self._expected
         try:
-            self._port.send(SYNC_ID)
+            self._port.put(self._sync)
         except BusError as error:
             self._failed(error)
         else:
@@ -256,7 +255,7 @@ class Cycle:
     def _gather(self, until_ns: int) -> int:
         """Take frames until all process data is there or the deadline; how many are missing."""
         missing, receive, tpdos = self._expected, self._port.receive, self._tpdos
-        self._owed.update(tpdos)
+        garbled: set[int] = set()
         try:
             while missing:
                 message = receive(until_ns)
@@ -269,20 +268,23 @@ class Cycle:
                     if self._port.timebase.now_ns() >= until_ns:
                         break
                     continue
-                self._owed.discard(cob_id)
                 before = axis.fresh
-                if not axis.feed(cob_id, bytes(message.data)):
+                if not axis.feed(cob_id, message.data):
+                    garbled.add(cob_id)
                     self._by_node[axis.node.node_id].bad_total += 1
-                elif not before and axis.fresh:
+                elif axis.fresh and not before:
                     missing -= len(axis.tpdo_ids)
         except BusError as error:
             self._failed(error)
+        if missing:
+            owed = {cob_id for axis in self.axes for cob_id in axis.missing_ids}
+            self._owed = owed - garbled
         return missing
 
     def _drain(self) -> None:
         """Before SYNC: what has come by now is late or a copy, and must not pass for new."""
         try:
-            while (message := self._port.receive(0)) is not None:
+            while (message := self._port.take()) is not None:
                 if message.arbitration_id in self._tpdos and not message.is_error_frame:
                     self.late_frames += 1
                     self._owed.discard(message.arbitration_id)

@@ -1,14 +1,15 @@
 """What one cycle showed."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from legbench.drives.master.cycle import Cycle, Tick
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Sample:
-    """One cycle; one value a drive, in the order of the leg's joints."""
+class Sample(NamedTuple):
+    """One cycle; one value a drive, in the order of the leg's joints. A tuple, because one is made
+    a millisecond.
+    """
 
     time_ns: int
     """SYNC was sent, on the link's time base."""
@@ -39,14 +40,14 @@ def sample_of(
     motor = tuple([axis.motor_pos for axis in axes])
     links = tuple([axis.link_pos for axis in axes])
     return Sample(
-        time_ns=tick.time_ns,
-        late_ns=tick.late_ns,
-        skipped=tick.skipped,
-        motor_pos=motor,
-        link_pos=links,
-        spring_torque=tuple([k * (a - b) for k, a, b in zip(stiffness, motor, links, strict=True)]),
-        applied_pos=applied_pos,
-        statusword=tuple([axis.statusword for axis in axes]),
-        fresh=tuple([axis.fresh for axis in axes]),
-        temperature=tuple([poll.celsius for poll in cycle.polls]),
+        tick.time_ns,
+        tick.late_ns,
+        tick.skipped,
+        motor,
+        links,
+        tuple([k * (a - b) for k, a, b in zip(stiffness, motor, links, strict=True)]),
+        applied_pos,
+        tuple([axis.statusword for axis in axes]),
+        tuple([axis.fresh for axis in axes]),
+        tuple([poll.celsius for poll in cycle.polls]),
     )

@@ -10,6 +10,7 @@ from legbench.drives.master.cycle import Cycle, Tick
 from legbench.drives.timebase import Timebase
 from legbench.errors import PlantFault
 
+FOLLOWS = int(StatusBit.FOLLOWS_COMMAND)
 MISSING_TEMPERATURES = 3
 """Requests in a row without an answer that end the run, where a temperature is limited."""
 
@@ -98,7 +99,7 @@ class Supervisor:
                     f"drive '{axis.node.name}' (node {axis.node.node_id}) left operation enabled: "
                     f"{describe_statusword(axis.statusword)}",
                 )
-            ignored = ignored or not axis.statusword & StatusBit.FOLLOWS_COMMAND
+            ignored = ignored or not axis.statusword & FOLLOWS
         self._ignored = self._ignored + 1 if ignored else 0
         if self._ignored > self._limits.following_cycles:
             words = "; ".join(describe_statusword(axis.statusword) for axis in self._cycle.axes)

@@ -25,7 +25,7 @@ class NodeWatch:
     """
 
     def __init__(self, bus: BusConfig, node: NodeConfig, now_ns: int) -> None:
-        self._node = node
+        self._node, self._who = node, f"drive '{node.name}' (node {node.node_id})"
         self._beat = HeartbeatWatch(1_000_000 * HEARTBEATS * bus.heartbeat_ms, now_ns)
         self.state: NmtState | None = None
         self.emergency: Emergency | None = None
@@ -75,7 +75,7 @@ class NodeWatch:
 
     def trouble(self, now_ns: int, lost_frames: int) -> tuple[str, str] | None:
         """Cause and message of what is wrong, if anything is."""
-        who = f"drive '{self._node.name}' (node {self._node.node_id})"
+        who = self._who
         if self.emergency is not None:
             return "drive emergency", f"{who}: {self.emergency}"
         if self._rebooted:
