@@ -144,6 +144,9 @@ class Guard:
                     f"the command of motor {len(applied) + 1} jumps by {abs(value - wished):.3f} "
                     f"rad in one cycle, the limit is {limits.command_step:g} rad; smooth it",
                 )
+            if low <= value <= high and -step <= value - last <= step:
+                applied.append(value)
+                continue
             # From outside the range the way leads back no faster than wished.
             wanted = min(max(value, low if low < last else last), high if high > last else last)
             applied.append(min(max(wanted, last - step), last + step))

@@ -49,6 +49,7 @@ class AxisLink:
             cob_id: (1 << number, layout, _wanted(layout, node))
             for number, (cob_id, layout) in enumerate(maps.items())
         }
+        self._tpdo_ids = tuple(maps)
         self._all = (1 << len(maps)) - 1
         self._missing = self._all
         self.fresh = False
@@ -67,7 +68,12 @@ class AxisLink:
     @property
     def tpdo_ids(self) -> tuple[int, ...]:
         """COB-IDs to expect after every SYNC."""
-        return tuple(self._tpdos)
+        return self._tpdo_ids
+
+    @property
+    def rpdo_ids(self) -> tuple[int, ...]:
+        """COB-IDs of its commands."""
+        return tuple(cob_id for cob_id, _ in self._rpdos)
 
     @property
     def known(self) -> bool:

@@ -95,6 +95,9 @@ class Cycle:
         self._owed: set[int] = set()
         """Process data that has not come, and may still."""
         self._sync = port.message(SYNC_ID)
+        self._commands = {
+            cob_id: port.message(cob_id) for axis in self.axes for cob_id in axis.rpdo_ids
+        }
 
     def begin(self) -> None:
         """Lay the grid: the next tick is one period from now, on a whole period."""
@@ -208,8 +211,11 @@ class Cycle:
             if controlword is None:
                 continue
             for cob_id, data in axis.frames(controlword):
+                message = self._commands[cob_id]
+                message.data = bytearray(data)
+                message.dlc = len(data)
                 try:
-                    self._port.send(cob_id, data)
+                    self._port.put(message)
                 except BusError as error:
                     self._failed(error)
                     sent = False

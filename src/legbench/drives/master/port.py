@@ -43,8 +43,6 @@ class Port:
             BusError: the driver did not take it.
             DriveError: it may not be sent, in read-only.
         """
-        if self.may_send is not None and not self.may_send(cob_id, data):
-            raise DriveError(f"read-only: {cob_id:03X}#{data.hex().upper()} is not sent")
         self.put(self.message(cob_id, data))
 
     @staticmethod
@@ -53,7 +51,10 @@ class Port:
         return can.Message(arbitration_id=cob_id, data=data, is_extended_id=False, is_rx=False)
 
     def put(self, message: can.Message) -> None:
-        """Send a message that is kept and sent again and again, as it is; raises BusError."""
+        """Send a message that is kept for many cycles; raises as `send` does."""
+        if self.may_send is not None and not self.may_send(message.arbitration_id, message.data):
+            text = f"{message.arbitration_id:03X}#{message.data.hex().upper()}"
+            raise DriveError(f"read-only: {text} is not sent")
         try:
             self.bus.send(message)
         except LegbenchError:

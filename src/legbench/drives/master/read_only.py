@@ -11,13 +11,13 @@ from legbench.drives.codec.frame import (
 )
 from legbench.drives.codec.nmt import NmtCommand
 
-MaySend = Callable[[int, bytes], bool]
+MaySend = Callable[[int, bytes | bytearray], bool]
 """Whether a frame, by identifier and data, may go out."""
 READING = (2, 3, 4)
 """Client command specifiers of SDO: upload, upload segment, abort."""
 
 
-def may_read(cob_id: int, data: bytes) -> bool:
+def may_read(cob_id: int, data: bytes | bytearray) -> bool:
     """Questions only: an SDO upload changes nothing in a drive."""
     asked = SDO_REQUEST_BASE < cob_id <= SDO_REQUEST_BASE + LAST_NODE
     return asked and bool(data) and data[0] >> 5 in READING
@@ -29,7 +29,7 @@ def may_pace(master_id: int) -> MaySend:
     """
     orders = (NmtCommand.START, NmtCommand.ENTER_PRE_OPERATIONAL)
 
-    def allowed(cob_id: int, data: bytes) -> bool:
+    def allowed(cob_id: int, data: bytes | bytearray) -> bool:
         if cob_id == NMT_ID:
             return data[:1] in [bytes((order,)) for order in orders]
         return cob_id in (SYNC_ID, HEARTBEAT_BASE + master_id) or may_read(cob_id, data)
