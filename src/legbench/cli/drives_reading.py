@@ -66,7 +66,10 @@ class Scan:
     def run(self, bench: Bench) -> int:
         """Print every node; 1 if a node of the bus file is not there."""
         from legbench.commissioning.scan import scan
+        from legbench.drives.codec.frame import LAST_NODE
 
+        if not 1 <= self.last <= LAST_NODE:
+            raise ConfigError(f"last is {self.last}; node ids are 1 to {LAST_NODE}")
         with bench.session(leads=False) as session:
             found = list(scan(session, self.last))
             names = {f"'{node.name}' of the bus file" for node in session.config.nodes}

@@ -11,9 +11,10 @@ from can.util import load_config
 from legbench.drives.bus import LockstepBus
 from legbench.drives.config import BusConfig
 from legbench.drives.errors import BusError
+from legbench.drives.interface import check_interface
 from legbench.drives.timebase import SystemTime, Timebase
 
-SLCAN = "slcan"
+SLCAN, SOCKETCAN = "slcan", "socketcan"
 TERMINALS = "/dev/pts/"
 """Of pseudo terminals on Linux."""
 SHARED = ("legbench", "legbench_unix", "socketcan", "socketcand", "udp_multicast", "virtual")
@@ -59,8 +60,10 @@ def open_bus(config: BusConfig, adapter: Adapter) -> can.BusABC:
     """Open an adapter at the bitrate of a bus; SocketCAN's is set with `ip link`, not here.
 
     Raises:
-        BusError: no such interface or channel, or it is down.
+        BusError: no such interface or channel, it is down, or runs at another bitrate.
     """
+    if adapter.interface == SOCKETCAN and adapter.channel is not None:
+        check_interface(config, adapter.channel)
     given = {
         "interface": adapter.interface,
         "channel": adapter.channel,
