@@ -2,12 +2,14 @@
 
 import itertools
 import os
+import random
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
 import can
 import pytest
+from can.interfaces import slcan
 from can.interfaces.slcan import slcanBus
 from can_rig import BUS, MS
 
@@ -204,3 +206,26 @@ def test_a_terminal_that_goes_is_a_bus_error(server: SlcanServer) -> None:
         bus.recv(0.0)
     with suppress(can.CanOperationError):
         bus.shutdown()
+
+
+def test_a_missing_package_names_the_extra(
+    server: SlcanServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(slcan, "serial", None)
+    with pytest.raises(BusError, match=r"pip install 'legbench\[slcan\]'"):
+        open_bus(load_bus(BUS), Adapter(interface="slcan", channel=server.path))
+
+
+def test_no_bytes_hurt_either_side(network: Network, server: SlcanServer) -> None:
+    chance = random.Random(7)
+    letters = b"SsOCLtTrRFVNZX0123456789ABCDEFabcxyz\r\r\r\r\a\x00\xff"
+    adapter = SlcanAdapter(network)
+    with opened(server) as bus:
+        for _ in range(3000):
+            chunk = bytes(chance.choices(letters, k=chance.randrange(1, 60)))
+            assert adapter.feed(chunk) is not None
+            network.advance(network.now_ns + MS // 10)
+            adapter.take()
+            os.write(server._ours, chunk)
+            while bus.recv(0.0) is not None:
+                continue

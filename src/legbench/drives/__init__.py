@@ -41,11 +41,15 @@ For commissioning:
     objects: OBJECTS, name_of;  configuration.configuration(bus, node): what is written, in order
     wire: schedule, bus_load, check_load (80 %);  master.bus_log.BusLog: candump lines
     master.lock.ChannelLock.of_channel(interface, channel): taken before the interface is opened
+    up.contact(): around a first question, so that a wrong bitrate is named
+    interface.check_interface(config, channel): a SocketCAN interface is up, at the right bitrate
     limits.SafetyLimits.require_complete(), stopping.check_stopping: before real drives are led
     timebase: SystemTime (absolute sleeps), NetworkTime
     eds.eds_text(), eds.dcf_text(config, node);  units.AxisUnits: counts <-> rad
 
-Modules: `codec/` (pure: frame, datatypes, nmt, emcy, pdo, sdo, sdo_client, sdo_server), `cia402`
-(pure), `config`, `bus_file`, `configuration`, `objects`, `units`, `limits`, `wire`, `emulated/`
-(pure), `bus` (python-can plugin), `master/` and `link` (I/O).
+Modules: `codec/` (pure: frame, datatypes, nmt, emcy, pdo, sdo, sdo_client, sdo_server, slcan),
+`cia402` (pure), `config`, `bus_file`, `configuration`, `objects`, `units`, `limits`, `wire`,
+`emulated/` (pure), `bus` and `unix_bus` (python-can plugins), `slcan_bus` (python-can's, with its own
+`recv`), `unix_server`, `slcan_server` and `bus_server` (the emulated leg for other processes),
+`master/` and `link` (I/O).
 """

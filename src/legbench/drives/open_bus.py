@@ -83,7 +83,10 @@ def _slcan(given: dict[str, object]) -> can.BusABC:
     if os.path.realpath(str(options["channel"])).startswith(TERMINALS):
         # A real adapter needs two seconds to boot after it has been opened.
         options.setdefault("sleep_after_open", 0.0)
-    return import_module("legbench.drives.slcan_bus").SlcanBus(**options)
+    try:
+        return import_module("legbench.drives.slcan_bus").SlcanBus(**options)
+    except can.CanInterfaceNotImplementedError as error:
+        raise BusError(f"slcan: {error}; pip install 'legbench[slcan]'") from None
 
 
 def _named(interface: str | None, channel: str | None, error: Exception) -> BusError:

@@ -27,7 +27,9 @@ class SlcanBus(slcanBus):
         """Open it; raises as python-can's does."""
         self._partial = b""
         self._lines: deque[bytes] = deque()
+        self._is_shutdown = True  # One that does not open has nothing to be shut down.
         super().__init__(channel, **options)
+        self._is_shutdown = False
         self.channel_info = f"slcan {channel}"
         self.channel = channel
 
