@@ -175,3 +175,31 @@ def test_a_run_over_the_slcan_of_python_can(tmp_path: Path) -> None:
     assert (manifest["status"], manifest["bus"]["interface"]) == ("complete", "slcan")
     log = (run_folder(tmp_path) / "bus.log").read_text(encoding="ascii")
     assert all(f" {cob_id}#" in log for cob_id in ("080", "181", "182", "201", "202"))
+
+
+def test_looking_beside_a_master_changes_nothing_for_it(tmp_path: Path) -> None:
+    with served(tmp_path) as drives:
+        drives.await_state("switch on disabled")
+        run = master(tmp_path)
+        try:
+            drives.await_state("operation enabled")
+            rows_on_disk(tmp_path)
+            look = started(
+                tmp_path,
+                *("run", "position-jump", "--plant", "can", "--bus", "leg.toml", "--read-only"),
+                *("--interface", "legbench_unix", "--channel", "leg.sock", "--out", "looks"),
+                *("--duration", "0.3", "--design", str(ROOT / "models" / "optimal.toml")),
+            )
+            _, complaint = look.communicate(timeout=PATIENCE)
+            assert look.returncode == 0, complaint
+            assert run.poll() is None
+            os.kill(run.pid, signal.SIGINT)
+            drives.await_state("switch on disabled")
+            _, trouble = run.communicate(timeout=PATIENCE)
+        finally:
+            end(run)
+    assert run.returncode == 0, trouble
+    kept = run_folder(tmp_path)
+    assert json.loads((kept / "run.json").read_text())["status"] == "interrupted"
+    # The drives stayed enabled from the master's start to its ^C.
+    assert [state for _, state in drives.seen].count("operation enabled") == 2

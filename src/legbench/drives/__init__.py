@@ -49,7 +49,7 @@ For commissioning:
 
 Modules: `codec/` (pure: frame, datatypes, nmt, emcy, pdo, sdo, sdo_client, sdo_server, slcan),
 `cia402` (pure), `config`, `bus_file`, `configuration`, `objects`, `units`, `limits`, `wire`,
-`emulated/` (pure), `bus` and `unix_bus` (python-can plugins), `slcan_bus` (python-can's, with its own
-`recv`), `unix_server`, `slcan_server` and `bus_server` (the emulated leg for other processes),
-`master/` and `link` (I/O).
+`emulated/` (pure), `bus` and `unix_bus` (python-can plugins), `slcan_bus` (python-can's, with a
+`recv` of its own), `unix_server`, `slcan_server` and `bus_server` (the emulated leg for other
+processes), `interface`, `master/` and `link` (I/O).
 """
