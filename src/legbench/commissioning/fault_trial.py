@@ -3,6 +3,7 @@
 import os
 import signal
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
@@ -25,6 +26,7 @@ from legbench.drives.emulated.faults import (
 from legbench.drives.emulated.network import Network
 from legbench.drives.errors import DriveError
 from legbench.drives.limits import SafetyLimits
+from legbench.errors import ConfigError
 from legbench.experiment import Experiment, make_controller, start_of, targets_of
 from legbench.loop import Outcome, StopFlag, run
 from legbench.plants import BUS_LOG, EMULATED, LIMITS_NAME, CanChoice, Leg, OpenPlant, open_plant
@@ -199,8 +201,11 @@ def try_fault(
     """Jump on the emulated leg, let the fault strike, see what is left.
 
     Raises:
-        ConfigError, RecordingError: as `open_plant`, `RunWriter`.
+        ConfigError: the trial needs a viewer, and none is given; or as `open_plant`.
+        RecordingError: as `RunWriter`.
     """
+    if trial.viewer and start_view is None:
+        raise ConfigError(f"the trial '{trial.name}' needs a viewer to freeze: give start_view")
     config = load_bus(bus_file)
     limits = load_limits(bus_file.parent / LIMITS_NAME)
     choice = CanChoice(bus=bus_file, interface=EMULATED, faults=trial.faults)
@@ -211,13 +216,14 @@ def try_fault(
     network = _network(opened)
     with opened.plant, RunWriter.create(out, opened.manifest, name="trial") as writer:
         opened.start_log(writer.path)
-        view = None if start_view is None or not trial.viewer else start_view(writer.path)
+        view = start_view(writer.path) if trial.viewer and start_view is not None else None
         try:
             outcome = _run(trial, opened, chosen, writer, network, view)
         finally:
             if view is not None:
                 view.stop()
-                os.kill(view.pid, signal.SIGCONT)
+                with suppress(ProcessLookupError):
+                    os.kill(view.pid, signal.SIGCONT)
         strike_ns = network.now_ns if trial.gone or trial.interrupted else STRIKE_NS
         ticks = outcome.cycles + opened.events()["bus"]["skipped_cycles"]
         reaction_ns = round(1e9 * (opened.began or 0.0)) + ticks * MS
