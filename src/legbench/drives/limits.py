@@ -184,9 +184,10 @@ class Guard:
         joint_pos: Sequence[float],
         spring_torque: Sequence[float],
         expected_pos: Sequence[float] | None = None,
-        temperature: Sequence[float] = (),
+        temperature: Sequence[float | None] = (),
     ) -> None:
-        """Look at what a cycle showed; `expected_pos` is where the motors should be by now.
+        """Look at what a cycle showed; `expected_pos` is where the motors should be by now, a
+        temperature that is not known is none.
 
         Raises:
             PlantFault: a limit is exceeded.
@@ -208,7 +209,7 @@ class Guard:
                     f"{limits.spring_torque:g} N m",
                 )
         for axis, value in enumerate(temperature, start=1):
-            if value > limits.temperature:
+            if value is not None and value > limits.temperature:
                 raise PlantFault(
                     "temperature",
                     f"drive {axis} is at {value:.1f} deg C, the limit is "

@@ -364,7 +364,7 @@ class Link:
             joint_pos=sample.link_pos,
             spring_torque=sample.spring_torque,
             expected_pos=self._expected[0] if self._expected else None,
-            temperature=[value for value in sample.temperature if value is not None],
+            temperature=sample.temperature,
         )
 
     def _end(self, error: PlantFault) -> None:

@@ -42,8 +42,8 @@ class AxisLink:
         self.target_counts = 0
         self.motor_counts = 0
         self.link_counts = 0
-        self.motor_pos = node.motor.to_rad(0)
-        self.link_pos = node.link.to_rad(0)
+        self._motor_rad, self._link_rad = node.motor.to_rad, node.link.to_rad
+        self.motor_pos, self.link_pos = self._motor_rad(0), self._link_rad(0)
         maps = {node.tpdo_id(pdo): PdoMap(pdo.objects) for pdo in node.tpdos}
         self._tpdos = {
             cob_id: (1 << number, layout, _wanted(layout, node))
@@ -110,11 +110,10 @@ class AxisLink:
         self.statusword, motor, link = self._shown
         if not self._known:
             self._find(motor)
-        node = self.node
-        self.motor_counts = self._motor.feed(motor)
-        self.link_counts = self._link.feed(link)
-        self.motor_pos = node.motor.to_rad(self.motor_counts)
-        self.link_pos = node.link.to_rad(self.link_counts)
+        self.motor_counts = counts = self._motor.feed(motor)
+        self.motor_pos = self._motor_rad(counts)
+        self.link_counts = counts = self._link.feed(link)
+        self.link_pos = self._link_rad(counts)
 
     def _find(self, motor: int) -> None:
         """Unwrap for the first time: the link lies within half a turn of its motor."""

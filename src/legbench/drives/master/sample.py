@@ -1,9 +1,13 @@
 """What one cycle showed."""
 
 from collections.abc import Sequence
+from operator import attrgetter
 from typing import NamedTuple
 
 from legbench.drives.master.cycle import Cycle, Tick
+
+_MOTOR, _LINK = attrgetter("motor_pos"), attrgetter("link_pos")
+_STATUSWORD, _FRESH, _CELSIUS = map(attrgetter, ("statusword", "fresh", "celsius"))
 
 
 class Sample(NamedTuple):
@@ -37,8 +41,7 @@ def sample_of(
 ) -> Sample:
     """The state of a cycle after a tick; stiffness of the series springs [N m/rad]."""
     axes = cycle.axes
-    motor = tuple([axis.motor_pos for axis in axes])
-    links = tuple([axis.link_pos for axis in axes])
+    motor, links = tuple(map(_MOTOR, axes)), tuple(map(_LINK, axes))
     return Sample(
         tick.time_ns,
         tick.late_ns,
@@ -47,7 +50,7 @@ def sample_of(
         links,
         tuple([k * (a - b) for k, a, b in zip(stiffness, motor, links, strict=True)]),
         applied_pos,
-        tuple([axis.statusword for axis in axes]),
-        tuple([axis.fresh for axis in axes]),
-        tuple([poll.celsius for poll in cycle.polls]),
+        tuple(map(_STATUSWORD, axes)),
+        tuple(map(_FRESH, axes)),
+        tuple(map(_CELSIUS, cycle.polls)),
     )

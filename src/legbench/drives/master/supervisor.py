@@ -31,7 +31,8 @@ class Supervisor:
 
     def bus(self, tick: Tick) -> None:
         """The controller is on the bus, and the grid is kept; raises PlantFault."""
-        self.alone()
+        if self._cycle.stranger is not None:
+            self.alone()
         missed = tick.skipped - tick.silent
         self._overruns = self._overruns + missed if missed else 0
         if self._cycle.bus_off:
