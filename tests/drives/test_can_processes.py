@@ -79,14 +79,14 @@ def end(process: subprocess.Popen[str]) -> None:
 
 
 @contextmanager
-def served(folder: Path, *how: str) -> Iterator[Served]:
-    """Drives over AF_UNIX that end by themselves after a while."""
+def served(folder: Path, *how: str, seconds: float = PATIENCE) -> Iterator[Served]:
+    """Drives over AF_UNIX that end by themselves after a while [s]."""
     calm(folder)
     process = started(
         folder,
         *("drives", "emulate", "--bus", "leg.toml", "--channel", "leg.sock", "--bare", "--json"),
         *how,
-        *("--patience", "2000", "--seconds", str(PATIENCE)),
+        *("--patience", "2000", "--seconds", str(seconds)),
         *("--design", str(ROOT / "models" / "optimal.toml")),
     )
     try:
@@ -178,7 +178,7 @@ def test_a_run_over_the_slcan_of_python_can(tmp_path: Path) -> None:
 
 
 def test_looking_beside_a_master_changes_nothing_for_it(tmp_path: Path) -> None:
-    with served(tmp_path) as drives:
+    with served(tmp_path, seconds=3 * PATIENCE) as drives:
         drives.await_state("switch on disabled")
         run = master(tmp_path)
         try:

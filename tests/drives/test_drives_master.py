@@ -163,6 +163,14 @@ def test_what_flags_and_file_leave_out_comes_from_the_configuration_of_python_ca
     assert adapter_of(config(channel="a"), channel="b").channel == "b"
 
 
+def test_no_interface_at_all_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.delenv("CAN_INTERFACE", raising=False)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(BusError, match=r"no interface is given: name one with --interface"):
+        adapter_of(config())
+
+
 def test_a_lock_that_is_taken_twice_is_let_go_with_the_last(tmp_path: Path) -> None:
     lock, other = ChannelLock("bus", tmp_path), ChannelLock("bus", tmp_path)
     lock.acquire()

@@ -480,7 +480,9 @@ def test_a_drive_without_a_quick_stop_ramp_is_refused(ramp: tuple[Parameter, ...
         check_stopping(with_nodes(parameters=ramp), SafetyLimits(command_speed=1.0))
 
 
-def test_a_second_name_of_a_device_does_not_get_past_its_lock(tmp_path: Path) -> None:
+def test_a_second_name_of_a_device_does_not_get_past_its_lock(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     device = tmp_path / "ttyACM0"
     device.touch()
     alias = tmp_path / "by-id"
@@ -489,6 +491,13 @@ def test_a_second_name_of_a_device_does_not_get_past_its_lock(tmp_path: Path) ->
     first.acquire()
     with pytest.raises(BusError, match=r"slcan .*ttyACM0 already has a master, process"):
         ChannelLock.of_channel("slcan", str(alias), tmp_path).acquire()
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(BusError, match="already has a master"):
+        ChannelLock.of_channel("slcan", "by-id", tmp_path).acquire()
+    # A file that happens to bear the name of an interface is not that interface.
+    (tmp_path / "can0").touch()
+    assert "can0" in ChannelLock.of_channel("socketcan", "can0", tmp_path)._path.name
+    assert str(tmp_path.name) not in ChannelLock.of_channel("socketcan", "can0")._path.name
     ChannelLock.of_channel("socketcan", "can0", tmp_path).acquire()
     first.release()
 

@@ -43,17 +43,20 @@ def adapter_of(
     Raises:
         BusError: nobody says which interface.
     """
-    given = {"interface": interface or config.interface, "channel": channel or config.channel}
-    if None in given.values():
+    chosen, where = interface or config.interface, channel or config.channel
+    if chosen is None or where is None:
+        given = {"interface": chosen, "channel": where}
         try:
             found = load_config(config={key: value for key, value in given.items() if value})
         except (can.CanError, OSError, ImportError, ValueError) as error:
-            raise _named(given["interface"], given["channel"], error) from error
-        given = {key: value or found.get(key) for key, value in given.items()}
-    if given["interface"] is None:
-        raise _named(None, given["channel"], ValueError("no interface is given"))
-    where = given["channel"]
-    return Adapter(interface=given["interface"], channel=None if where is None else str(where))
+            if chosen is None:
+                raise BusError(
+                    "no interface is given: name one with --interface, in the bus file, or in "
+                    "python-can's own configuration (CAN_INTERFACE, can.conf)"
+                ) from error
+            raise _named(chosen, where, error) from error
+        chosen, where = found["interface"], where or found.get("channel")
+    return Adapter(interface=str(chosen), channel=None if where is None else str(where))
 
 
 def open_bus(config: BusConfig, adapter: Adapter) -> can.BusABC:
@@ -89,8 +92,8 @@ def _slcan(given: dict[str, object]) -> can.BusABC:
         raise BusError(f"slcan: {error}; pip install 'legbench[slcan]'") from None
 
 
-def _named(interface: str | None, channel: str | None, error: Exception) -> BusError:
-    where = f"{interface or 'the default interface'} {channel or ''}".strip()
+def _named(interface: str, channel: str | None, error: Exception) -> BusError:
+    where = f"{interface} {channel or ''}".strip()
     return BusError(
         f"cannot open {where}: {error}; interfaces are those of python-can, 'legbench' is the "
         "emulated leg"

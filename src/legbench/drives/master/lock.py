@@ -10,6 +10,8 @@ from legbench.drives.errors import BusError
 
 FOLDERS = (Path("/run/lock"), Path("/tmp"))
 """Of lock files; not the one for temporary files, which everybody may choose."""
+BY_FILE = ("legbench_unix", "serial", "slcan")
+"""Interfaces whose channels are files, also where a name has no slash in it."""
 
 
 def _folder() -> Path:
@@ -42,7 +44,7 @@ class ChannelLock:
         A path is followed to the device behind it, so that no second name gets past the lock.
         """
         where = channel or "default"
-        if "/" in where:
+        if "/" in where or (interface in BY_FILE and os.path.exists(where)):
             where = os.path.realpath(where)
         return cls(f"{interface or 'default'} {where}", folder)
 
