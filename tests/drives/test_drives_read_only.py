@@ -19,6 +19,7 @@ from legbench.drives.emulated.faults import FrameFault, FrameFaultKind
 from legbench.drives.emulated.network import Network
 from legbench.drives.errors import BusError, DriveError
 from legbench.drives.link import Link, LinkState
+from legbench.drives.master.cycle import Tick
 from legbench.drives.master.lock import ChannelLock
 from legbench.drives.master.read_only import may_pace, may_read
 from legbench.drives.session import Session
@@ -158,6 +159,8 @@ def test_a_sync_that_is_missed_is_counted(tmp_path: Path) -> None:
         )
         observe(it.link, 20)
         assert it.link.skipped_total == 1
+        # Whoever only looks is not to blame for what another master misses.
+        it.link._supervisor.bus(Tick(0, 0, 50, 50, True))
 
 
 def test_a_drive_that_is_not_configured_is_refused_with_the_way_out(tmp_path: Path) -> None:

@@ -40,7 +40,7 @@ class Tick(NamedTuple):
     skipped: int
     """Ticks without SYNC before it, for whatever reason."""
     silent: int
-    """Of these, ticks that were left out on purpose."""
+    """Of these, not missed by this master: left out on purpose, or another master's."""
     complete: bool
     """All process data came before the deadline."""
 
@@ -173,7 +173,7 @@ class Cycle:
         self._due_ns = sync_ns or last_ns
         for axis, watch in zip(self.axes, self.watches, strict=True):
             watch.cycle(complete=axis.fresh)
-        return Tick(sync_ns or timebase.now_ns(), 0, skipped, 0, missing == 0)
+        return Tick(sync_ns or timebase.now_ns(), 0, skipped, skipped, missing == 0)
 
     def _await_sync(self, until_ns: int) -> int | None:
         """When the SYNC of another master came; none by then [ns]."""
