@@ -5,6 +5,7 @@ from pathlib import Path
 
 from legbench.commissioning.fault_trial import TRIALS, Result, try_fault
 from legbench.design import load_design
+from legbench.viz.live import LiveView, start_live
 
 ROOT = Path(__file__).parents[1]
 EXIT = {"complete": 0, "interrupted": 0, "fault": 1}
@@ -23,6 +24,11 @@ def row(result: Result) -> str:
     )
 
 
+def view(run: Path) -> LiveView:
+    """A live view that needs no screen."""
+    return start_live(run, save=run / "live.rrd")
+
+
 def main() -> None:
     """Print the table."""
     print(
@@ -33,7 +39,8 @@ def main() -> None:
     design = load_design(ROOT / "models" / "optimal.toml")
     with tempfile.TemporaryDirectory() as folder:
         for trial in TRIALS:
-            print(row(try_fault(trial, ROOT / "hardware" / "leg.toml", design, Path(folder))))
+            bus_file = ROOT / "hardware" / "leg.toml"
+            print(row(try_fault(trial, bus_file, design, Path(folder), view)))
 
 
 if __name__ == "__main__":

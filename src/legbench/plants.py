@@ -13,11 +13,15 @@ from legbench.drives.config import BusConfig
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.build import emulate
 from legbench.drives.emulated.faults import Fault
+from legbench.drives.emulated.network import Network
+from legbench.drives.errors import BusError
 from legbench.drives.limits import UNLIMITED, Range, SafetyLimits
 from legbench.drives.link import Link
-from legbench.drives.open_bus import open_bus
+from legbench.drives.master.lock import ChannelLock
+from legbench.drives.open_bus import adapter_of, open_bus
 from legbench.drives.session import Session
 from legbench.drives.stopping import check_stopping
+from legbench.drives.wire import check_load
 from legbench.errors import ConfigError, LegbenchError
 from legbench.mjcf import BuildOptions
 from legbench.plant.abstract import AbstractPlant
@@ -133,6 +137,7 @@ class OpenPlant:
         return {
             "bus": {
                 "skipped_cycles": self.link.skipped_total,
+                "silent_cycles": cycle.silent_total,
                 "late_frames": cycle.late_frames,
                 "error_frames": cycle.error_frames,
                 "lost_cycles": [watch.lost_total for watch in cycle.watches],
@@ -211,11 +216,12 @@ def _open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
         raise ConfigError(f"{choice.bus}: {len(config.nodes)} nodes; a leg has 2")
     if config.period != PERIOD:
         raise ConfigError(f"{choice.bus}: period_us is {config.period_us}; runs need 1000")
+    check_load(config.at(choice.bitrate))
     limits = limits_for(choice.limits or choice.bus.parent / LIMITS_NAME, leg.design)
     check_stopping(config, limits)
     if not choice.is_virtual(config):
         limits.require_complete()
-    session = open_session(config, choice, leg)
+    session = open_session(config, choice, leg, leads=not choice.read_only)
     granted = session.be_punctual()
     try:
         link = session.link(limits, leg.design.stiffness, read_only=choice.read_only)
@@ -245,29 +251,51 @@ def _open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
     )
 
 
-def open_session(config: BusConfig, choice: CanChoice, leg: Leg | None = None) -> Session:
+def open_session(
+    config: BusConfig, choice: CanChoice, leg: Leg | None = None, *, leads: bool = True
+) -> Session:
     """Open the bus of a choice; with interface `legbench` the emulated leg in this process.
 
-    Without a leg the emulated drives have nothing on their shafts.
+    The channel is locked before its adapter is touched: opening a serial one resets it under a
+    program that uses it. Whoever only reads locks no channel that others may share.
+
+    Args:
+        config: the bus file.
+        choice: which bus.
+        leg: on the shafts of emulated drives; nothing by default.
+        leads: or only reads.
 
     Raises:
-        BusError: the interface is not there or is down.
+        BusError: the interface is not there, is down, or has a master.
     """
     if not choice.is_virtual(config):
-        bus = open_bus(
-            config,
-            interface=choice.interface,
-            channel=choice.channel,
-            bitrate=choice.bitrate,
-        )
-        return Session(bus, config)
+        adapter = adapter_of(config, interface=choice.interface, channel=choice.channel)
+        lock = ChannelLock.of_channel(adapter.interface, adapter.channel)
+        if leads or not adapter.shared:
+            lock.acquire()
+        try:
+            bus = open_bus(config.at(choice.bitrate), adapter)
+        except BusError:
+            lock.release()
+            raise
+        return Session(bus, config.at(choice.bitrate), lock=lock)
+    network = _emulated(config, choice, leg)
+    bus = LockstepBus("leg", network=network, bitrate=choice.bitrate)
+    return Session(bus, config.at(choice.bitrate))
+
+
+def _emulated(config: BusConfig, choice: CanChoice, leg: Leg | None) -> Network:
+    """The emulated leg; its drives run at the bitrate of the bus file, whatever is asked for.
+
+    For those who only look its drives have kept their configuration: nobody may write it.
+    """
     if leg is None:
-        return Session(LockstepBus("leg", network=emulate(config)), config)
+        return emulate(config, configured=choice.read_only)
     motors = [float(value) for value in leg.start.motor_pos]
-    network = emulate(
+    return emulate(
         config,
         [Behaviour(start_pos=motor) for motor in motors],
         body=EmulatedLeg(leg.design, leg.options, leg.start),
         faults=choice.faults,
+        configured=choice.read_only,
     )
-    return Session(LockstepBus("leg", network=network), config)

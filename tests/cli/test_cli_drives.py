@@ -15,6 +15,7 @@ from legbench.drives.bus_file import load_bus
 from legbench.drives.config import BusConfig
 from legbench.drives.emulated.network import Network
 from legbench.drives.master.lock import ChannelLock
+from legbench.drives.realtime import Granted
 from legbench.drives.session import Session
 
 HARDWARE = Path(__file__).parents[2] / "hardware"
@@ -93,7 +94,8 @@ def test_zero_writes_offsets_and_keeps_the_comments(
 def test_home_calls_the_present_position_zero(drives: Drives) -> None:
     done = drives("home", "--node", "motor2", "--json")
     assert done.status == 0, done.err
-    assert json.loads(done.out)["after_counts"] == 0
+    told = json.loads(done.out)
+    assert (told["after_counts"], told["granted"]) == (0, None)
 
 
 def test_jog_moves_one_motor_and_comes_back(drives: Drives) -> None:
@@ -102,6 +104,23 @@ def test_jog_moves_one_motor_and_comes_back(drives: Drives) -> None:
     jogged = json.loads(done.out)
     moved = [after - before for before, after in zip(*_ends(jogged), strict=True)]
     assert moved == pytest.approx([0.05, 0.0], abs=1e-4)
+    assert jogged["granted"] is None
+
+
+@pytest.mark.parametrize(
+    "command", [("home", "--node", "motor1"), ("jog", "--node", "motor1")], ids=lambda it: it[0]
+)
+def test_what_moves_asks_for_real_time_and_says_what_was_granted(
+    command: tuple[str, ...], drives: Drives, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    granted = Granted(
+        fifo="refused (no)", mlockall="granted", affinity="", spin_us=0, kernel="", preemption=""
+    )
+    monkeypatch.setattr(Session, "be_punctual", lambda _session: granted)
+    done = drives(*command)
+    assert done.status == 0, done.err
+    assert "SCHED_FIFO refused (no); locked memory granted" in done.err
+    assert json.loads(drives(*command, "--json").out)["granted"]["fifo"] == "refused (no)"
 
 
 def _ends(jogged: dict[str, list[float]]) -> tuple[list[float], list[float]]:
@@ -116,8 +135,13 @@ def _ends(jogged: dict[str, list[float]]) -> tuple[list[float], list[float]]:
         (("jog", "--node", "motor1", "--speed", "3"), ("3 rad/s", "up to 1 rad/s")),
         (("home", "--node", "knee"), ("no node 'knee'",)),
         (("home", "--node", "motor1", "--method", "99"), ("homing", "failed")),
+        (("home", "--node", "motor1", "--timeout", "-1"), ("timeout is -1 s", "positive")),
+        (("zero", "--posture", "0", "nan"), ("posture is nan rad", "-pi to pi rad")),
+        (("scan", "--last", "0"), ("last is 0", "1 to 127")),
+        (("scan", "--last", "128"), ("last is 128", "1 to 127")),
         (("jitter", "--cycles", "0"), ("cycles is 0",)),
         (("emulate",), ("needs --channel",)),
+        (("emulate", "--serve", "slcan"), ("--interface legbench", "give one of the two")),
         (("monitor", "--every", "0"), ("every is 0 s",)),
     ],
 )
@@ -228,12 +252,71 @@ def test_limits_looser_than_the_design_are_refused(
     done.refused("motor_range of axis 1", "looser", "[-2.2, 0.9] rad")
 
 
-def test_a_second_master_is_refused(
-    capfd: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    "command",
+    [
+        JUMP[:-2],
+        ("drives", "configure", "--write"),
+        ("drives", "zero", "--posture", "0", "0"),
+        ("drives", "home", "--node", "motor1"),
+        ("drives", "jog", "--node", "motor1"),
+        ("drives", "jitter"),
+    ],
+    ids=lambda command: command[1],
+)
+def test_a_second_master_is_refused_before_it_opens_anything(
+    command: tuple[str, ...], capfd: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    first = ChannelLock("one", tmp_path)
+    # Nobody serves there: whoever opened it would say so.
+    where = ("--interface", "legbench_unix", "--channel", str(tmp_path / "leg.sock"))
+    first = ChannelLock.of_channel(where[1], where[3])
     first.acquire()
-    monkeypatch.setattr(Session, "lock", lambda _self: ChannelLock("one", tmp_path))
-    done = called(capfd, *JUMP, *EMULATED, "--out", tmp_path / "runs")
+    done = called(capfd, *command, "--bus", BUS, *where, *DESIGN)
     first.release()
-    done.refused("already has a master")
+    done.refused("already has a master, process", "end that one first")
+
+
+@pytest.mark.parametrize("command", ["scan", "status", "configure", "monitor"])
+@pytest.mark.parametrize("interface", ["legbench_unix", "slcan"])
+def test_a_reader_shares_a_channel_but_not_a_serial_adapter(
+    interface: str, command: str, capfd: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    where = ("--interface", interface, "--channel", str(tmp_path / "leg"))
+    first = ChannelLock.of_channel(interface, where[3])
+    first.acquire()
+    done = called(capfd, "drives", command, "--bus", BUS, *where, *DESIGN)
+    first.release()
+    done.refused("already has a master" if interface == "slcan" else "cannot open legbench_unix")
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("run", "jump", "--plant", "can", "--duration", "0.05"),
+        ("drives", "scan"),
+        ("drives", "status"),
+        ("drives", "configure"),
+        ("drives", "jog", "--node", "motor1"),
+    ],
+    ids=lambda command: command[1],
+)
+def test_a_wrong_bitrate_is_named(
+    command: tuple[str, ...],
+    capfd: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = called(capfd, *command, *EMULATED, *DESIGN, "--bitrate", "750000")
+    done.refused("750000 bit/s is asked for", "the bus file says 1000000 bit/s", "error frames")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_bitrate_that_is_too_slow_is_refused_before_a_bus_is_opened(
+    capfd: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    for command in (JUMP[:-2], ("drives", "budget")):
+        done = called(capfd, *command, "--bus", BUS, *DESIGN, "--bitrate", "500000")
+        assert done.status == 1
+        assert "114 % of 500000 bit/s" in done.err
+        assert "the bus file says 1000000 bit/s" in done.err

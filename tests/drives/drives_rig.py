@@ -87,13 +87,14 @@ def rig(
     behaviours: Sequence[Behaviour] | None = None,
     limits: SafetyLimits = LIMITS,
     read_only: bool = False,
+    configured: bool = False,
     body: Body = stiff_body,
     tx_queue: int = 64,
 ) -> Iterator[Rig]:
     """A rig whose link is not started yet."""
     chosen = bus_config or config()
     how = behaviours or [Behaviour(start_pos=pos, seed=3) for pos in START]
-    network = emulate(chosen, how, body=body, keep_log=True)
+    network = emulate(chosen, how, body=body, keep_log=True, configured=configured)
     bus = LockstepBus("rig", network=network, tx_queue=tx_queue)
     link = Link(
         bus,

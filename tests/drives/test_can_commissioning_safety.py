@@ -276,7 +276,8 @@ def test_a_signal_stops_all_drives_before_the_command_ends(
 ) -> None:
     made: list[Network] = []
 
-    def the_bench(config: BusConfig) -> Network:
+    def the_bench(config: BusConfig, *, configured: bool) -> Network:
+        assert not configured
         behaviours = [Behaviour(hard_stop=(-STOP, STOP)) for _ in config.nodes]
         made.append(emulate(config, behaviours, keep_log=True))
         return made[0]

@@ -1,4 +1,6 @@
-"""Master and drives in processes of their own, over AF_UNIX; bounded in time, none measured."""
+"""Master and drives in processes of their own, over AF_UNIX and over a terminal; bounded in time,
+none measured.
+"""
 
 import json
 import os
@@ -77,13 +79,14 @@ def end(process: subprocess.Popen[str]) -> None:
 
 
 @contextmanager
-def served(folder: Path) -> Iterator[Served]:
-    """Drives over AF_UNIX that end by themselves after a while."""
+def served(folder: Path, *how: str, seconds: float = PATIENCE) -> Iterator[Served]:
+    """Drives over AF_UNIX that end by themselves after a while [s]."""
     calm(folder)
     process = started(
         folder,
         *("drives", "emulate", "--bus", "leg.toml", "--channel", "leg.sock", "--bare", "--json"),
-        *("--patience", "2000", "--seconds", str(PATIENCE)),
+        *how,
+        *("--patience", "2000", "--seconds", str(seconds)),
         *("--design", str(ROOT / "models" / "optimal.toml")),
     )
     try:
@@ -150,3 +153,53 @@ def test_interrupting_the_master_stops_both_drives_and_keeps_the_run(tmp_path: P
     assert manifest["status"] == "interrupted"
     assert manifest["realtime"]["kernel"]
     assert (run_folder(tmp_path) / "bus.log").stat().st_size > 0
+
+
+def test_a_run_over_the_slcan_of_python_can(tmp_path: Path) -> None:
+    with served(tmp_path, "--serve", "slcan") as drives:
+        drives.await_state("switch on disabled")
+        run = started(
+            tmp_path,
+            *("run", "position-jump", "--plant", "can", "--bus", "leg.toml", "--duration", "0.3"),
+            *("--interface", "slcan", "--channel", "leg.sock", "--bitrate", "1000000"),
+            *("--design", str(ROOT / "models" / "optimal.toml"), "--out", "runs"),
+        )
+        try:
+            drives.await_state("operation enabled")
+            drives.await_state("switch on disabled")
+            _, complaint = run.communicate(timeout=PATIENCE)
+        finally:
+            end(run)
+    assert run.returncode == 0, complaint
+    manifest = json.loads((run_folder(tmp_path) / "run.json").read_text())
+    assert (manifest["status"], manifest["bus"]["interface"]) == ("complete", "slcan")
+    log = (run_folder(tmp_path) / "bus.log").read_text(encoding="ascii")
+    assert all(f" {cob_id}#" in log for cob_id in ("080", "181", "182", "201", "202"))
+
+
+def test_looking_beside_a_master_changes_nothing_for_it(tmp_path: Path) -> None:
+    with served(tmp_path, seconds=3 * PATIENCE) as drives:
+        drives.await_state("switch on disabled")
+        run = master(tmp_path)
+        try:
+            drives.await_state("operation enabled")
+            rows_on_disk(tmp_path)
+            look = started(
+                tmp_path,
+                *("run", "position-jump", "--plant", "can", "--bus", "leg.toml", "--read-only"),
+                *("--interface", "legbench_unix", "--channel", "leg.sock", "--out", "looks"),
+                *("--duration", "0.3", "--design", str(ROOT / "models" / "optimal.toml")),
+            )
+            _, complaint = look.communicate(timeout=PATIENCE)
+            assert look.returncode == 0, complaint
+            assert run.poll() is None
+            os.kill(run.pid, signal.SIGINT)
+            drives.await_state("switch on disabled")
+            _, trouble = run.communicate(timeout=PATIENCE)
+        finally:
+            end(run)
+    assert run.returncode == 0, trouble
+    kept = run_folder(tmp_path)
+    assert json.loads((kept / "run.json").read_text())["status"] == "interrupted"
+    # The drives stayed enabled from the master's start to its ^C.
+    assert [state for _, state in drives.seen].count("operation enabled") == 2

@@ -14,7 +14,7 @@ from legbench.drives.bus import LockstepBus
 from legbench.drives.bus_file import parse_object
 from legbench.drives.codec.datatypes import DataType
 from legbench.drives.codec.pdo import Mapped
-from legbench.drives.config import LINK_POSITION, POSITION_ACTUAL, STATUSWORD, PdoConfig
+from legbench.drives.config import LINK_POSITION, POSITION_ACTUAL, STATUSWORD, BusConfig, PdoConfig
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.build import emulate
 from legbench.drives.emulated.faults import NodeFault, NodeFaultKind
@@ -22,7 +22,7 @@ from legbench.drives.errors import BusError, DriveError
 from legbench.drives.link import Link
 from legbench.drives.master.bus_log import BusLog
 from legbench.drives.master.lock import ChannelLock
-from legbench.drives.open_bus import open_bus, timebase_of
+from legbench.drives.open_bus import adapter_of, open_bus, timebase_of
 from legbench.drives.timebase import NetworkTime, SystemTime
 from legbench.errors import ConfigError, PlantFault
 
@@ -139,13 +139,51 @@ def test_a_bus_log_is_read_by_others_and_its_failure_is_not_ours(tmp_path: Path)
 
 
 def test_interfaces_that_are_not_there_are_named() -> None:
+    def opened(bus: BusConfig, **flags: str) -> can.BusABC:
+        return open_bus(bus, adapter_of(bus, **flags))
+
     with pytest.raises(BusError, match="cannot open nonsense can0: "):
-        open_bus(config(), interface="nonsense", channel="can0")
+        opened(config(), interface="nonsense", channel="can0")
     with pytest.raises(BusError, match="cannot open socketcan nowhere0: "):
-        open_bus(config(interface="socketcan", channel="nowhere0"))
-    bus = open_bus(config(), interface="virtual", channel="here")
+        opened(config(interface="socketcan", channel="nowhere0"))
+    bus = opened(config(), interface="virtual", channel="here")
     assert isinstance(timebase_of(bus), SystemTime)
     bus.shutdown()
+
+
+def test_what_flags_and_file_leave_out_comes_from_the_configuration_of_python_can(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("CAN_INTERFACE", "slcan")
+    monkeypatch.setenv("CAN_CHANNEL", "/dev/ttyACM7")
+    found = adapter_of(config())
+    assert (found.interface, found.channel, found.shared) == ("slcan", "/dev/ttyACM7", False)
+    found = adapter_of(config(interface="socketcan"))
+    assert (found.interface, found.channel, found.shared) == ("socketcan", "/dev/ttyACM7", True)
+    assert adapter_of(config(channel="a"), channel="b").channel == "b"
+
+
+def test_no_interface_at_all_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.delenv("CAN_INTERFACE", raising=False)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(BusError, match=r"no interface is given: name one with --interface"):
+        adapter_of(config())
+
+
+def test_a_lock_that_is_taken_twice_is_let_go_with_the_last(tmp_path: Path) -> None:
+    lock, other = ChannelLock("bus", tmp_path), ChannelLock("bus", tmp_path)
+    lock.acquire()
+    lock.acquire()
+    lock.release()
+    assert lock.held
+    with pytest.raises(BusError, match="already has a master"):
+        other.acquire()
+    lock.release()
+    lock.release()
+    other.acquire()
+    assert not lock.held
+    other.release()
 
 
 def test_a_bus_without_drives_names_the_first_that_is_missing(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import can
 import pytest
-from drives_rig import LIMITS, MS, START, STIFFNESS, Rig, config, rig
+from drives_rig import LIMITS, MS, START, Rig, config, rig
 
 from legbench.drives.bus_file import bus_from_mapping
 from legbench.drives.cia402 import Controlword, DriveState, Goal, PowerMachine, decode_state
@@ -216,7 +216,7 @@ def test_a_listener_that_fails_hears_nothing_more_and_stops_nothing(tmp_path: Pa
         def full(_message: can.Message) -> None:
             raise RuntimeError("no more room")
 
-        it.link._port._listener = full
+        it.link.tell(full)
         it.run(20)
         it.link.stop()
         assert it.states == [SO, SO]
@@ -480,7 +480,9 @@ def test_a_drive_without_a_quick_stop_ramp_is_refused(ramp: tuple[Parameter, ...
         check_stopping(with_nodes(parameters=ramp), SafetyLimits(command_speed=1.0))
 
 
-def test_a_second_name_of_a_device_does_not_get_past_its_lock(tmp_path: Path) -> None:
+def test_a_second_name_of_a_device_does_not_get_past_its_lock(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     device = tmp_path / "ttyACM0"
     device.touch()
     alias = tmp_path / "by-id"
@@ -489,6 +491,13 @@ def test_a_second_name_of_a_device_does_not_get_past_its_lock(tmp_path: Path) ->
     first.acquire()
     with pytest.raises(BusError, match=r"slcan .*ttyACM0 already has a master, process"):
         ChannelLock.of_channel("slcan", str(alias), tmp_path).acquire()
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(BusError, match="already has a master"):
+        ChannelLock.of_channel("slcan", "by-id", tmp_path).acquire()
+    # A file that happens to bear the name of an interface is not that interface.
+    (tmp_path / "can0").touch()
+    assert "can0" in ChannelLock.of_channel("socketcan", "can0", tmp_path)._path.name
+    assert str(tmp_path.name) not in ChannelLock.of_channel("socketcan", "can0")._path.name
     ChannelLock.of_channel("socketcan", "can0", tmp_path).acquire()
     first.release()
 
@@ -508,42 +517,3 @@ def test_a_bus_log_may_be_closed_twice(tmp_path: Path) -> None:
     log.close()
     log.close()
     assert log.error is None
-
-
-def test_read_only_writes_nothing_to_drives_that_are_configured(tmp_path: Path) -> None:
-    with rig(tmp_path) as it:
-        it.link.open()
-        before = it.network.now_ns
-        look = Link(
-            it.bus,
-            it.config,
-            LIMITS,
-            stiffness=STIFFNESS,
-            read_only=True,
-            lock=ChannelLock("look", tmp_path),
-        )
-        with look:
-            look.start()
-            written = [
-                frame
-                for at_ns, frame in it.network.log or []
-                if at_ns > before
-                and frame.cob_id in (0x601, 0x602)
-                and frame.data[0] & 0xE0 == 0x20
-            ]
-            assert written == []
-            it.network.inject(
-                FrameFault(kind=FrameFaultKind.DROP, cob_id=0x181, start_ns=it.network.now_ns)
-            )
-            with pytest.raises(PlantFault, match=r"'hip' .* sent no process data for 3 cycles"):
-                observe(look, 20)
-        assert it.words() == []
-
-
-def test_read_only_does_not_change_a_drive_that_has_power(tmp_path: Path) -> None:
-    with rig(tmp_path, read_only=True) as it:
-        it.network.advance(20 * MS)
-        it.network.drives[1].axis.power.state = OE
-        with pytest.raises(DriveError, match=r"'knee' \(node 2\) has power and is not configured"):
-            it.link.open()
-        assert it.words() == []

@@ -11,10 +11,17 @@ from types import FrameType
 from legbench.cli.drives_reading import Bench
 from legbench.cli.output import note, print_json
 from legbench.drives.config import NodeConfig
+from legbench.drives.realtime import Granted
 from legbench.drives.session import Session
 from legbench.errors import ConfigError
 from legbench.loop import STOP_SIGNALS
 from legbench.plants import LIMITS_NAME, limits_for
+
+
+def tell(granted: Granted | None) -> None:
+    """What the system granted to those who move motors; in virtual time nothing was asked."""
+    if granted is not None:
+        note(f"SCHED_FIFO {granted.fifo}; locked memory {granted.mlockall}")
 
 
 @contextmanager
@@ -53,7 +60,7 @@ class Configure:
         from legbench.commissioning.configure import differences, write
 
         written = 0
-        with bench.session() as session:
+        with bench.session(leads=self.write) as session:
             if self.write:
                 written = write(session)
             different = differences(session)
@@ -83,7 +90,7 @@ class Zero:
         """Measure, print, write the offsets into the bus file."""
         from legbench.commissioning.zero import measure, write
 
-        with bench.session() as session:
+        with bench.session(leads=True) as session:
             zeros = measure(session, self.posture)
         path = None if self.dry_run else write(bench.bus, zeros, self.out)
         if bench.json:
@@ -114,11 +121,13 @@ class Home:
         """Home and print the counts before and after."""
         from legbench.commissioning.home import home
 
-        with interrupted_by_signals(), bench.session() as session:
+        with interrupted_by_signals(), bench.session(leads=True) as session:
+            granted = session.be_punctual()
             homed = home(session, _node(session, self.node), self.method, timeout=self.timeout)
         if bench.json:
-            print_json(asdict(homed))
+            print_json({**asdict(homed), "granted": granted and asdict(granted)})
         else:
+            tell(granted)
             print(
                 f"{homed.node}: method {homed.method}, {homed.before_counts} counts before, "
                 f"{homed.after_counts} after"
@@ -145,7 +154,8 @@ class Jog:
 
         design = bench.leg()
         limits = limits_for(bench.limits or bench.bus.parent / LIMITS_NAME, design)
-        with interrupted_by_signals(), bench.session() as session:
+        with interrupted_by_signals(), bench.session(leads=True) as session:
+            granted = session.be_punctual()
             jogged = jog(
                 session,
                 limits,
@@ -156,8 +166,9 @@ class Jog:
                 back=not self.stay,
             )
         if bench.json:
-            print_json(asdict(jogged))
+            print_json({**asdict(jogged), "granted": granted and asdict(granted)})
             return 0
+        tell(granted)
         note("enabled where they stood; quick stop at the end")
         for place, (before, after) in enumerate(
             zip(jogged.before_pos, jogged.after_pos, strict=True), start=1

@@ -1,7 +1,7 @@
 """`legbench drives scan|status|jitter|budget`: looking, never enabling."""
 
 from contextlib import AbstractContextManager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -50,9 +50,10 @@ class Bench:
         """The design; raises DesignError."""
         return load_design(self.design)
 
-    def session(self) -> AbstractContextManager[Session]:
-        """The bus, open; raises ConfigError, BusError."""
-        return open_session(self.config(), self.choice)
+    def session(self, *, leads: bool, read_only: bool = False) -> AbstractContextManager[Session]:
+        """The bus, open, its channel locked by whoever leads; raises ConfigError, BusError."""
+        choice = replace(self.choice, read_only=read_only)
+        return open_session(self.config(), choice, leads=leads)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,8 +66,11 @@ class Scan:
     def run(self, bench: Bench) -> int:
         """Print every node; 1 if a node of the bus file is not there."""
         from legbench.commissioning.scan import scan
+        from legbench.drives.codec.frame import LAST_NODE
 
-        with bench.session() as session:
+        if not 1 <= self.last <= LAST_NODE:
+            raise ConfigError(f"last is {self.last}; node ids are 1 to {LAST_NODE}")
+        with bench.session(leads=False) as session:
             found = list(scan(session, self.last))
             names = {f"'{node.name}' of the bus file" for node in session.config.nodes}
         if bench.json:
@@ -80,7 +84,10 @@ class Scan:
                 )
         missing = sorted(names - {node.verdict for node in found})
         for verdict in missing:
-            note(f"not there: {verdict}; look at its power, its wiring and the bitrate")
+            note(
+                f"not there: {verdict}; look at its power, its wiring and the bitrate, "
+                f"{session.config.bitrate_text}"
+            )
         return 1 if missing else 0
 
 
@@ -92,7 +99,7 @@ class Status:
         """Print state, mode, error and encoders of every drive."""
         from legbench.commissioning.status import status
 
-        with bench.session() as session:
+        with bench.session(leads=False) as session:
             nodes = status(session)
         if bench.json:
             print_json({"nodes": [asdict(node) for node in nodes]})
@@ -125,7 +132,7 @@ class Jitter:
 
         if self.cycles < 1:
             raise ConfigError(f"cycles is {self.cycles}; it must be 1 or more")
-        with bench.session() as session:
+        with bench.session(leads=True, read_only=True) as session:
             granted = session.be_punctual(self.cpu)
             timing = measure(session, bench.leg().stiffness, self.cycles)
         table = timing.table()
@@ -163,7 +170,7 @@ class Budget:
         """Print every frame; raises ConfigError above 80 %."""
         from legbench.drives.wire import MAX_LOAD, bus_load, check_load, schedule
 
-        config = bench.config()
+        config = bench.config().at(bench.bitrate)
         entries, load = schedule(config), bus_load(config)
         if bench.json:
             print_json(

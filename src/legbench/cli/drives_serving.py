@@ -5,13 +5,14 @@ import sys
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 from legbench.cli.drives_reading import Bench
 from legbench.cli.output import note, print_json
 from legbench.errors import ConfigError
 
-UNIX = "legbench_unix"
-"""Interface of a bus behind a socket file."""
+UNIX, SLCAN = "legbench_unix", "slcan"
+"""Interfaces of a bus behind a socket file, and behind a terminal."""
 
 
 def _check_time(name: str, value: float) -> None:
@@ -23,10 +24,13 @@ def _check_time(name: str, value: float) -> None:
 class Emulate:
     """An emulated leg for other processes, at --channel: a socket file for legbench_unix.
 
-    With --interface it sits on that bus instead, such as socketcan on a vcan. --bitrate is that of
-    the emulated wire.
+    With --serve slcan it sits behind a pseudo terminal, as behind an adapter on a serial line, and
+    --channel may name a link to it. With --interface it sits on that bus, such as socketcan on a
+    vcan. --bitrate is that of the emulated wire.
     """
 
+    serve: Literal["unix", "slcan"] = "unix"
+    """How other processes reach it: a socket file, or python-can's slcan on a terminal."""
     bare: bool = False
     """Nothing on the shafts: no MuJoCo."""
     patience: int = 5
@@ -36,10 +40,11 @@ class Emulate:
 
     def run(self, bench: Bench) -> int:
         """Serve until ^C or SIGTERM, printing every change of a drive's state."""
-        from legbench.commissioning.emulate import serve
+        from legbench.commissioning.emulate import Server, serve
         from legbench.control import JumpConfig
         from legbench.drives.bus_server import BusServer
         from legbench.drives.emulated.network import Network, stiff_body
+        from legbench.drives.slcan_server import SlcanServer
         from legbench.drives.unix_server import UnixServer
         from legbench.experiment import Experiment, start_of
         from legbench.loop import stop_on_interrupt
@@ -47,24 +52,29 @@ class Emulate:
         from legbench.plants import open_session
 
         _check_time("seconds", self.seconds)
-        if bench.channel is None:
-            raise ConfigError("emulate needs --channel: a socket file, or a bus with --interface")
+        self._check_way(bench)
         chosen = Experiment(design=bench.leg(), controller=JumpConfig())
         start = start_of(chosen)
         body = stiff_body if self.bare else EmulatedLeg(chosen.design, chosen.options, start)
         config = bench.config()
         if bench.bitrate is not None:
             config = replace(config, bitrate=bench.bitrate)
-        channel, end = bench.channel, time.monotonic() + self.seconds
+        end = time.monotonic() + self.seconds
+        where = None if bench.channel is None else Path(bench.channel)
 
-        def serve_at(network: Network) -> UnixServer | BusServer:
-            if bench.interface in (None, UNIX):
-                return UnixServer(network, Path(channel))
-            return BusServer(network, open_session(config, bench.choice).bus)
+        def serve_at(network: Network) -> Server:
+            if self.serve == SLCAN:
+                return SlcanServer(network, where, warn=note)
+            if where is not None and bench.interface in (None, UNIX):
+                return UnixServer(network, where)
+            return BusServer(network, open_session(config, bench.choice, leads=False).bus)
 
-        def ready() -> None:
-            interface = bench.interface or UNIX
-            note(f"serving {channel}; use it with --interface {interface} --channel {channel}")
+        def ready(server: Server) -> None:
+            interface, channel = bench.interface or UNIX, bench.channel
+            if isinstance(server, SlcanServer):
+                interface, channel = SLCAN, server.path
+            at = f" --bitrate {config.bitrate}" if isinstance(server, SlcanServer) else ""
+            note(f"serving {channel}; use it with --interface {interface} --channel {channel}{at}")
 
         def report(at: float, node: str, state: str) -> None:
             if bench.json:
@@ -86,6 +96,18 @@ class Emulate:
             )
         return 0
 
+    def _check_way(self, bench: Bench) -> None:
+        if self.serve == SLCAN and bench.interface is not None:
+            raise ConfigError(
+                f"--serve slcan makes a terminal of its own, --interface {bench.interface} is "
+                "another bus: give one of the two"
+            )
+        if self.serve != SLCAN and bench.channel is None:
+            raise ConfigError(
+                "emulate needs --channel: a socket file, or a bus with --interface; or --serve "
+                "slcan, which makes a terminal"
+            )
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Monitor:
@@ -103,7 +125,7 @@ class Monitor:
         _check_time("seconds", self.seconds)
         _check_time("every", self.every)
         in_place = sys.stdout.isatty() and not bench.json
-        with bench.session() as session:
+        with bench.session(leads=False) as session:
             seconds = min(self.seconds, 1e9)
             for count, (at, lines) in enumerate(
                 monitor(session, seconds=seconds, every=self.every)

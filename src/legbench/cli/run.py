@@ -60,7 +60,7 @@ class RunArguments:
     bitrate: int | None = None
     """can: of interfaces that set their own; else the bus file's [bit/s]."""
     read_only: bool = False
-    """can: observe, never enable; commands are recorded and go nowhere."""
+    """can: observe, change nothing in a drive; commands are recorded and go nowhere."""
     setpoint: SetpointMeaning = SetpointMeaning.LINK
     """Whether z2 is the link's equilibrium or the motor's position."""
     convention: ModalConvention = ModalConvention.ORTHONORMAL

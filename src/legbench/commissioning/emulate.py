@@ -10,21 +10,24 @@ from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.build import emulate
 from legbench.drives.emulated.network import Body, Network, stiff_body
 from legbench.drives.realtime import ask
+from legbench.drives.slcan_server import SlcanServer
 from legbench.drives.unix_server import UnixServer
 
+Server = UnixServer | SlcanServer | BusServer
+"""Where the drives are reached."""
 Report = Callable[[float, str, str], None]
 """Called with time since the start [s], node and its new state."""
 
 
 def serve(
     config: BusConfig,
-    serve_at: Callable[[Network], UnixServer | BusServer],
+    serve_at: Callable[[Network], Server],
     *,
     start_pos: tuple[float, ...],
     body: Body = stiff_body,
     patience: int = 5,
     report: Report,
-    ready: Callable[[], None],
+    ready: Callable[[Server], None],
     stop: Callable[[], bool],
 ) -> None:
     """Serve emulated drives until told to stop.
@@ -59,7 +62,7 @@ def serve(
     shown: dict[str, DriveState] = {}
     began = time.monotonic()
     with serve_at(network) as server:
-        ready()
+        ready(server)
         while not stop():
             server.poll()
             for node, drive in zip(config.nodes, network.drives, strict=True):

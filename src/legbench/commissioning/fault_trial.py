@@ -1,7 +1,12 @@
 """One fault in mid-jump on the emulated leg, and what came of it."""
 
+import os
+import signal
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Protocol
 
 from legbench.control import JumpConfig
 from legbench.design import LegDesign
@@ -10,6 +15,7 @@ from legbench.drives.bus_file import load_bus, load_limits
 from legbench.drives.cia402 import DriveState
 from legbench.drives.config import BusConfig
 from legbench.drives.emulated.faults import (
+    FOREVER_NS,
     Babble,
     Fault,
     FrameFault,
@@ -20,6 +26,7 @@ from legbench.drives.emulated.faults import (
 from legbench.drives.emulated.network import Network
 from legbench.drives.errors import DriveError
 from legbench.drives.limits import SafetyLimits
+from legbench.errors import ConfigError
 from legbench.experiment import Experiment, make_controller, start_of, targets_of
 from legbench.loop import Outcome, StopFlag, run
 from legbench.plants import BUS_LOG, EMULATED, LIMITS_NAME, CanChoice, Leg, OpenPlant, open_plant
@@ -54,6 +61,25 @@ class Trial:
     """The master itself stops without a word, as by SIGKILL or SIGSTOP."""
     interrupted: bool = False
     """^C."""
+    viewer: bool = False
+    """The live view of the run is frozen, by SIGSTOP."""
+
+
+class View(Protocol):
+    """A live view of a run, in a process of its own."""
+
+    @property
+    def pid(self) -> int:
+        """Of the process."""
+        ...
+
+    def stop(self) -> None:
+        """End it."""
+        ...
+
+
+StartView = Callable[[Path], View]
+"""Opens a view of the run in a folder."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,6 +98,8 @@ class Result:
     intact: bool
     """Every row is in the recording, which says how it ended."""
     lost_cycles: int
+    run: Path
+    """Its recording."""
 
     @property
     def safe(self) -> bool:
@@ -80,9 +108,11 @@ class Result:
         return quiet and self.excess <= 0.0 and self.intact
 
 
-def _frame(kind: FrameFaultKind, cob_id: int | None, *, brief: bool = False, **how: int) -> Fault:
-    end = {"end_ns": STRIKE_NS + BRIEF_NS} if brief else {}
-    return FrameFault(kind=kind, cob_id=cob_id, start_ns=STRIKE_NS, **end, **how)
+def _frame(
+    kind: FrameFaultKind, cob_id: int | None, *, until_ns: int = FOREVER_NS, **how: int
+) -> Fault:
+    end_ns = STRIKE_NS + until_ns
+    return FrameFault(kind=kind, cob_id=cob_id, start_ns=STRIKE_NS, end_ns=end_ns, **how)
 
 
 def _node(kind: NodeFaultKind, node_id: int) -> Fault:
@@ -101,7 +131,7 @@ TRIALS = (
     Trial(name="answers of a drive dropped", faults=(_frame(_F.DROP, 0x181),), cause=LOST),
     Trial(
         name="answers dropped for 2 cycles",
-        faults=(_frame(_F.DROP, 0x181, brief=True),),
+        faults=(_frame(_F.DROP, 0x181, until_ns=BRIEF_NS),),
     ),
     Trial(name="SYNC dropped", faults=(_frame(_F.DROP, 0x080),), cause=LOST),
     Trial(name="commands of a drive dropped", faults=(_frame(_F.DROP, 0x202),), cause=EMERGENCY),
@@ -113,9 +143,23 @@ TRIALS = (
         cause=LOST,
     ),
     Trial(
+        name="answers 0.7 ms late",
+        faults=(_frame(_F.DELAY, 0x181, delay_ns=700_000),),
+        cause=LOST,
+    ),
+    Trial(
         name="answers 1 ms late",
         faults=(_frame(_F.DELAY, 0x181, delay_ns=1_000_000),),
         cause=LOST,
+    ),
+    Trial(
+        name="answers 2 ms late",
+        faults=(_frame(_F.DELAY, 0x182, delay_ns=2_000_000),),
+        cause=LOST,
+    ),
+    Trial(
+        name="answers of one cycle 1 ms late",
+        faults=(_frame(_F.DELAY, 0x181, until_ns=MS, delay_ns=1_000_000),),
     ),
     Trial(
         name="answers doubled",
@@ -147,15 +191,21 @@ TRIALS = (
     Trial(name="over-temperature", faults=(_node(_N.OVER_TEMPERATURE, 2),), cause=EMERGENCY),
     Trial(name="master killed or frozen", gone=True, cause="master gone"),
     Trial(name="^C", interrupted=True),
+    Trial(name="the viewer hangs", viewer=True),
 )
 
 
-def try_fault(trial: Trial, bus_file: Path, design: LegDesign, out: Path) -> Result:
+def try_fault(
+    trial: Trial, bus_file: Path, design: LegDesign, out: Path, start_view: StartView | None = None
+) -> Result:
     """Jump on the emulated leg, let the fault strike, see what is left.
 
     Raises:
-        ConfigError, RecordingError: as `open_plant`, `RunWriter`.
+        ConfigError: the trial needs a viewer, and none is given; or as `open_plant`.
+        RecordingError: as `RunWriter`.
     """
+    if trial.viewer and start_view is None:
+        raise ConfigError(f"the trial '{trial.name}' needs a viewer to freeze: give start_view")
     config = load_bus(bus_file)
     limits = load_limits(bus_file.parent / LIMITS_NAME)
     choice = CanChoice(bus=bus_file, interface=EMULATED, faults=trial.faults)
@@ -166,9 +216,17 @@ def try_fault(trial: Trial, bus_file: Path, design: LegDesign, out: Path) -> Res
     network = _network(opened)
     with opened.plant, RunWriter.create(out, opened.manifest, name="trial") as writer:
         opened.start_log(writer.path)
-        outcome = _run(trial, opened, chosen, writer, network)
+        view = start_view(writer.path) if trial.viewer and start_view is not None else None
+        try:
+            outcome = _run(trial, opened, chosen, writer, network, view)
+        finally:
+            if view is not None:
+                view.stop()
+                with suppress(ProcessLookupError):
+                    os.kill(view.pid, signal.SIGCONT)
         strike_ns = network.now_ns if trial.gone or trial.interrupted else STRIKE_NS
-        reaction_ns = round(1e9 * (opened.began or 0.0)) + outcome.cycles * MS
+        ticks = outcome.cycles + opened.events()["bus"]["skipped_cycles"]
+        reaction_ns = round(1e9 * (opened.began or 0.0)) + ticks * MS
         if trial.gone:
             reaction_ns = _wait_for_drives(network)
         opened.plant.close()
@@ -186,6 +244,7 @@ def try_fault(trial: Trial, bus_file: Path, design: LegDesign, out: Path) -> Res
         excess=_excess(writer.path / BUS_LOG, config, limits),
         intact=intact and found.manifest["cause"] == outcome.cause,
         lost_cycles=max(opened.events()["bus"]["lost_cycles"]),
+        run=writer.path,
     )
 
 
@@ -197,13 +256,22 @@ def _network(opened: OpenPlant) -> Network:
 
 
 def _run(
-    trial: Trial, opened: OpenPlant, chosen: Experiment, writer: RunWriter, network: Network
+    trial: Trial,
+    opened: OpenPlant,
+    chosen: Experiment,
+    writer: RunWriter,
+    network: Network,
+    view: View | None,
 ) -> Outcome:
     stop = StopFlag()
 
     def watch(_done: int, _total: int) -> None:
-        if (trial.gone or trial.interrupted) and network.now_ns >= STRIKE_NS:
+        if network.now_ns < STRIKE_NS:
+            return
+        if trial.gone or trial.interrupted:
             stop.set()
+        if view is not None:
+            os.kill(view.pid, signal.SIGSTOP)
 
     controller = make_controller(chosen.controller, targets_of(chosen))
     outcome = run(opened.plant, controller, CYCLES, sink=writer, stop=stop, progress=watch)

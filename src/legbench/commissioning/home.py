@@ -4,6 +4,7 @@ The drive is configured as for a run and goes to operational, so that its own wa
 when this master falls silent; it is always led out by quick stop.
 """
 
+import math
 from dataclasses import dataclass
 from typing import final
 
@@ -70,10 +71,12 @@ def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20
         timeout: [s]
 
     Raises:
-        ConfigError: the bus file does not bound a search, or the search is too fast.
+        ConfigError: no time at all, the bus file does not bound a search, or it is too fast.
         BusError: the channel has a master.
         DriveError: another drive, a refused step, or homing failed.
     """
+    if not 0.0 < timeout < math.inf:
+        raise ConfigError(f"timeout is {timeout:g} s; it must be positive")
     if method not in IN_PLACE:
         _check_bounded(node)
     session.hold()

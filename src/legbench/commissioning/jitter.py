@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from legbench.drives.errors import DriveError
 from legbench.drives.limits import SafetyLimits
 from legbench.drives.session import Session
 from legbench.signals import Floats
@@ -37,6 +38,7 @@ def measure(session: Session, stiffness: Sequence[float], cycles: int) -> Timing
     """Exchange frames in read-only for a number of cycles.
 
     Raises:
+        DriveError: another master sends SYNC, whose punctuality is not ours.
         BusError, DriveError, PlantFault: as `Link.start`, `Link.exchange`.
     """
     timebase = session.timebase
@@ -44,6 +46,11 @@ def measure(session: Session, stiffness: Sequence[float], cycles: int) -> Timing
     lost = 0
     with session.link(SafetyLimits(), stiffness, read_only=True) as link:
         link.start()
+        if link.listening:
+            raise DriveError(
+                "another master sends SYNC on this bus; its cycle cannot be measured from here: "
+                "end it, or run jitter on its computer"
+            )
         before = link.skipped_total
         for cycle in range(cycles):
             sample = link.exchange()

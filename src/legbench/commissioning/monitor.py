@@ -69,4 +69,7 @@ def monitor(session: Session, *, seconds: float, every: float) -> Iterator[tuple
                 one.hear(message)
             if timebase.now_ns() >= due_ns:
                 break
-        yield 1e-9 * (timebase.now_ns() - began_ns), [one.line() for one in watched]
+        lines = [one.line() for one in watched]
+        if port.error_frames:
+            lines[-1] += f"; {port.error_frames} error frames, {session.config.bitrate_text}"
+        yield 1e-9 * (timebase.now_ns() - began_ns), lines

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from legbench.drives.codec.datatypes import DataType
 from legbench.drives.codec.frame import LAST_NODE
 from legbench.drives.config import BusConfig
-from legbench.drives.errors import DriveError
+from legbench.drives.errors import DriveError, NoAnswerError
+from legbench.drives.master.first_contact import first_contact
+from legbench.drives.master.sdo_port import SdoPort
 from legbench.drives.session import Session
 
 PROBE_MS = 15
@@ -29,26 +31,36 @@ class Found:
 
 
 def scan(session: Session, last: int = LAST_NODE) -> Iterator[Found]:
-    """Ask every node id up to `last` for its identity; nothing is written."""
-    for node_id in range(1, last + 1):
-        probe = session.sdo(node_id, timeout_ms=PROBE_MS, retries=2)
-        try:
-            device = probe.get_int(0x1000, 0, DataType.UNSIGNED32)
-        except DriveError:
-            continue
-        sdo = session.sdo(node_id, timeout_ms=session.config.sdo_timeout_ms, retries=3)
-        vendor, product, revision, serial = (
-            sdo.get_int(0x1018, sub, DataType.UNSIGNED32) for sub in range(1, 5)
-        )
-        yield Found(
-            node_id=node_id,
-            device_type=device,
-            vendor=vendor,
-            product=product,
-            revision=revision,
-            serial=serial,
-            verdict=_verdict(session.config, node_id, (vendor, product, serial)),
-        )
+    """Ask every node id up to `last` for its identity; nothing is written.
+
+    Raises:
+        BusError: nobody can be asked, such as at a wrong bitrate.
+    """
+    config, port = session.config, session.port()
+    found = 0
+    with first_contact(port, config):
+        for node_id in range(1, last + 1):
+            probe = SdoPort(port, node_id, timeout_ms=PROBE_MS, retries=2)
+            try:
+                device = probe.get_int(0x1000, 0, DataType.UNSIGNED32)
+            except DriveError:
+                continue
+            found += 1
+            sdo = SdoPort(port, node_id, timeout_ms=config.sdo_timeout_ms)
+            vendor, product, revision, serial = (
+                sdo.get_int(0x1018, sub, DataType.UNSIGNED32) for sub in range(1, 5)
+            )
+            yield Found(
+                node_id=node_id,
+                device_type=device,
+                vendor=vendor,
+                product=product,
+                revision=revision,
+                serial=serial,
+                verdict=_verdict(config, node_id, (vendor, product, serial)),
+            )
+        if not found and port.error_frames:
+            raise NoAnswerError(f"no node up to {last} answers")
 
 
 def _verdict(config: BusConfig, node_id: int, there: tuple[int, int, int]) -> str:

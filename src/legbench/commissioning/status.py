@@ -6,6 +6,7 @@ from legbench.drives.cia402 import Mode, describe_statusword
 from legbench.drives.codec.datatypes import DataType
 from legbench.drives.codec.emcy import MEANINGS
 from legbench.drives.config import NodeConfig
+from legbench.drives.master.sdo_port import SdoPort
 from legbench.drives.session import Session
 from legbench.drives.units import unwrap
 
@@ -33,7 +34,10 @@ class NodeStatus:
 
 def read_counts(session: Session, node: NodeConfig) -> tuple[int, int]:
     """Both encoders as shown, not unwrapped [counts]; raises DriveError."""
-    sdo = session.bring_up().sdo(node)
+    return _counts(session.bring_up().sdo(node), node)
+
+
+def _counts(sdo: SdoPort, node: NodeConfig) -> tuple[int, int]:
     motor = sdo.get_int(0x6064, 0, DataType.INTEGER32)
     link = node.link_object
     return motor, sdo.get_int(link.index, link.sub, link.kind)
@@ -43,14 +47,16 @@ def status(session: Session) -> list[NodeStatus]:
     """All drives of the bus file.
 
     Raises:
+        BusError: nobody can be asked, such as at a wrong bitrate.
         DriveError: one does not answer.
     """
-    return [_status(session, node) for node in session.config.nodes]
+    up = session.bring_up()
+    with up.contact():
+        return [_status(up.sdo(node), node) for node in session.config.nodes]
 
 
-def _status(session: Session, node: NodeConfig) -> NodeStatus:
-    sdo = session.bring_up().sdo(node)
-    motor, link = read_counts(session, node)
+def _status(sdo: SdoPort, node: NodeConfig) -> NodeStatus:
+    motor, link = _counts(sdo, node)
     mode = sdo.get_int(0x6061, 0, DataType.INTEGER8)
     code = sdo.get_int(0x603F, 0, DataType.UNSIGNED16)
     heat = node.temperature_object

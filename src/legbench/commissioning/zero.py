@@ -1,5 +1,6 @@
 """Encoder offsets from a leg that stands in a known posture."""
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -36,8 +37,12 @@ def measure(session: Session, posture: Sequence[float]) -> list[Zero]:
     """Offsets with which both encoders of every node show `posture`, one angle a node [rad].
 
     Raises:
+        ConfigError: an angle that no leg stands at.
         DriveError: a drive does not answer, is another one, or its encoders move.
     """
+    for angle in posture:
+        if not abs(angle) <= math.pi:
+            raise ConfigError(f"an angle of the posture is {angle:g} rad; it must be -pi to pi rad")
     session.bring_up().identify()
     return [
         _node(session, node, angle)

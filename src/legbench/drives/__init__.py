@@ -6,7 +6,8 @@ modules; this package itself imports nothing.
 What a program needs:
 
     config = bus_file.load_bus(path)                  # BusConfig; load_limits(path): SafetyLimits
-    bus = open_bus.open_bus(config, interface=, channel=, bitrate=)      # any can.BusABC
+    adapter = open_bus.adapter_of(config, interface=, channel=)          # python-can's conventions
+    bus = open_bus.open_bus(config, adapter)                             # any can.BusABC
     with link.Link(bus, config, limits, stiffness=(k1, k2), read_only=, listener=) as it:
         sample = it.start(clear_faults=)    # lock, identity, configuration, settle, enable: Sample
         sample = it.move_to(posture, speed)             # guarded, before the first real cycle
@@ -40,11 +41,15 @@ For commissioning:
     objects: OBJECTS, name_of;  configuration.configuration(bus, node): what is written, in order
     wire: schedule, bus_load, check_load (80 %);  master.bus_log.BusLog: candump lines
     master.lock.ChannelLock.of_channel(interface, channel): taken before the interface is opened
+    up.contact(): around a first question, so that a wrong bitrate is named
+    interface.check_interface(config, channel): a SocketCAN interface is up, at the right bitrate
     limits.SafetyLimits.require_complete(), stopping.check_stopping: before real drives are led
     timebase: SystemTime (absolute sleeps), NetworkTime
     eds.eds_text(), eds.dcf_text(config, node);  units.AxisUnits: counts <-> rad
 
-Modules: `codec/` (pure: frame, datatypes, nmt, emcy, pdo, sdo, sdo_client, sdo_server), `cia402`
-(pure), `config`, `bus_file`, `configuration`, `objects`, `units`, `limits`, `wire`, `emulated/`
-(pure), `bus` (python-can plugin), `master/` and `link` (I/O).
+Modules: `codec/` (pure: frame, datatypes, nmt, emcy, pdo, sdo, sdo_client, sdo_server, slcan),
+`cia402` (pure), `config`, `bus_file`, `configuration`, `objects`, `units`, `limits`, `wire`,
+`emulated/` (pure), `bus` and `unix_bus` (python-can plugins), `slcan_bus` (python-can's, with a
+`recv` of its own), `unix_server`, `slcan_server` and `bus_server` (the emulated leg for other
+processes), `interface`, `master/` and `link` (I/O).
 """

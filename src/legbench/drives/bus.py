@@ -39,9 +39,12 @@ class LockstepBus(can.BusABC):
         *,
         network: Network | None = None,
         tx_queue: int = 64,
+        bitrate: int | None = None,
         **_others: object,
     ) -> None:
         """Plug into a network, or build one with stiff links from the bus file `channel`.
+
+        The bitrate [bit/s] is that of the wire by default; at another one no frame passes.
 
         Raises:
             can.CanInitializationError: the bus file makes no sense.
@@ -53,15 +56,15 @@ class LockstepBus(can.BusABC):
                 raise can.CanInitializationError(str(error)) from error
         self.network = network
         self.timebase = NetworkTime(network)
-        self._station = network.attach(tx_queue)
+        self._station = network.attach(tx_queue, bitrate)
         self.channel_info = f"emulated bus {channel}"
         self.channel = channel
         super().__init__(channel=channel, can_filters=can_filters)
 
     @property
     def state(self) -> can.BusState:
-        """From the transmit error counter; setting it `ACTIVE` restarts the controller."""
-        errors = self.network.errors[self._station]
+        """From the error counters; setting it `ACTIVE` restarts the controller."""
+        errors = max(self.network.errors[self._station], self._station.unread)
         if self.network.off_bus(self._station):
             return can.BusState.ERROR
         return can.BusState.PASSIVE if errors >= PASSIVE else can.BusState.ACTIVE

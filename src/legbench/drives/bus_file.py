@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 from legbench.drives.codec.datatypes import SHORT_NAMES
 from legbench.drives.codec.pdo import Mapped
 from legbench.drives.config import (
+    NOT_IN_FILES,
     RPDO,
     BusConfig,
     Identity,
@@ -144,7 +145,11 @@ def _build(
     converted: tuple[str, ...] = (),
 ) -> Built:
     """A dataclass from keys: unknown and missing ones are named, plain types checked."""
-    known = {field.name: field for field in fields(kind)}  # pyright: ignore[reportArgumentType]
+    known = {
+        field.name: field
+        for field in fields(kind)  # pyright: ignore[reportArgumentType]
+        if field.init and NOT_IN_FILES not in field.metadata
+    }
     unknown = sorted(set(given) - set(known))
     if unknown:
         raise ConfigError(

@@ -1,7 +1,7 @@
 """What is on the bus: nodes, their identity, process data, units; one frozen value each."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 from legbench.drives.codec.datatypes import DataType
 from legbench.drives.codec.frame import LAST_NODE, RPDO_BASES, TPDO_BASES
@@ -179,6 +179,8 @@ class NodeConfig:
         return pdo.cob_id or TPDO_BASES[pdo.number - 1] + self.node_id
 
 
+NOT_IN_FILES = "not in files"
+"""Metadata of a field that is no key of a bus file."""
 FASTEST_START = 5.0
 """Of a move before a run begins [rad/s]."""
 
@@ -221,6 +223,8 @@ class BusConfig:
     """Cycles with regular process data before anything is enabled."""
     start_speed: float = 2.0
     """Of a move to the start posture, before a run begins [rad/s]."""
+    stated_bitrate: int | None = field(default=None, metadata={NOT_IN_FILES: True})
+    """What the bus file says, where an interface is opened at another `bitrate` [bit/s]."""
 
     def __post_init__(self) -> None:
         if not self.nodes:
@@ -243,6 +247,22 @@ class BusConfig:
         for name in ("bitrate", "heartbeat_ms", "master_heartbeat_ms", "sdo_timeout_ms"):
             if getattr(self, name) <= 0:
                 raise ConfigError(f"{name} is {getattr(self, name)}; it must be positive")
+
+    def at(self, bitrate: int | None) -> "BusConfig":
+        """The same bus as an interface at another bitrate sees it [bit/s]."""
+        if bitrate in (None, self.bitrate):
+            return self
+        return replace(self, bitrate=bitrate, stated_bitrate=self.bitrate)
+
+    @property
+    def bitrate_text(self) -> str:
+        """At which bitrate this bus is talked to, and who says so."""
+        if self.stated_bitrate is None:
+            return f"the bus file says {self.bitrate} bit/s"
+        return (
+            f"{self.bitrate} bit/s is asked for, but the bus file says {self.stated_bitrate} "
+            "bit/s: leave --bitrate out, or give that of the drives"
+        )
 
     @property
     def period(self) -> float:

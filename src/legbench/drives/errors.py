@@ -7,6 +7,10 @@ class DriveError(LegbenchError, RuntimeError):
     """A drive that is missing, is another one, or does not do what it was told."""
 
 
+class NoAnswerError(DriveError):
+    """A node that keeps silent when it is asked for an object."""
+
+
 class BusError(LegbenchError, OSError):
     """A CAN interface that is not there, is down, is taken, or has left the bus."""
 

@@ -127,27 +127,30 @@ class Guard:
         Raises:
             PlantFault: the wish is not finite or jumps too far; `applied` stands.
         """
+        limits, step, applied = self._limits, self._step_max, []
         before = self.applied if self._wish is None else self._wish
-        for axis, (value, last) in enumerate(zip(wish, before, strict=True), start=1):
+        for value, wished, last, (low, high) in zip(
+            wish, before, self.applied, limits.motor_range, strict=True
+        ):
             if not math.isfinite(value):
                 raise PlantFault(
                     "command not finite",
-                    f"the command of motor {axis} is {value} rad; the controller has failed",
+                    f"the command of motor {len(applied) + 1} is {value} rad; the controller has "
+                    "failed",
                 )
-            if abs(value - last) > self._limits.command_step:
+            if abs(value - wished) > limits.command_step:
                 raise PlantFault(
                     "command step",
-                    f"the command of motor {axis} jumps by {abs(value - last):.3f} rad in one "
-                    f"cycle, the limit is {self._limits.command_step:g} rad; smooth it",
+                    f"the command of motor {len(applied) + 1} jumps by {abs(value - wished):.3f} "
+                    f"rad in one cycle, the limit is {limits.command_step:g} rad; smooth it",
                 )
-        self._wish = tuple(wish)
-        step, applied = self._step_max, []
-        for value, last, (low, high) in zip(
-            wish, self.applied, self._limits.motor_range, strict=True
-        ):
+            if low <= value <= high and -step <= value - last <= step:
+                applied.append(value)
+                continue
             # From outside the range the way leads back no faster than wished.
             wanted = min(max(value, low if low < last else last), high if high > last else last)
             applied.append(min(max(wanted, last - step), last + step))
+        self._wish = tuple(wish)
         self.applied = tuple(applied)
         return self.applied
 
@@ -181,9 +184,10 @@ class Guard:
         joint_pos: Sequence[float],
         spring_torque: Sequence[float],
         expected_pos: Sequence[float] | None = None,
-        temperature: Sequence[float] = (),
+        temperature: Sequence[float | None] = (),
     ) -> None:
-        """Look at what a cycle showed; `expected_pos` is where the motors should be by now.
+        """Look at what a cycle showed; `expected_pos` is where the motors should be by now, a
+        temperature that is not known is none.
 
         Raises:
             PlantFault: a limit is exceeded.
@@ -205,7 +209,7 @@ class Guard:
                     f"{limits.spring_torque:g} N m",
                 )
         for axis, value in enumerate(temperature, start=1):
-            if value > limits.temperature:
+            if value is not None and value > limits.temperature:
                 raise PlantFault(
                     "temperature",
                     f"drive {axis} is at {value:.1f} deg C, the limit is "
@@ -215,7 +219,7 @@ class Guard:
             self._check_following(motor_pos, expected_pos)
 
     def _check_following(self, motor_pos: Sequence[float], expected: Sequence[float]) -> None:
-        worst = max(abs(a - b) for a, b in zip(motor_pos, expected, strict=True))
+        worst = max([abs(a - b) for a, b in zip(motor_pos, expected, strict=True)])
         self._follow_age = self._follow_age + 1 if worst > self._limits.following_error else 0
         if self._follow_age > self._limits.following_cycles:
             raise PlantFault(

@@ -20,6 +20,7 @@ from typing import Self, final
 import can
 
 from legbench.drives.cia402 import Goal
+from legbench.drives.codec.nmt import NmtState
 from legbench.drives.config import BusConfig, check_start_speed
 from legbench.drives.errors import BusError, DriveError
 from legbench.drives.limits import Guard, SafetyLimits
@@ -27,6 +28,7 @@ from legbench.drives.master.bring_up import BringUp
 from legbench.drives.master.cycle import Cycle, Tick
 from legbench.drives.master.lock import ChannelLock
 from legbench.drives.master.port import Listener, Port
+from legbench.drives.master.read_only import may_pace, may_read
 from legbench.drives.master.sample import Sample, sample_of
 from legbench.drives.master.start_up import StartUp
 from legbench.drives.master.stop import StopLadder
@@ -36,6 +38,8 @@ from legbench.drives.timebase import Timebase
 from legbench.drives.wire import check_load
 from legbench.errors import PlantFault
 
+LISTEN_NS = 100_000_000
+"""So long read-only listens for the SYNC of another master, and for heartbeats."""
 ARRIVED = 1e-9
 """Of a target that has been reached [rad]."""
 
@@ -60,7 +64,8 @@ class Link:
     Attributes:
         state: how far it has come.
         fault: the first fault; what ended the link.
-        skipped_total: ticks missed since the start.
+        skipped_total: ticks without SYNC since the start.
+        listening: read-only, and another master sends SYNC: this one sends nothing.
     """
 
     def __init__(
@@ -84,7 +89,7 @@ class Link:
             stiffness: of the series springs, one a drive [N m/rad].
             timebase: that of the bus by default.
             listener: sees every frame, such as a `BusLog`.
-            read_only: observe; never send a controlword or a target.
+            read_only: observe; change nothing in a drive, see `master.read_only`.
             lock: taken by `open`; by default one for the bus's channel.
 
         Raises:
@@ -104,37 +109,56 @@ class Link:
         self.skipped_total = 0
         self._supervisor = Supervisor(self.cycle, config, self._limits, self._port.timebase)
         self._start_up = StartUp(self._port, self.cycle, config, read_only=read_only)
-        self._last = Tick(0, 0, 0, False)
+        self._last = Tick(0, 0, 0, 0, False)
         self._expected: list[tuple[float, ...]] = []
+        self._holds = False
+        self.listening = False
+
+    def tell(self, listener: Listener) -> None:
+        """Show every frame to a listener from now on."""
+        self._port.listener = listener
 
     # --- before anything moves ---------------------------------------------------------------
 
     def open(self) -> None:
         """Take the channel, check who is there, write and read back the configuration.
 
+        In read-only nothing is written, and the channel is taken only if SYNC has to come from
+        here.
+
         Raises:
             BusError: the channel has a master, or the interface does not work.
-            DriveError: a drive is missing, is another one, or refuses its configuration.
+            DriveError: a drive is missing, is another one, or refuses its configuration; or, in
+                read-only, is not configured.
         """
         if self.state is not LinkState.NEW:
             return
-        self._lock.acquire()
         try:
-            self.bring_up.identify()
             if self._read_only:
-                self._configure_to_look()
+                self._prepare_to_look()
             else:
-                self._configure_to_move()
+                self._hold()
+                self._prepare_to_move()
             for node, poll in zip(self._config.nodes, self.cycle.polls, strict=True):
                 reading = self.bring_up.temperature(node)
                 if reading is not None:
                     poll.take(reading)
         except BaseException:
-            self._lock.release()
+            self._let_go()
             raise
         self.state = LinkState.CONFIGURED
 
-    def _configure_to_move(self) -> None:
+    def _hold(self) -> None:
+        self._lock.acquire()
+        self._holds = True
+
+    def _let_go(self) -> None:
+        if self._holds:
+            self._holds = False
+            self._lock.release()
+
+    def _prepare_to_move(self) -> None:
+        self.bring_up.identify()
         self.bring_up.unpower()
         self.bring_up.pre_operational()
         for node in self._config.nodes:
@@ -142,23 +166,32 @@ class Link:
             self.bring_up.check_soft_limits(node)
             self.bring_up.preload(node)
 
-    def _configure_to_look(self) -> None:
-        """Drives that hold their configuration already are written nothing.
+    def _prepare_to_look(self) -> None:
+        """Beside another master listen only; without one SYNC has to come from here.
 
         Raises:
-            DriveError: one holds another configuration, and has power.
+            BusError: a master of this computer holds the channel, and sends no SYNC yet.
+            DriveError: a drive is not configured, or somebody leads it without SYNC.
         """
-        other = [node for node in self._config.nodes if self.bring_up.differences(node)]
-        for node in other:
-            if self.bring_up.powered(node):
+        self._port.may_send = may_read
+        now_ns = self._port.timebase.now_ns()
+        self.listening = self.cycle.hears_sync(now_ns + LISTEN_NS)
+        self._start_up.listening = self.listening
+        if not self.listening:
+            self._hold()
+        self.bring_up.identify()
+        self.bring_up.refuse_differences()
+        if self.listening:
+            return
+        for node, watch in zip(self._config.nodes, self.cycle.watches, strict=True):
+            powered = self.bring_up.powered(node)
+            if powered or watch.state is NmtState.OPERATIONAL:
                 raise DriveError(
-                    f"drive '{node.name}' (node {node.node_id}) has power and is not configured as "
-                    "the bus file says; read-only does not change a drive with power"
+                    f"drive '{node.name}' (node {node.node_id}) "
+                    f"{'has power' if powered else 'is operational'}, though nobody sends SYNC: "
+                    "somebody else leads it, and read-only does not interfere; end that program"
                 )
-        if other:
-            self.bring_up.pre_operational()
-        for node in other:
-            self.bring_up.configure(node)
+        self._port.may_send = may_pace(self._config.master_id)
 
     def start(self, *, clear_faults: bool = False) -> Sample:
         """Open if need be, let process data settle, enable all drives where they stand.
@@ -307,7 +340,7 @@ class Link:
             raise error
 
     def _tick(self) -> Tick:
-        self._last = tick = self.cycle.tick()
+        self._last = tick = self.cycle.follow() if self.listening else self.cycle.tick()
         self.skipped_total += tick.skipped
         return tick
 
@@ -331,7 +364,7 @@ class Link:
             joint_pos=sample.link_pos,
             spring_torque=sample.spring_torque,
             expected_pos=self._expected[0] if self._expected else None,
-            temperature=[value for value in sample.temperature if value is not None],
+            temperature=sample.temperature,
         )
 
     def _end(self, error: PlantFault) -> None:
@@ -356,18 +389,23 @@ class Link:
                 StopLadder(self.cycle).run()
 
     def close(self) -> None:
-        """Stop, leave the drives in pre-operational, release the channel; never raises."""
+        """Stop, leave the drives in pre-operational, release the channel; never raises.
+
+        A link that only looks leaves the drives of another master alone.
+        """
         if self.state is LinkState.NEW:
             return
+        looked = self.listening or self.state is LinkState.CONFIGURED
         try:
             self.stop()
         finally:
             try:
-                self.bring_up.pre_operational()
+                if not (self._read_only and (looked or self.cycle.stranger is not None)):
+                    self.bring_up.pre_operational()
             except BusError as error:
                 self.cycle.bus_error = error
             finally:
-                self._lock.release()
+                self._let_go()
                 self.state = LinkState.STOPPED
 
     def __enter__(self) -> Self:

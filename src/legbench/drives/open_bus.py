@@ -1,48 +1,103 @@
 """A python-can bus from a bus file and flags, its failures named."""
 
+import os
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
 import can
+from can.util import load_config
 
 from legbench.drives.bus import LockstepBus
 from legbench.drives.config import BusConfig
 from legbench.drives.errors import BusError
+from legbench.drives.interface import check_interface
 from legbench.drives.timebase import SystemTime, Timebase
 
+SLCAN, SOCKETCAN = "slcan", "socketcan"
+TERMINALS = "/dev/pts/"
+"""Of pseudo terminals on Linux."""
+SHARED = ("legbench", "legbench_unix", "socketcan", "socketcand", "udp_multicast", "virtual")
+"""Interfaces that serve any number of programs; any other adapter serves one."""
 
-def open_bus(
-    config: BusConfig,
-    *,
-    interface: str | None = None,
-    channel: str | None = None,
-    bitrate: int | None = None,
-    **options: object,
-) -> can.BusABC:
-    """Open an interface; flags go before the bus file, python-can's own configuration fills in.
 
-    Args:
-        config: the bus file.
-        interface: python-can's name, such as `socketcan`, `slcan` or `legbench`.
-        channel: such as `can0`.
-        bitrate: [bit/s]; SocketCAN's is set with `ip link`, not here.
-        options: of the driver.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Adapter:
+    """Where a bus is reached."""
+
+    interface: str
+    """python-can's name."""
+    channel: str | None
+
+    @property
+    def shared(self) -> bool:
+        """Whether a program may listen beside another one."""
+        return self.interface in SHARED
+
+
+def adapter_of(
+    config: BusConfig, *, interface: str | None = None, channel: str | None = None
+) -> Adapter:
+    """Flags go before the bus file, python-can's own configuration fills in; opens nothing.
 
     Raises:
-        BusError: no such interface or channel, or it is down.
+        BusError: nobody says which interface.
     """
-    chosen = interface or config.interface
-    where = channel or config.channel
+    chosen, where = interface or config.interface, channel or config.channel
+    if chosen is None or where is None:
+        given = {"interface": chosen, "channel": where}
+        try:
+            found = load_config(config={key: value for key, value in given.items() if value})
+        except (can.CanError, OSError, ImportError, ValueError) as error:
+            if chosen is None:
+                raise BusError(
+                    "no interface is given: name one with --interface, in the bus file, or in "
+                    "python-can's own configuration (CAN_INTERFACE, can.conf)"
+                ) from error
+            raise _named(chosen, where, error) from error
+        chosen, where = found["interface"], where or found.get("channel")
+    return Adapter(interface=str(chosen), channel=None if where is None else str(where))
+
+
+def open_bus(config: BusConfig, adapter: Adapter) -> can.BusABC:
+    """Open an adapter at the bitrate of a bus; SocketCAN's is set with `ip link`, not here.
+
+    Raises:
+        BusError: no such interface or channel, it is down, or runs at another bitrate.
+    """
+    if adapter.interface == SOCKETCAN and adapter.channel is not None:
+        check_interface(config, adapter.channel)
     given = {
-        "interface": chosen,
-        "channel": where,
-        "bitrate": bitrate or config.bitrate,
-        **options,
+        "interface": adapter.interface,
+        "channel": adapter.channel,
+        "bitrate": config.bitrate,
     }
+    given = {key: value for key, value in given.items() if value is not None}
     try:
-        return can.Bus(**{key: value for key, value in given.items() if value is not None})  # pyright: ignore[reportArgumentType]
+        return _slcan(given) if adapter.interface == SLCAN else can.Bus(**given)  # pyright: ignore[reportArgumentType]
     except (can.CanError, OSError, ImportError, ValueError) as error:
-        raise BusError(
-            f"cannot open {chosen or 'the default interface'} {where or ''}: {error}; interfaces "
-            "are those of python-can, 'legbench' is the emulated leg"
-        ) from error
+        raise _named(adapter.interface, adapter.channel, error) from error
+
+
+def _slcan(given: dict[str, object]) -> can.BusABC:
+    """Imported late: without pyserial python-can warns of it."""
+    options: dict[str, Any] = {**load_config(config=given)}
+    del options["interface"]
+    if os.path.realpath(str(options["channel"])).startswith(TERMINALS):
+        # A real adapter needs two seconds to boot after it has been opened.
+        options.setdefault("sleep_after_open", 0.0)
+    try:
+        return import_module("legbench.drives.slcan_bus").SlcanBus(**options)
+    except can.CanInterfaceNotImplementedError as error:
+        raise BusError(f"slcan: {error}; pip install 'legbench[slcan]'") from None
+
+
+def _named(interface: str, channel: str | None, error: Exception) -> BusError:
+    where = f"{interface} {channel or ''}".strip()
+    return BusError(
+        f"cannot open {where}: {error}; interfaces are those of python-can, 'legbench' is the "
+        "emulated leg"
+    )
 
 
 def timebase_of(bus: can.BusABC, spin_ns: int = 0) -> Timebase:

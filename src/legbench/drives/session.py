@@ -15,7 +15,6 @@ from legbench.drives.master.bring_up import BringUp
 from legbench.drives.master.bus_log import BusLog
 from legbench.drives.master.lock import ChannelLock
 from legbench.drives.master.port import Port
-from legbench.drives.master.sdo_port import SdoPort
 from legbench.drives.open_bus import timebase_of
 from legbench.drives.realtime import Granted, ask
 from legbench.drives.timebase import SystemTime, Timebase
@@ -32,13 +31,26 @@ class Session:
     """
 
     def __init__(
-        self, bus: can.BusABC, config: BusConfig, timebase: Timebase | None = None
+        self,
+        bus: can.BusABC,
+        config: BusConfig,
+        timebase: Timebase | None = None,
+        *,
+        lock: ChannelLock | None = None,
     ) -> None:
+        """Own a bus.
+
+        Args:
+            bus: shut down in the end.
+            config: what hangs on it.
+            timebase: that of the bus by default.
+            lock: of its channel, which this session releases if it is held already.
+        """
         self.bus, self.config = bus, config
         self.timebase = timebase or timebase_of(bus)
         self.log: BusLog | None = None
         self._links: list[Link] = []
-        self._locks: list[ChannelLock] = []
+        self._lock = lock or self._lock_of_bus()
         self._closed = False
 
     @property
@@ -57,37 +69,29 @@ class Session:
         self.timebase = SystemTime(1000 * granted.spin_us)
         return granted
 
-    def heard(self, message: can.Message) -> None:
-        """Every frame comes past here."""
-        if self.log is not None:
-            self.log(message)
-
     def log_to(self, path: Path) -> None:
-        """Write every frame from now on; raises BusError if the file cannot be made."""
+        """Write every frame of all links from now on; raises BusError if there can be no file."""
         self.log = BusLog(path, str(getattr(self.bus, "channel", "can")))
+        for link in self._links:
+            link.tell(self.log)
 
-    def lock(self) -> ChannelLock:
-        """The lock of this channel; an emulated bus of this process has no other master."""
+    def _lock_of_bus(self) -> ChannelLock:
+        """An emulated bus of this process has no other master."""
         name = str(self.bus.channel_info)
         return ChannelLock(f"{name}-{id(self.bus):x}" if self.virtual else name)
 
     def hold(self) -> None:
         """Take the channel for this session; raises BusError if it has a master."""
-        lock = self.lock()
-        lock.acquire()
-        self._locks.append(lock)
+        if not self._lock.held:
+            self._lock.acquire()
 
     def port(self) -> Port:
         """Frames in and out."""
-        return Port(self.bus, self.timebase, self.heard)
+        return Port(self.bus, self.timebase, self.log)
 
     def bring_up(self) -> BringUp:
         """SDO access to all nodes of the bus file."""
         return BringUp(self.port(), self.config, lambda _message: None)
-
-    def sdo(self, node_id: int, *, timeout_ms: int, retries: int = 1) -> SdoPort:
-        """SDO access to any node."""
-        return SdoPort(self.port(), node_id, timeout_ms=timeout_ms, retries=retries)
 
     def link(
         self, limits: SafetyLimits, stiffness: Sequence[float], *, read_only: bool = False
@@ -99,9 +103,9 @@ class Session:
             limits,
             stiffness=stiffness,
             timebase=self.timebase,
-            listener=self.heard,
+            listener=self.log,
             read_only=read_only,
-            lock=self.lock(),
+            lock=self._lock,
         )
         self._links.append(link)
         return link
@@ -113,8 +117,6 @@ class Session:
         self._closed = True
         for link in self._links:
             link.close()
-        for lock in self._locks:
-            lock.release()
         if self.log is not None:
             self.log.close()
         try:
@@ -123,6 +125,8 @@ class Session:
             # The drives have been told to stop; the interface itself is beyond help, whatever it
             # raises: a serial adapter has a ValueError for a garbled line.
             return
+        finally:
+            self._lock.release()
 
     def __enter__(self) -> Self:
         return self

@@ -20,12 +20,27 @@ from legbench.drives.codec.frame import Frame
 PACKET = struct.Struct("<IB8s")
 """Identifier with flags, length, data."""
 EXTENDED, REMOTE, ERROR, ID_MASK = 1 << 31, 1 << 30, 1 << 29, (1 << 29) - 1
+BITRATE = struct.Struct("<I")
 
 
 def pack_frame(frame: Frame) -> bytes:
     """A frame as one packet."""
     flags = EXTENDED * frame.extended | REMOTE * frame.remote | ERROR * frame.error
     return PACKET.pack(frame.cob_id | flags, len(frame.data), frame.data)
+
+
+def opening(bitrate: int) -> bytes:
+    """The packet with which a master says at which bitrate its controller runs [bit/s].
+
+    No master sends error frames, so it is one.
+    """
+    return pack_frame(Frame(0, BITRATE.pack(bitrate), error=True))
+
+
+def opened_at(frame: Frame) -> int | None:
+    """The bitrate that an opening packet says; none if it is a frame like any other."""
+    plain = not frame.error or len(frame.data) != BITRATE.size
+    return None if plain else BITRATE.unpack(frame.data)[0]
 
 
 def unpack_frame(packet: bytes) -> Frame | None:
@@ -49,9 +64,14 @@ class UnixBus(can.BusABC):
     """A port to a bus that another process serves."""
 
     def __init__(
-        self, channel: str, can_filters: CanFilters | None = None, **_others: object
+        self,
+        channel: str,
+        can_filters: CanFilters | None = None,
+        *,
+        bitrate: int | None = None,
+        **_others: object,
     ) -> None:
-        """Connect.
+        """Connect, by default at the bitrate of the wire behind [bit/s].
 
         Raises:
             can.CanInitializationError: nobody serves a bus there.
@@ -59,6 +79,8 @@ class UnixBus(can.BusABC):
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         try:
             self._socket.connect(channel)
+            if bitrate is not None:
+                self._socket.send(opening(bitrate))
         except OSError as error:
             self._socket.close()
             self._is_shutdown = True

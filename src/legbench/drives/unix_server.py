@@ -13,7 +13,7 @@ from typing import Self, final
 from legbench.drives.emulated.network import Network, Station
 from legbench.drives.errors import BusError
 from legbench.drives.pacer import Pacer
-from legbench.drives.unix_bus import PACKET, pack_frame, unpack_frame
+from legbench.drives.unix_bus import PACKET, opened_at, pack_frame, unpack_frame
 
 
 @final
@@ -78,6 +78,11 @@ class UnixServer:
                 return
             frame = unpack_frame(packet)
             if frame is None:
+                continue
+            bitrate = opened_at(frame)
+            if bitrate is not None:
+                self.network.detach(self._stations[client])
+                self._stations[client] = self.network.attach(bitrate=bitrate)
                 continue
             try:
                 self.network.send(self._stations[client], frame)

@@ -119,8 +119,9 @@ def check_load(bus: BusConfig) -> float:
     """
     load = bus_load(bus)
     if load > MAX_LOAD:
+        stated = "" if bus.stated_bitrate is None else f"; {bus.bitrate_text}"
         raise ConfigError(
             f"the schedule takes {100 * load:.0f} % of {bus.bitrate} bit/s at worst, the limit is "
-            f"{100 * MAX_LOAD:.0f} %; raise bitrate or period_us, or map fewer objects"
+            f"{100 * MAX_LOAD:.0f} %; raise bitrate or period_us, or map fewer objects{stated}"
         )
     return load

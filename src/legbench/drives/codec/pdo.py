@@ -88,7 +88,7 @@ class PdoMap:
         except struct.error:
             raise CodecError(self._why_not(values)) from None
 
-    def unpack(self, data: bytes) -> tuple[int, ...]:
+    def unpack(self, data: bytes | bytearray) -> tuple[int, ...]:
         """The values of a frame, signed where their objects are.
 
         Raises:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from legbench.drives.config import BusConfig
+from legbench.drives.configuration import configuration
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.drive import EmulatedDrive
 from legbench.drives.emulated.faults import Fault
@@ -19,6 +20,7 @@ def emulate(
     stuffing: Stuffing = Stuffing.WORST,
     faults: Sequence[Fault] = (),
     keep_log: bool = False,
+    configured: bool = False,
 ) -> Network:
     """Drives as a bus file describes them, on a wire of its bitrate.
 
@@ -30,6 +32,7 @@ def emulate(
         stuffing: how long frames are.
         faults: to inject.
         keep_log: remember every frame in `Network.log`.
+        configured: the drives have kept, over their last power-off, what the bus file says.
 
     Raises:
         ConfigError: not one behaviour a drive.
@@ -37,7 +40,10 @@ def emulate(
     chosen = [Behaviour() for _ in bus.nodes] if behaviours is None else list(behaviours)
     if len(chosen) != len(bus.nodes):
         raise ConfigError(f"{len(chosen)} behaviours for {len(bus.nodes)} drives")
-    drives = [EmulatedDrive(node, how) for node, how in zip(bus.nodes, chosen, strict=True)]
+    drives = [
+        EmulatedDrive(node, how, tuple(configuration(bus, node)) if configured else ())
+        for node, how in zip(bus.nodes, chosen, strict=True)
+    ]
     return Network(
         drives,
         body=body,

@@ -1,7 +1,7 @@
 """An emulated CiA 301/402 drive: frames in, frames out, time is an argument; pure."""
 
 import random
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import final
 
 from legbench.drives.cia402 import DriveState
@@ -24,7 +24,7 @@ from legbench.drives.codec.nmt import (
 )
 from legbench.drives.codec.sdo import Abort
 from legbench.drives.codec.sdo_server import SdoServer
-from legbench.drives.config import NodeConfig
+from legbench.drives.config import NodeConfig, Parameter
 from legbench.drives.emulated.axis import SYNC_MISSING, Axis
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.process_data import LAST_SYNCHRONOUS, ProcessData
@@ -52,8 +52,14 @@ class EmulatedDrive:
         axis: the CiA 402 half.
     """
 
-    def __init__(self, node: NodeConfig, behaviour: Behaviour | None = None) -> None:
-        self._node, self._behaviour = node, behaviour or Behaviour()
+    def __init__(
+        self,
+        node: NodeConfig,
+        behaviour: Behaviour | None = None,
+        kept: Sequence[Parameter] = (),
+    ) -> None:
+        """Switch it on; `kept` is what its memory holds instead of the defaults (1010h)."""
+        self._node, self._behaviour, self._kept = node, behaviour or Behaviour(), kept
         self.node_id = node.node_id
         self._random = random.Random(self._behaviour.seed * LAST_NODE + node.node_id)
         self._store = ObjectStore(OBJECTS.values(), self._check, self._written)
@@ -72,6 +78,13 @@ class EmulatedDrive:
         self._watches: dict[int, HeartbeatWatch] = {}
         self._out: list[tuple[int, Frame]] = []
         self._mute = False
+        self._recall()
+
+    def _recall(self) -> None:
+        for parameter in self._kept:
+            entry = self._store.entry(parameter.key)
+            if entry is not None:
+                self._store.put(entry, parameter.value)
 
     def _personal(self) -> None:
         identity, node_id = self._node.identity, self._node.node_id
@@ -143,6 +156,7 @@ class EmulatedDrive:
         self._personal()
         self.axis.restart()
         self._pdos.rebuild()
+        self._recall()
         self._watches.clear()
         self._out.clear()
         self.state, self._sync_ns, self._fresh = NmtState.BOOT_UP, None, False

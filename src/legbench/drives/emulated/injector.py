@@ -31,8 +31,6 @@ class Injector:
         self._nodes: list[NodeFault] = []
         self._babbles: list[Babble] = []
         self._begun: list[NodeFault] = []
-        self.broken = False
-        """Whether the frame on the wire is being destroyed."""
         for fault in faults:
             self.add(fault)
 
@@ -58,11 +56,10 @@ class Injector:
 
     def breaks(self, frame: Frame, now_ns: int) -> bool:
         """Whether a frame is destroyed on the wire."""
-        self.broken = any(
+        return any(
             fault.kind is FrameFaultKind.BAD_BITS and fault.hits(frame, now_ns)
             for fault in self._frames
         )
-        return self.broken
 
     def fate(self, frame: Frame, now_ns: int) -> Fate:
         """What arrives of a frame that was not destroyed."""

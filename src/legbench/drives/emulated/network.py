@@ -56,11 +56,13 @@ class Participant(Protocol):
 class Station:
     """A master's controller: a queue of received frames and an error counter."""
 
-    def __init__(self, tx_queue: int) -> None:
+    def __init__(self, tx_queue: int, bitrate: int, *, listen_only: bool) -> None:
         self.received: deque[tuple[int, Frame]] = deque()
-        self.tx_queue = tx_queue
+        self.tx_queue, self.bitrate, self.listen_only = tx_queue, bitrate, listen_only
         self.waiting = 0
         """Frames that have not been on the wire yet."""
+        self.unread = 0
+        """Receive error counter: frames of others that made no sense here."""
 
 
 Node = Participant | Station
@@ -82,6 +84,7 @@ class Network:
         drives: in the order of the leg's joints.
         log: every frame that was on the wire with the time of its end, if wanted.
         errors: transmit error counter of every node.
+        bitrate: of the wire and of all drives [bit/s].
     """
 
     def __init__(
@@ -103,6 +106,7 @@ class Network:
         self._others = tuple(others)
         self._nodes: list[Node] = [*drives, *others]
         self.errors: dict[Node, int] = dict.fromkeys(self._nodes, 0)
+        self.bitrate = bitrate
         self._bit_ns = round(1e9 / bitrate)
         self._stuffing = stuffing
         self._injector = Injector(faults)
@@ -111,18 +115,31 @@ class Network:
         self._sequence = 0
         self._copied: dict[int, Node] = {}
         self._flying: _Pending | None = None
+        self._broken = False
         self._end_ns = 0
+        self._strangers: list[Station] = []
+        """Stations at another bitrate than the wire's."""
 
-    def attach(self, tx_queue: int = 64) -> Station:
-        """Plug a master in."""
-        station = Station(tx_queue)
+    def attach(
+        self, tx_queue: int = 64, bitrate: int | None = None, *, listen_only: bool = False
+    ) -> Station:
+        """Plug a master in, by default at the bitrate of the wire [bit/s].
+
+        At another one it reads nothing, nobody reads what it sends, and until its controller is
+        error passive it destroys what the others send.
+        """
+        station = Station(tx_queue, bitrate or self.bitrate, listen_only=listen_only)
         self._nodes.append(station)
         self.errors[station] = 0
+        if station.bitrate != self.bitrate:
+            self._strangers.append(station)
         return station
 
     def detach(self, station: Station) -> None:
         """Unplug a master; what it had not sent yet is lost."""
         self._nodes.remove(station)
+        if station in self._strangers:
+            self._strangers.remove(station)
         self._pending = [entry for entry in self._pending if entry[3] is not station]
 
     def inject(self, fault: Fault) -> None:
@@ -136,6 +153,8 @@ class Network:
     def recover(self, node: Node) -> None:
         """Take a node back onto the bus."""
         self.errors[node] = 0
+        if isinstance(node, Station):
+            node.unread = 0
 
     def send(self, station: Station, frame: Frame) -> None:
         """Hand a master's frame to its controller.
@@ -211,9 +230,22 @@ class Network:
         self._pending.remove(winner)
         self._flying = winner
         frame = winner[4]
-        error = self._injector.breaks(frame, now_ns)
-        bits = ERROR_BITS + worst_bits(0) if error else self._length(frame)
+        self._broken = self._injector.breaks(frame, now_ns) or self._garbled(winner[3])
+        bits = ERROR_BITS + worst_bits(0) if self._broken else self._length(frame)
         self._end_ns = now_ns + bits * self._bit_ns
+
+    def _garbled(self, sender: Node) -> bool:
+        """Whether two bitrates meet: all others flag what a stranger sends, and a stranger flags
+        all that it hears as long as it may.
+        """
+        if sender in self._strangers:
+            return True
+        broken = False
+        for stranger in self._strangers:
+            stranger.unread = min(BUS_OFF, stranger.unread + 8)
+            active = max(self.errors[stranger], stranger.unread) < PASSIVE
+            broken = broken or (active and not stranger.listen_only)
+        return broken
 
     def _length(self, frame: Frame) -> int:
         if self._stuffing is Stuffing.EXACT:
@@ -226,7 +258,7 @@ class Network:
         if flying is None:
             return
         _, _, sequence, sender, frame = flying
-        if self._injector.broken:
+        if self._broken:
             self._fail(sender, frame)
             return
         if sender in self.errors:
@@ -255,7 +287,8 @@ class Network:
                 continue
             if isinstance(node, Station):
                 if not self.off_bus(node):
-                    node.received.append((now_ns, frame))
+                    heard = ERROR_FRAME if node in self._strangers else frame
+                    node.received.append((now_ns, heard))
             elif not (self.off_bus(node) or self._deaf(node)):
                 node.receive(frame, now_ns)
                 self._collect(node)

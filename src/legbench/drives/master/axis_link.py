@@ -12,10 +12,14 @@ from legbench.drives.config import (
     NodeConfig,
 )
 from legbench.drives.errors import CodecError
-from legbench.drives.objects import Key
 from legbench.drives.units import Unwrapper, wrap
 
-_STATUSWORD, _POSITION = STATUSWORD.key, POSITION_ACTUAL.key
+
+def _wanted(layout: PdoMap, node: NodeConfig) -> tuple[tuple[int, int], ...]:
+    """Slot among what an axis is after, and place among the values of a TPDO."""
+    objects = (STATUSWORD, POSITION_ACTUAL, node.link_object)
+    places = [(slot, layout.place(*entry.key)) for slot, entry in enumerate(objects)]
+    return tuple((slot, place) for slot, place in places if place is not None)
 
 
 @final
@@ -28,6 +32,7 @@ class AxisLink:
         statusword: as last received.
         target_counts: what its next RPDO says, not wrapped.
         fresh: whether all its TPDOs have come in this cycle.
+        motor_pos, link_pos: measured angles of motor and link [rad].
     """
 
     def __init__(self, node: NodeConfig) -> None:
@@ -37,14 +42,23 @@ class AxisLink:
         self.target_counts = 0
         self.motor_counts = 0
         self.link_counts = 0
-        self._tpdos = {node.tpdo_id(pdo): PdoMap(pdo.objects) for pdo in node.tpdos}
+        self._motor_rad, self._link_rad = node.motor.to_rad, node.link.to_rad
+        self.motor_pos, self.link_pos = self._motor_rad(0), self._link_rad(0)
+        maps = {node.tpdo_id(pdo): PdoMap(pdo.objects) for pdo in node.tpdos}
+        self._tpdos = {
+            cob_id: (1 << number, layout, _wanted(layout, node))
+            for number, (cob_id, layout) in enumerate(maps.items())
+        }
+        self._tpdo_ids = tuple(maps)
+        self._all = (1 << len(maps)) - 1
+        self._missing = self._all
+        self.fresh = False
+        self._shown = [0, 0, 0]
+        """Statusword, motor and link, as received."""
         self._rpdos = tuple((node.rpdo_id(pdo), PdoMap(pdo.objects)) for pdo in node.rpdos)
-        self.values: dict[Key, int] = {}
         self._plain = self._plain_layout()
-        self._missing = set(self._tpdos)
         self._motor = Unwrapper(node.motor.bits, 0)
         self._link = Unwrapper(node.link.bits, 0)
-        self._link_key = node.link_object.key
         self._known = False
 
     def _plain_layout(self) -> bool:
@@ -54,7 +68,12 @@ class AxisLink:
     @property
     def tpdo_ids(self) -> tuple[int, ...]:
         """COB-IDs to expect after every SYNC."""
-        return tuple(self._tpdos)
+        return self._tpdo_ids
+
+    @property
+    def rpdo_ids(self) -> tuple[int, ...]:
+        """COB-IDs of its commands."""
+        return tuple(cob_id for cob_id, _ in self._rpdos)
 
     @property
     def known(self) -> bool:
@@ -62,35 +81,39 @@ class AxisLink:
         return self._known
 
     @property
-    def fresh(self) -> bool:
-        """Whether all process data of this cycle has come."""
-        return not self._missing
+    def missing_ids(self) -> tuple[int, ...]:
+        """COB-IDs that have not come in this cycle."""
+        return tuple(cob for cob, (bit, _, _) in self._tpdos.items() if bit & self._missing)
 
     def begin_cycle(self) -> None:
         """SYNC goes out: everything is expected again."""
-        self._missing.update(self._tpdos)
+        self._missing = self._all
+        self.fresh = False
 
-    def feed(self, cob_id: int, data: bytes) -> bool:
+    def feed(self, cob_id: int, data: bytes | bytearray) -> bool:
         """Take a TPDO; false, and nothing changed, if its length is wrong."""
-        layout = self._tpdos[cob_id]
+        bit, layout, wanted = self._tpdos[cob_id]
         try:
             values = layout.unpack(data)
         except CodecError:
             return False
-        self.values.update(zip(layout.keys, values, strict=True))
-        self._missing.discard(cob_id)
+        shown = self._shown
+        for slot, place in wanted:
+            shown[slot] = values[place]
+        self._missing &= ~bit
         if not self._missing:
+            self.fresh = True
             self._digest()
         return True
 
     def _digest(self) -> None:
-        values = self.values
-        self.statusword = values[_STATUSWORD]
-        motor, link = values[_POSITION], values[self._link_key]
+        self.statusword, motor, link = self._shown
         if not self._known:
             self._find(motor)
-        self.motor_counts = self._motor.feed(motor)
-        self.link_counts = self._link.feed(link)
+        self.motor_counts = counts = self._motor.feed(motor)
+        self.motor_pos = self._motor_rad(counts)
+        self.link_counts = counts = self._link.feed(link)
+        self.link_pos = self._link_rad(counts)
 
     def _find(self, motor: int) -> None:
         """Unwrap for the first time: the link lies within half a turn of its motor."""
@@ -101,16 +124,6 @@ class AxisLink:
     def forget(self) -> None:
         """Positions may have jumped (homing, reset): unwrap anew."""
         self._known = False
-
-    @property
-    def motor_pos(self) -> float:
-        """Measured angle of the motor [rad]."""
-        return self.node.motor.to_rad(self.motor_counts)
-
-    @property
-    def link_pos(self) -> float:
-        """Measured angle of the link [rad]."""
-        return self.node.link.to_rad(self.link_counts)
 
     @property
     def state_text(self) -> str:

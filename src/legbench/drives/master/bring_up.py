@@ -1,6 +1,7 @@
 """From power-on to pre-operational with everything checked; nothing here enables a drive."""
 
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from typing import final
 
 import can
@@ -19,6 +20,7 @@ from legbench.drives.codec.sdo import Abort
 from legbench.drives.config import BusConfig, Identity, NodeConfig, Parameter
 from legbench.drives.configuration import configuration
 from legbench.drives.errors import BusError, DriveError, SdoAbortError
+from legbench.drives.master.first_contact import first_contact
 from legbench.drives.master.port import Port
 from legbench.drives.master.sdo_port import SdoPort
 from legbench.drives.objects import name_of
@@ -61,13 +63,21 @@ class BringUp:
         """Access to the objects of a node."""
         return self._sdo[node.node_id]
 
+    def contact(self) -> AbstractContextManager[None]:
+        """Around the first question: says what is wrong with the bus if nobody answers."""
+        return first_contact(self._port, self._bus)
+
     def identify(self, nodes: Sequence[NodeConfig] | None = None) -> None:
         """Check that every node is the one that the bus file means (1000h, 1018h, 6502h).
 
         Raises:
+            BusError: nobody can be talked to, such as at a wrong bitrate.
             DriveError: a node is missing, is another one, or two are swapped.
         """
-        nodes = self._bus.nodes if nodes is None else nodes
+        with self.contact():
+            self._identify(self._bus.nodes if nodes is None else nodes)
+
+    def _identify(self, nodes: Sequence[NodeConfig]) -> None:
         found: dict[int, Identity] = {}
         for node in nodes:
             sdo = self.sdo(node)
@@ -144,6 +154,22 @@ class BringUp:
             if there != parameter.value:
                 different.append((parameter, there))
         return different
+
+    def refuse_differences(self) -> None:
+        """For a master that may not configure; raises DriveError for the first drive that differs.
+
+        Process data that is mapped otherwise would be read as what it is not.
+        """
+        for node in self._bus.nodes:
+            different = self.differences(node)
+            if different:
+                parameter, there = different[0]
+                raise DriveError(
+                    f"node {node.node_id} ('{node.name}') holds {len(different)} objects otherwise "
+                    f"than the bus file, first {name_of(parameter.index, parameter.sub)}: {there}, "
+                    f"wanted {parameter.value}; read-only changes no drive: run `legbench drives "
+                    "configure --write` first"
+                )
 
     def configure(self, node: NodeConfig) -> int:
         """Write the configuration, reading every object back; how many.

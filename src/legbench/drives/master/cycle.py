@@ -1,8 +1,12 @@
-"""The cycle itself: grid, SYNC, process data until a deadline, RPDOs; no policy, no limits."""
+"""The cycle itself: grid, SYNC, process data until a deadline, RPDOs; no policy, no limits.
+
+CAN frames carry no number: an answer that is a whole cycle late looks like the next one. So SYNC
+never goes out while an answer to the last one may be on its way. If one has not come by the next
+tick, that tick is silent: without a SYNC, whatever comes answers an earlier one.
+"""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import final
+from typing import NamedTuple, final
 
 import can
 
@@ -15,21 +19,18 @@ from legbench.drives.codec.frame import (
     SYNC_ID,
 )
 from legbench.drives.codec.nmt import NmtState, heartbeat_frame
-from legbench.drives.codec.pdo import PdoMap
 from legbench.drives.config import BusConfig
 from legbench.drives.errors import BusError
 from legbench.drives.master.axis_link import AxisLink
 from legbench.drives.master.port import Port
 from legbench.drives.master.temperature import TemperaturePoll
 from legbench.drives.master.watch import NodeWatch
-from legbench.drives.wire import plain_bits
 
 ERROR_FRAME_BUS_OFF = 0x40
 """Class of a SocketCAN error frame: this controller has left the bus."""
 
 
-@dataclass(frozen=True, slots=True)
-class Tick:
+class Tick(NamedTuple):
     """When a cycle began."""
 
     time_ns: int
@@ -37,7 +38,9 @@ class Tick:
     late_ns: int
     """After its place on the grid."""
     skipped: int
-    """Ticks that were missed before it."""
+    """Ticks without SYNC before it, for whatever reason."""
+    silent: int
+    """Of these, not missed by this master: left out on purpose, or another master's."""
     complete: bool
     """All process data came before the deadline."""
 
@@ -54,6 +57,8 @@ class Cycle:
         stranger: identifier of a frame that only this master may send, and another one did.
         error_frames: heard so far.
         late_frames: process data that came after its deadline.
+        silent_total: ticks that were left out to find late answers.
+        stopping: from now on SYNC goes out at every tick, because a stop waits for it.
     """
 
     def __init__(self, port: Port, config: BusConfig) -> None:
@@ -67,9 +72,11 @@ class Cycle:
         self.stranger: int | None = None
         self.error_frames = 0
         self.late_frames = 0
+        self.silent_total = 0
+        self.stopping = False
         self._tpdos = {cob: axis for axis in self.axes for cob in axis.tpdo_ids}
         self._expected = len(self._tpdos)
-        self._ours = frozenset(
+        self._masters = self._ours = frozenset(
             {NMT_ID, SYNC_ID, HEARTBEAT_BASE + config.master_id}
             | {node.rpdo_id(pdo) for node in config.nodes for pdo in node.rpdos}
         )
@@ -83,14 +90,14 @@ class Cycle:
         self._deadline_ns = 1000 * config.tpdo_deadline_us
         self._beat = heartbeat_frame(config.master_id, NmtState.OPERATIONAL)
         self._beat_cycles = max(1, 1000 * config.master_heartbeat_ms // config.period_us)
-        smallest = min(PdoMap(pdo.objects).size for node in config.nodes for pdo in node.tpdos)
-        bits = plain_bits(0) + plain_bits(smallest)
-        self._soonest_ns = 1_000_000_000 * bits // config.bitrate
         self._due_ns = 0
         self._count = 0
-        self._complete = True
         self._owed: set[int] = set()
-        self._early: set[int] = set()
+        """Process data that has not come, and may still."""
+        self._sync = port.message(SYNC_ID)
+        self._commands = {
+            cob_id: port.message(cob_id) for axis in self.axes for cob_id in axis.rpdo_ids
+        }
 
     def begin(self) -> None:
         """Lay the grid: the next tick is one period from now, on a whole period."""
@@ -112,26 +119,87 @@ class Cycle:
         # Up to half a period late SYNC still goes out; beyond, it would crowd the next one.
         skipped = max(0, (late_ns + self._period_ns // 2) // self._period_ns)
         self._due_ns += skipped * self._period_ns
-        due_ns = self._due_ns
-        timebase.wait_until(due_ns)
+        timebase.wait_until(self._due_ns)
         self.bus_error = None
         self._drain()
+        silent = 0
+        if self._owed and not self.stopping:
+            silent = 1
+            self._keep_silent()
+        due_ns = self._due_ns
         for axis in self.axes:
             axis.begin_cycle()
         sync_ns = timebase.now_ns()
         missing = self._expected
         try:
-            self._port.send(SYNC_ID)
-            missing = self._gather(sync_ns + self._deadline_ns)
+            self._port.put(self._sync)
         except BusError as error:
             self._failed(error)
-        self._complete = missing == 0
-        self._remember()
+        else:
+            missing = self._gather(sync_ns + self._deadline_ns)
         for axis, watch in zip(self.axes, self.watches, strict=True):
             watch.cycle(complete=axis.fresh)
         self._due_ns = due_ns + self._period_ns
         self._count += 1
-        return Tick(sync_ns, sync_ns - due_ns, skipped, self._complete)
+        return Tick(sync_ns, sync_ns - due_ns, skipped + silent, silent, missing == 0)
+
+    def hears_sync(self, until_ns: int) -> bool:
+        """Whether another master sends SYNC by then; from its first one on this one may `follow`.
+
+        Raises:
+            BusError: the bus has failed.
+        """
+        self._ours = frozenset[int]()
+        heard = self._await_sync(until_ns) is not None
+        if not heard:
+            self._ours = self._masters
+        return heard
+
+    def follow(self) -> Tick:
+        """Wait for the SYNC of another master, gather process data; nothing is sent."""
+        timebase, last_ns = self._port.timebase, self._due_ns
+        self.bus_error = None
+        missing, skipped = self._expected, 0
+        sync_ns = None
+        try:
+            sync_ns = self._await_sync(timebase.now_ns() + 2 * self._period_ns)
+        except BusError as error:
+            self._failed(error)
+        for axis in self.axes:
+            axis.begin_cycle()
+        if sync_ns is not None:
+            skipped = max(0, round((sync_ns - last_ns) / self._period_ns) - 1)
+            missing = self._gather(sync_ns + self._deadline_ns)
+        self._due_ns = sync_ns or last_ns
+        for axis, watch in zip(self.axes, self.watches, strict=True):
+            watch.cycle(complete=axis.fresh)
+        return Tick(sync_ns or timebase.now_ns(), 0, skipped, skipped, missing == 0)
+
+    def _await_sync(self, until_ns: int) -> int | None:
+        """When the SYNC of another master came; none by then [ns]."""
+        now_ns = self._port.timebase.now_ns
+        while now_ns() < until_ns:
+            message = self._port.receive(until_ns)
+            if message is None:
+                break
+            if message.arbitration_id == SYNC_ID and not message.is_error_frame:
+                return now_ns()
+            if message.arbitration_id in self._tpdos and not message.is_error_frame:
+                self.late_frames += 1
+            else:
+                self.other(message)
+        return None
+
+    def _keep_silent(self) -> None:
+        """Let this tick pass, so that a late answer cannot be taken for one to the next SYNC."""
+        self.silent_total += 1
+        for axis, watch in zip(self.axes, self.watches, strict=True):
+            if not self._owed.isdisjoint(axis.tpdo_ids):
+                watch.cycle(complete=False)
+        self._due_ns += self._period_ns
+        self._port.timebase.wait_until(self._due_ns)
+        self._drain()
+        self._owed.clear()
 
     def send(self, controlwords: Sequence[int | None]) -> bool:
         """Send the RPDOs of all drives; they act at the next SYNC. False: the bus failed.
@@ -143,8 +211,11 @@ class Cycle:
             if controlword is None:
                 continue
             for cob_id, data in axis.frames(controlword):
+                message = self._commands[cob_id]
+                message.data = bytearray(data)
+                message.dlc = len(data)
                 try:
-                    self._port.send(cob_id, data)
+                    self._port.put(message)
                 except BusError as error:
                     self._failed(error)
                     sent = False
@@ -190,52 +261,36 @@ class Cycle:
     def _gather(self, until_ns: int) -> int:
         """Take frames until all process data is there or the deadline; how many are missing."""
         missing, receive, tpdos = self._expected, self._port.receive, self._tpdos
-        soonest_ns = until_ns - self._deadline_ns + self._soonest_ns
-        while missing:
-            message = receive(until_ns)
-            if message is None:
-                break
-            axis = tpdos.get(message.arbitration_id)
-            if axis is None or message.is_error_frame:
-                self.other(message)
-                if self._port.timebase.now_ns() >= until_ns:
+        garbled: set[int] = set()
+        try:
+            while missing:
+                message = receive(until_ns)
+                if message is None:
                     break
-                continue
-            if self._owed and self._stale(message.arbitration_id, soonest_ns):
-                continue
-            before = axis.fresh
-            if not axis.feed(message.arbitration_id, bytes(message.data)):
-                self._by_node[axis.node.node_id].bad_total += 1
-            elif not before and axis.fresh:
-                missing -= len(axis.tpdo_ids)
+                cob_id = message.arbitration_id
+                axis = tpdos.get(cob_id)
+                if axis is None or message.is_error_frame:
+                    self.other(message)
+                    if self._port.timebase.now_ns() >= until_ns:
+                        break
+                    continue
+                before = axis.fresh
+                if not axis.feed(cob_id, message.data):
+                    garbled.add(cob_id)
+                    self._by_node[axis.node.node_id].bad_total += 1
+                elif axis.fresh and not before:
+                    missing -= len(axis.tpdo_ids)
+        except BusError as error:
+            self._failed(error)
+        if missing:
+            owed = {cob_id for axis in self.axes for cob_id in axis.missing_ids}
+            self._owed = owed - garbled
         return missing
-
-    def _stale(self, cob_id: int, soonest_ns: int) -> bool:
-        """Whether a frame owed by the last cycle came sooner than an answer to this SYNC can."""
-        if cob_id not in self._owed or self._port.timebase.now_ns() >= soonest_ns:
-            return False
-        self._owed.discard(cob_id)
-        self._early.add(cob_id)
-        self.late_frames += 1
-        return True
-
-    def _remember(self) -> None:
-        """Which frames of this cycle may still come.
-
-        A bus without the wire's timing answers sooner than a wire: a frame that was refused for
-        that is not refused again.
-        """
-        if self._complete:
-            self._owed.clear()
-        else:
-            missing = {cob for cob, axis in self._tpdos.items() if not axis.fresh}
-            self._owed = missing - self._early
-        self._early.clear()
 
     def _drain(self) -> None:
         """Before SYNC: what has come by now is late or a copy, and must not pass for new."""
         try:
-            while (message := self._port.receive(0)) is not None:
+            while (message := self._port.take()) is not None:
                 if message.arbitration_id in self._tpdos and not message.is_error_frame:
                     self.late_frames += 1
                     self._owed.discard(message.arbitration_id)

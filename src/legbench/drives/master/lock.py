@@ -10,6 +10,8 @@ from legbench.drives.errors import BusError
 
 FOLDERS = (Path("/run/lock"), Path("/tmp"))
 """Of lock files; not the one for temporary files, which everybody may choose."""
+BY_FILE = ("legbench_unix", "serial", "slcan")
+"""Interfaces whose channels are files, also where a name has no slash in it."""
 
 
 def _folder() -> Path:
@@ -18,7 +20,8 @@ def _folder() -> Path:
 
 @final
 class ChannelLock:
-    """Held from `acquire` to `release`, or to the end of the process, by whatever means.
+    """Held from the first `acquire` to the last `release`, or to the end of the process, by
+    whatever means.
 
     Args:
         name: of the channel, such as `socketcan-can0`; `of_channel` makes one.
@@ -30,6 +33,7 @@ class ChannelLock:
         self._name = name
         self._path = (folder or _folder()) / f"legbench-{safe}.lock"
         self._fd: int | None = None
+        self._depth = 0
 
     @classmethod
     def of_channel(
@@ -40,16 +44,21 @@ class ChannelLock:
         A path is followed to the device behind it, so that no second name gets past the lock.
         """
         where = channel or "default"
-        if "/" in where:
+        if "/" in where or (interface in BY_FILE and os.path.exists(where)):
             where = os.path.realpath(where)
         return cls(f"{interface or 'default'} {where}", folder)
 
     def acquire(self) -> None:
-        """Take the lock.
+        """Take the lock, once more if it is held here already.
 
         Raises:
             BusError: another process has it, or the lock file cannot be written.
         """
+        if self._fd is None:
+            self._fd = self._take()
+        self._depth += 1
+
+    def _take(self) -> int:
         try:
             fd = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
         except OSError as error:
@@ -61,14 +70,21 @@ class ChannelLock:
             os.close(fd)
             raise BusError(
                 f"{self._name} already has a master, process {holder}; two masters on one bus move "
-                "the leg twice: end that one first"
+                "the leg twice, and an adapter on a serial line serves one program: end that one "
+                "first"
             ) from None
         os.ftruncate(fd, 0)
         os.write(fd, f"{os.getpid()}\n".encode())
-        self._fd = fd
+        return fd
+
+    @property
+    def held(self) -> bool:
+        """Whether it is held here."""
+        return self._fd is not None
 
     def release(self) -> None:
-        """Let go; may be called twice."""
-        if self._fd is not None:
+        """Undo one `acquire`; without one nothing happens."""
+        self._depth = max(0, self._depth - 1)
+        if self._depth == 0 and self._fd is not None:
             os.close(self._fd)
             self._fd = None

@@ -6,7 +6,8 @@ from typing import final
 import can
 
 from legbench.drives.codec.frame import Frame
-from legbench.drives.errors import BusError
+from legbench.drives.errors import BusError, DriveError
+from legbench.drives.master.read_only import MaySend
 from legbench.drives.timebase import Timebase
 from legbench.errors import LegbenchError
 
@@ -22,30 +23,45 @@ class Port:
     Attributes:
         timebase: of the bus.
         bus: for those who need the driver itself.
+        listener: sees every frame, if there is one.
+        error_frames: heard so far.
+        may_send: asked before every frame, where not all may go out.
     """
 
     def __init__(
         self, bus: can.BusABC, timebase: Timebase, listener: Listener | None = None
     ) -> None:
         self.bus, self.timebase = bus, timebase
-        self._listener = listener
+        self.listener = listener
+        self.error_frames = 0
+        self.may_send: MaySend | None = None
 
     def send(self, cob_id: int, data: bytes = b"") -> None:
         """Send a frame.
 
         Raises:
             BusError: the driver did not take it.
+            DriveError: it may not be sent, in read-only.
         """
-        message = can.Message(
-            arbitration_id=cob_id, data=data, is_extended_id=False, check=False, is_rx=False
-        )
+        self.put(self.message(cob_id, data))
+
+    @staticmethod
+    def message(cob_id: int, data: bytes = b"") -> can.Message:
+        """A frame for `put`."""
+        return can.Message(arbitration_id=cob_id, data=data, is_extended_id=False, is_rx=False)
+
+    def put(self, message: can.Message) -> None:
+        """Send a message that is kept for many cycles; raises as `send` does."""
+        if self.may_send is not None and not self.may_send(message.arbitration_id, message.data):
+            text = f"{message.arbitration_id:03X}#{message.data.hex().upper()}"
+            raise DriveError(f"read-only: {text} is not sent")
         try:
             self.bus.send(message)
         except LegbenchError:
             raise
         except Exception as error:  # Drivers raise what they like, a ValueError for a bad line.
             raise BusError(f"{self.bus.channel_info}: cannot send: {error}; {HINT}") from error
-        if self._listener is not None:
+        if self.listener is not None:
             message.timestamp = 1e-9 * self.timebase.now_ns()
             self._tell(message)
 
@@ -61,33 +77,45 @@ class Port:
         """
         while True:
             left = 1e-9 * (until_ns - self.timebase.now_ns())
-            try:
-                message = self.bus.recv(left if left > 0.0 else 0.0)
-            except LegbenchError:
-                raise
-            except Exception as error:
-                raise BusError(
-                    f"{self.bus.channel_info}: cannot receive: {error}; {HINT}"
-                ) from error
-            if message is None:
+            message = self._receive(left if left > 0.0 else 0.0)
+            if message is None or self._for_us(message):
+                return message
+            if left <= 0.0:
                 return None
-            if self._listener is not None:
-                self._tell(message)
-            if message.is_extended_id or message.is_remote_frame:
-                if left <= 0.0:
-                    return None
-                continue
-            return message
+
+    def take(self) -> can.Message | None:
+        """The next frame that has come already, whatever lies before it; raises BusError."""
+        while True:
+            message = self._receive(0.0)
+            if message is None or self._for_us(message):
+                return message
+
+    def _receive(self, timeout: float) -> can.Message | None:
+        try:
+            message = self.bus.recv(timeout)
+        except LegbenchError:
+            raise
+        except Exception as error:
+            raise BusError(f"{self.bus.channel_info}: cannot receive: {error}; {HINT}") from error
+        if message is not None and self.listener is not None:
+            self._tell(message)
+        return message
+
+    def _for_us(self, message: can.Message) -> bool:
+        if message.is_error_frame:
+            self.error_frames += 1
+            return True
+        return not (message.is_extended_id or message.is_remote_frame)
 
     def _tell(self, message: can.Message) -> None:
         """A listener that fails hears nothing more: no stop may depend on it."""
-        listener = self._listener
+        listener = self.listener
         if listener is None:
             return
         try:
             listener(message)
         except Exception as error:
-            self._listener = None
+            self.listener = None
             raise BusError(f"{self.bus.channel_info}: a listener failed: {error}") from error
 
     @property

@@ -1,21 +1,26 @@
 """What one cycle showed."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from operator import attrgetter
+from typing import NamedTuple
 
 from legbench.drives.master.cycle import Cycle, Tick
 
+_MOTOR, _LINK = attrgetter("motor_pos"), attrgetter("link_pos")
+_STATUSWORD, _FRESH, _CELSIUS = map(attrgetter, ("statusword", "fresh", "celsius"))
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Sample:
-    """One cycle; one value a drive, in the order of the leg's joints."""
+
+class Sample(NamedTuple):
+    """One cycle; one value a drive, in the order of the leg's joints. A tuple, because one is made
+    a millisecond.
+    """
 
     time_ns: int
     """SYNC was sent, on the link's time base."""
     late_ns: int
     """After its place on the grid."""
     skipped: int
-    """Ticks that were missed just before."""
+    """Ticks without SYNC just before."""
     motor_pos: tuple[float, ...]
     """[rad]"""
     link_pos: tuple[float, ...]
@@ -36,17 +41,16 @@ def sample_of(
 ) -> Sample:
     """The state of a cycle after a tick; stiffness of the series springs [N m/rad]."""
     axes = cycle.axes
-    motor = tuple([axis.motor_pos for axis in axes])
-    links = tuple([axis.link_pos for axis in axes])
+    motor, links = tuple(map(_MOTOR, axes)), tuple(map(_LINK, axes))
     return Sample(
-        time_ns=tick.time_ns,
-        late_ns=tick.late_ns,
-        skipped=tick.skipped,
-        motor_pos=motor,
-        link_pos=links,
-        spring_torque=tuple([k * (a - b) for k, a, b in zip(stiffness, motor, links, strict=True)]),
-        applied_pos=applied_pos,
-        statusword=tuple([axis.statusword for axis in axes]),
-        fresh=tuple([axis.fresh for axis in axes]),
-        temperature=tuple([poll.celsius for poll in cycle.polls]),
+        tick.time_ns,
+        tick.late_ns,
+        tick.skipped,
+        motor,
+        links,
+        tuple([k * (a - b) for k, a, b in zip(stiffness, motor, links, strict=True)]),
+        applied_pos,
+        tuple(map(_STATUSWORD, axes)),
+        tuple(map(_FRESH, axes)),
+        tuple(map(_CELSIUS, cycle.polls)),
     )

@@ -9,7 +9,7 @@ from legbench.drives.codec.datatypes import DataType, Value, pack, unpack
 from legbench.drives.codec.frame import SDO_REPLY_BASE, SDO_REQUEST_BASE
 from legbench.drives.codec.sdo import Abort, abort_data
 from legbench.drives.codec.sdo_client import Download, Progress, Upload
-from legbench.drives.errors import CodecError, DriveError, SdoAbortError
+from legbench.drives.errors import CodecError, DriveError, NoAnswerError, SdoAbortError
 from legbench.drives.master.port import Port
 from legbench.drives.objects import name_of
 
@@ -41,7 +41,7 @@ class SdoPort:
 
         Raises:
             SdoAbortError: the drive refuses.
-            DriveError: it does not answer.
+            NoAnswerError: it does not answer.
             BusError: the bus does not work.
         """
         transfer = self._transfer(lambda: Upload(index, sub), index, sub)
@@ -87,7 +87,7 @@ class SdoPort:
             self._port.send(
                 SDO_REQUEST_BASE + self.node_id, abort_data(Abort.TIMED_OUT, index, sub)
             )
-        raise DriveError(
+        raise NoAnswerError(
             f"node {self.node_id} on {self._port.bus.channel_info} does not answer for "
             f"{name_of(index, sub)} within {self._timeout_ms} ms, {self._retries} times; look at "
             "its power, its node id, the wiring and the bitrate"

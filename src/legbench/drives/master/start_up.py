@@ -35,11 +35,14 @@ class StartUp:
     def __init__(self, port: Port, cycle: Cycle, config: BusConfig, *, read_only: bool) -> None:
         self._port, self._cycle, self._config = port, cycle, config
         self._read_only = read_only
+        self.listening = False
+        """Another master sends SYNC: nothing is sent at all."""
 
     def settle(self, tick: Callable[[], Tick]) -> Tick:
         """Start the nodes, wait for regular process data; raises DriveError or BusError."""
-        for node in self._config.nodes:
-            self._port.send_frame(nmt_frame(NmtCommand.START, node.node_id))
+        if not self.listening:
+            for node in self._config.nodes:
+                self._port.send_frame(nmt_frame(NmtCommand.START, node.node_id))
         self._cycle.begin()
         regular = 0
         for _ in range(SETTLE_PATIENCE):
@@ -57,6 +60,8 @@ class StartUp:
 
     def idle(self) -> None:
         """The rest of a cycle in which nothing is commanded."""
+        if self.listening:
+            return
         if self._read_only:
             self._cycle.send_rest()
             return

@@ -32,6 +32,7 @@ class StopLadder:
     def run(self) -> None:
         """Send quick stop to all drives now, then lead them to switch on disabled."""
         cycle = self._cycle
+        cycle.stopping = True
         for axis in cycle.axes:
             axis.machine.seek(Goal.QUICK_STOP)
         self._send()

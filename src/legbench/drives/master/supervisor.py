@@ -10,6 +10,7 @@ from legbench.drives.master.cycle import Cycle, Tick
 from legbench.drives.timebase import Timebase
 from legbench.errors import PlantFault
 
+FOLLOWS = int(StatusBit.FOLLOWS_COMMAND)
 MISSING_TEMPERATURES = 3
 """Requests in a row without an answer that end the run, where a temperature is limited."""
 
@@ -30,8 +31,10 @@ class Supervisor:
 
     def bus(self, tick: Tick) -> None:
         """The controller is on the bus, and the grid is kept; raises PlantFault."""
-        self.alone()
-        self._overruns = self._overruns + tick.skipped if tick.skipped else 0
+        if self._cycle.stranger is not None:
+            self.alone()
+        missed = tick.skipped - tick.silent
+        self._overruns = self._overruns + missed if missed else 0
         if self._cycle.bus_off:
             raise PlantFault(
                 "bus off", "the controller has left the bus; check wiring and termination"
@@ -97,7 +100,7 @@ class Supervisor:
                     f"drive '{axis.node.name}' (node {axis.node.node_id}) left operation enabled: "
                     f"{describe_statusword(axis.statusword)}",
                 )
-            ignored = ignored or not axis.statusword & StatusBit.FOLLOWS_COMMAND
+            ignored = ignored or not axis.statusword & FOLLOWS
         self._ignored = self._ignored + 1 if ignored else 0
         if self._ignored > self._limits.following_cycles:
             words = "; ".join(describe_statusword(axis.statusword) for axis in self._cycle.axes)

@@ -18,13 +18,14 @@ class NodeWatch:
         state: its NMT state, as last heard.
         emergency: the first one since `arm`.
         history: every emergency ever heard, the all-clear included.
-        missed: consecutive cycles without process data.
+        missed: cycles without process data since two in a row had theirs: every second answer is
+            no answer, and may be an old one.
         lost_total: all cycles without process data.
         bad_total: process data of a wrong length.
     """
 
     def __init__(self, bus: BusConfig, node: NodeConfig, now_ns: int) -> None:
-        self._node = node
+        self._node, self._who = node, f"drive '{node.name}' (node {node.node_id})"
         self._beat = HeartbeatWatch(1_000_000 * HEARTBEATS * bus.heartbeat_ms, now_ns)
         self.state: NmtState | None = None
         self.emergency: Emergency | None = None
@@ -33,6 +34,7 @@ class NodeWatch:
         self.lost_total = 0
         self.bad_total = 0
         self._rebooted = False
+        self._well = True
 
     def arm(self, now_ns: int) -> None:
         """From now on count: forget what was before."""
@@ -63,14 +65,17 @@ class NodeWatch:
     def cycle(self, *, complete: bool) -> None:
         """A cycle has passed, with its process data or without."""
         if complete:
-            self.missed = 0
+            if self._well:
+                self.missed = 0
+            self._well = True
         else:
+            self._well = False
             self.missed += 1
             self.lost_total += 1
 
     def trouble(self, now_ns: int, lost_frames: int) -> tuple[str, str] | None:
         """Cause and message of what is wrong, if anything is."""
-        who = f"drive '{self._node.name}' (node {self._node.node_id})"
+        who = self._who
         if self.emergency is not None:
             return "drive emergency", f"{who}: {self.emergency}"
         if self._rebooted:

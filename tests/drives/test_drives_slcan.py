@@ -1,0 +1,231 @@
+"""The drives behind an adapter on a serial line: protocol, adapter, terminal; no clock but ours."""
+
+import itertools
+import os
+import random
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+
+import can
+import pytest
+from can.interfaces import slcan
+from can.interfaces.slcan import slcanBus
+from can_rig import BUS, MS
+
+from legbench.drives.bus_file import load_bus
+from legbench.drives.codec.frame import Frame
+from legbench.drives.codec.slcan import bitrate_of_registers, format_frame, parse_frame
+from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.network import Network
+from legbench.drives.emulated.slcan import SlcanAdapter
+from legbench.drives.errors import BusError
+from legbench.drives.open_bus import Adapter, open_bus
+from legbench.drives.slcan_bus import SlcanBus
+from legbench.drives.slcan_server import FULL, SlcanServer
+
+ASK = can.Message(
+    arbitration_id=0x601, data=bytes.fromhex("4000100000000000"), is_extended_id=False
+)
+"""SDO: what is your device type?"""
+
+
+@pytest.fixture
+def network() -> Network:
+    network = emulate(load_bus(BUS))
+    network.advance(10 * MS)
+    return network
+
+
+def served(network: Network, link: Path | None = None, warned: list[str] | None = None):
+    clock = itertools.count(0, MS // 10)
+    told = [] if warned is None else warned
+    return SlcanServer(network, link, lambda: next(clock), told.append)
+
+
+@pytest.fixture
+def server(network: Network) -> Iterator[SlcanServer]:
+    with served(network) as it:
+        yield it
+
+
+def opened(server: SlcanServer, bitrate: int = 1_000_000) -> can.BusABC:
+    adapter = Adapter(interface="slcan", channel=server.path)
+    bus = open_bus(load_bus(BUS).at(bitrate), adapter)
+    for _ in range(10):
+        server.poll()
+    return bus
+
+
+def answered(server: SlcanServer, bus: can.BusABC, cob_id: int) -> can.Message | None:
+    for _ in range(200):
+        server.poll()
+        message = bus.recv(0.0)
+        if message is not None and message.arbitration_id == cob_id:
+            return message
+    return None
+
+
+@pytest.mark.parametrize(
+    ("frame", "line"),
+    [
+        (Frame(0x080), b"t0800\r"),
+        (Frame(0x181, bytes(range(8))), b"t18180001020304050607\r"),
+        (Frame(0x1ABCDEF0, b"\xff", extended=True), b"T1ABCDEF01FF\r"),
+        (Frame(0x123, remote=True), b"r1230\r"),
+        (Frame(0x1, remote=True, extended=True), b"R000000010\r"),
+    ],
+)
+def test_a_frame_survives_its_line(frame: Frame, line: bytes) -> None:
+    assert format_frame(frame) == line
+    assert parse_frame(line.decode().rstrip("\r")) == frame
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        *("", "t", "z", "V1013", "NLEGB", "q1230", "t18", "t1819", "t18x0", "t8000", "T200000000"),
+        *("t1812AA", "t1811AABB", "t181 1AA", "r1231AA"),
+    ],
+)
+def test_other_lines_are_no_frames(line: str) -> None:
+    assert parse_frame(line) is None
+
+
+def test_registers_of_an_adapter_say_its_bitrate() -> None:
+    found = [bitrate_of_registers(text) for text in ("0014", "001C", "031C", "x", "0014FF")]
+    assert found == [1_000_000, 500_000, 125_000, None, None]
+
+
+@pytest.mark.parametrize(
+    ("lines", "answers"),
+    [
+        ("O\r", "\a"),  # no bitrate yet
+        ("C\r", "\a"),
+        ("S8\rO\rO\rC\rC\r", "\r\r\a\r\a"),
+        ("S8\rO\rS6\r", "\r\r\a"),  # not while it is open
+        ("s0014\rO\r", "\r\r"),
+        ("Sx\rsxyz\rQ\rt0800\r", "\a\a\a\a"),
+        ("S8\rO\rt0800\rt18\rT00000080\r", "\r\r\r\a\a"),
+        ("S8\rL\rt0800\r", "\r\r\a"),  # listening only
+        ("\rV\rN\rZ0\rZ1\r", "\rV1013\rNLEGB\r\r\a"),
+        ("F\rS8\rO\rF\r", "\a\r\rF00\r"),
+        (40 * "x" + "\rV\r", "\a\aV1013\r"),
+    ],
+)
+def test_an_adapter_answers_as_its_manual_says(network: Network, lines: str, answers: str) -> None:
+    assert SlcanAdapter(network).feed(lines.encode()) == answers.encode()
+
+
+def test_an_adapter_at_another_bitrate_passes_nothing_and_shows_it(network: Network) -> None:
+    adapter = SlcanAdapter(network)
+    adapter.feed(b"S6\rO\r" + format_frame(Frame(0x601, bytes(ASK.data))))
+    network.advance(100 * MS)
+    assert adapter.take() == b""
+    assert adapter.feed(b"F\rt0800\r") == b"FA4\r\a"
+
+
+def test_python_can_reaches_the_drives(server: SlcanServer) -> None:
+    with opened(server) as bus:
+        assert isinstance(bus, SlcanBus)
+        bus.send(ASK)
+        message = answered(server, bus, 0x581)
+        assert message is not None
+        assert message.data[4:6] == b"\x92\x01"
+
+
+def test_the_one_of_python_can_itself_does_too(server: SlcanServer) -> None:
+    with slcanBus(server.path, bitrate=1_000_000, sleep_after_open=0) as bus:
+        for _ in range(10):
+            server.poll()
+        bus.send(ASK)
+        assert answered(server, bus, 0x581) is not None
+
+
+def test_a_frame_behind_an_acknowledgement_is_not_missed(server: SlcanServer) -> None:
+    with opened(server) as bus:
+        os.write(server._ours, b"\r\r\a\rt7011")
+        assert bus.recv(0.0) is None
+        os.write(server._ours, b"05\r\rt70210")
+        message = bus.recv(0.0)
+        assert message is not None
+        assert (message.arbitration_id, message.data) == (0x701, b"\x05")
+        bus.set_filters([{"can_id": 0x701, "can_mask": 0x7FF}])
+        os.write(server._ours, b"5\rt701104\r")
+        message = bus.recv(0.0)
+        assert message is not None
+        assert message.data == b"\x04"
+
+
+def test_a_wrong_bitrate_is_told_on_both_sides(network: Network) -> None:
+    warned: list[str] = []
+    with served(network, warned=warned) as server, opened(server, 500_000) as bus:
+        bus.send(ASK)
+        assert answered(server, bus, 0x581) is None
+    assert warned == [
+        "the adapter was set to 500000 bit/s, the bus runs at 1000000 bit/s: no frame passes"
+    ]
+
+
+def test_what_an_earlier_program_left_unread_is_forgotten(
+    network: Network, server: SlcanServer
+) -> None:
+    first, other = opened(server), network.attach(1 << 16)
+    for count in range(FULL // 50):
+        network.send(other, Frame(0x7EE, count.to_bytes(8, "little")))
+        server.poll()
+    assert server._unsent
+    with opened(server) as bus:
+        bus.send(ASK)
+        heard = []
+        for _ in range(100):
+            server.poll()
+            heard += iter(lambda: bus.recv(0.0), None)
+        ids = [message.arbitration_id for message in heard]
+        assert 0x581 in ids
+        assert ids.count(0x7EE) < 200  # what the kernel still held
+    first.shutdown()
+
+
+def test_a_link_names_the_terminal_and_goes_with_it(network: Network, tmp_path: Path) -> None:
+    link = tmp_path / "leg"
+    link.symlink_to("/dev/pts/none")
+    with served(network, link) as server:
+        assert os.readlink(link) == server.path
+        with pytest.raises(BusError, match=r"cannot serve a bus at .*leg: File exists"):
+            served(network, link)
+        assert link.exists()
+    assert not link.is_symlink()
+    server.close()
+
+
+def test_a_terminal_that_goes_is_a_bus_error(server: SlcanServer) -> None:
+    bus = opened(server)
+    server.close()
+    with pytest.raises(can.CanOperationError, match=r"/dev/pts/\d+: "):
+        bus.recv(0.0)
+    with suppress(can.CanOperationError):
+        bus.shutdown()
+
+
+def test_a_missing_package_names_the_extra(
+    server: SlcanServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(slcan, "serial", None)
+    with pytest.raises(BusError, match=r"pip install 'legbench\[slcan\]'"):
+        open_bus(load_bus(BUS), Adapter(interface="slcan", channel=server.path))
+
+
+def test_no_bytes_hurt_either_side(network: Network, server: SlcanServer) -> None:
+    chance = random.Random(7)
+    letters = b"SsOCLtTrRFVNZX0123456789ABCDEFabcxyz\r\r\r\r\a\x00\xff"
+    adapter = SlcanAdapter(network)
+    with opened(server) as bus:
+        for _ in range(3000):
+            chunk = bytes(chance.choices(letters, k=chance.randrange(1, 60)))
+            assert adapter.feed(chunk) is not None
+            network.advance(network.now_ns + MS // 10)
+            adapter.take()
+            os.write(server._ours, chunk)
+            while bus.recv(0.0) is not None:
+                continue
