@@ -16,7 +16,10 @@ from legbench.analytic.smooth import Accuracy
 from legbench.analytic.state import LegState, Regime, Transition
 from legbench.errors import ConfigError
 
-__all__ = ["SILENT", "Levels", "TaylorLeg", "Watched"]
+__all__ = ["MAP_TOLERANCE", "SILENT", "Levels", "TaylorLeg", "Watched"]
+
+MAP_TOLERANCE = 1e-10
+"""For maps of many hops: a hop then errs by some 1e-9 and costs two thirds."""
 
 
 @final

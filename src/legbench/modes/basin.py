@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from legbench.analytic import LegModel
-from legbench.analytic.taylor import TaylorLeg
+from legbench.analytic.taylor import MAP_TOLERANCE, TaylorLeg
 from legbench.control import JumpConfig
 from legbench.design import LegDesign
 from legbench.design.toml import design_to_mapping
@@ -97,6 +97,8 @@ class Question:
     up: Axis
     hops: int = 25
     """Until a start is said to wander."""
+    tolerance: float = MAP_TOLERANCE
+    """Of the integration; far below `near`, which decides [-]."""
     near: float = 0.05
     """Distance from the periodic hop that counts as returned, in units of `hop.UNITS` [-]."""
 
@@ -115,7 +117,7 @@ class Question:
         """The compiled leg and its drive."""
         model = LegModel.of(self.design, undamped=self.undamped)
         drive = JumpLaw(self.jump, self.design) if self.jump else Passive(self.motor)
-        return TaylorLeg(model, probe=drive.probe), drive
+        return TaylorLeg(model, probe=drive.probe, tolerance=self.tolerance), drive
 
 
 def fate_of(leg: TaylorLeg, drive: AbstractDrive, question: Question, start: Apex) -> Fate:
