@@ -147,6 +147,14 @@ def test_a_probe_stops_where_it_is_told(fast: TaylorLeg) -> None:
     assert end.time == risen.time + 1e-3
 
 
+def test_a_go_ends_at_its_time_to_the_last_bit(fast: TaylorLeg) -> None:
+    random = np.random.default_rng(34)
+    for _ in range(200):
+        began, until = random.uniform(0.0, 0.1), random.uniform(0.1, 0.2)
+        start = standing(EXACT, (-0.6, 0.6), time=began, pinned=True)
+        assert fast.watch(start, until, MOTOR, Levels())[0].time == until
+
+
 def test_a_runaway_is_a_fault(fast: TaylorLeg) -> None:
     start = standing(EXACT, (-0.6, 0.6), (1e200, -1e200), pinned=True)
     with pytest.raises(PlantFault, match="integration failed at t ="):

@@ -119,6 +119,5 @@ class TaylorLeg:
         leg = self._leg(state.regime)
         leg.load(state)
         leg.set(motor, SILENT)
-        for _ in range(count):
-            leg.integrator.step(step)
+        leg.march(step, count)
         return leg.read(state)
