@@ -20,11 +20,13 @@ from legbench.errors import ConfigError
 from legbench.modes.basin import Axis, Fate, Question, map_basin
 from legbench.modes.drive import JumpLaw, Passive
 from legbench.modes.hop import Apex, FixedPoint, fixed_point, settle
-from legbench.modes.passive import free_hops
+from legbench.modes.passive import FreeHop, depths, free_hop
 from legbench.modes.scene import make_scene
 from legbench.modes.slip import Slip, leg_groups, slip_groups
 from legbench.signals import Ints
 
+MATCHED = 1e-9
+"""Polar set point of the motors that is rounding [rad]."""
 DROPS = (0.02, 0.05, 0.1)
 """From which leg and template are compared [m]."""
 
@@ -123,38 +125,59 @@ def _passive(flags: HopArguments, design: LegDesign) -> dict[str, Any]:
     from legbench.design.setup import SetupKind
 
     scene = make_scene(design, SetupKind.JUMP, flags.rest)
-    model, half = LegModel.of(design, undamped=True), 0.5 * (scene.motor[1] - scene.motor[0])
-    if abs(scene.motor[0] + scene.motor[1]) > 1e-12:
-        note("the motors are set symmetrically; this leg is not quite matched")
-    drive = Passive((-half, half))
-    leg = TaylorLeg(model, probe=drive.probe)
-    depth = np.linspace(scene.rest[1], 0.5 * design.limits.knee[1], 150)
-    points: list[FixedPoint] = []
-    for apex in free_hops(leg, drive, depth):
-        try:
-            points.append(fixed_point(leg, drive, apex))
-        except ConfigError as error:
-            note(f"not a hop of this leg: {error}")
-    slip = Slip.of(model, half)
+    half = 0.5 * (scene.motor[1] - scene.motor[0])
+    leg = TaylorLeg(LegModel.of(design, undamped=True), probe=Passive.probe)
+    hops = []
+    for depth in depths(leg, half, np.linspace(scene.rest[1], 0.5 * design.limits.knee[1], 150)):
+        found = free_hop(leg, half, depth)
+        if found is None:
+            note(
+                f"no hop without impact near a stance folded to {depth:.3f} rad: a joint meets "
+                "its stop on the way, or the leg is too far from matched"
+            )
+        else:
+            hops.append(found)
+    slip = Slip.of(leg.model, half)
     compared = [
         {"drop": drop, "leg": asdict(leg_groups(leg, slip, half, drop))}
         | {"slip": asdict(slip_groups(slip, drop))}
         for drop in DROPS
     ]
     if not flags.json:
-        print(f"{design.name}, motors held at half angle {half:.4f} rad, undamped")
-        print(f"\n{len(points)} hops without impact on x1 = 0")
-        for point in points:
-            _print_point(point)
+        print(f"{design.name}, motors held around half angle {half:.4f} rad, undamped")
+        _print_free(hops)
         _print_slip(slip, compared)
     return {
         "design": design.name,
         "drive": "passive",
         "support": str(Support.FOOT),
         "motor_half": half,
-        "fixed_points": [_point(point) for point in points],
+        "fixed_points": [_free(found) for found in hops],
         "slip": asdict(slip) | {"firmness": slip.firmness},
         "compared": compared,
+    }
+
+
+def _print_free(hops: list[FreeHop]) -> None:
+    print(f"\nhops without impact: {len(hops)}")
+    if any(abs(found.motor_z1) > MATCHED for found in hops):
+        print(
+            "This leg is not quite matched: x1 = 0 does not stay, and a hop without impact needs\n"
+            "the motors at a polar set point z1 of its own; at z1 = 0 there is none."
+        )
+    for found in hops:
+        _print_point(found.point, "indication only, the map is not smooth here")
+        print(
+            f"  motors at z1 {found.motor_z1:+.6f} rad; at z1 = 0 the hop from there loses "
+            f"{1e3 * found.symmetric_loss:.3g} mJ"
+        )
+
+
+def _free(found: FreeHop) -> dict[str, Any]:
+    return _point(found.point) | {
+        "motor": list(found.motor),
+        "motor_z1": found.motor_z1,
+        "symmetric_loss": found.symmetric_loss,
     }
 
 
@@ -170,7 +193,7 @@ def _print_slip(slip: Slip, compared: list[dict[str, Any]]) -> None:
             print(f"{who:<12}" + " ".join(f"{entry[who][name]:13.4f}" for name in names))
 
 
-def _print_point(point: FixedPoint) -> None:
+def _print_point(point: FixedPoint, verdict: str = "") -> None:
     apex, done = point.apex, point.hop
     flight = done.duration - (done.liftoff - done.touchdown)
     sizes = ", ".join(f"{abs(value):.4g}" for value in point.multipliers)
@@ -181,7 +204,7 @@ def _print_point(point: FixedPoint) -> None:
     print(
         f"  period {done.duration:.5f} s, flight {flight:.5f} s, impact {1e3 * done.impact:.3g} mJ"
     )
-    print(f"  multipliers {sizes}: {'stable' if point.stable else 'not stable'}")
+    print(f"  multipliers {sizes}: {verdict or ('stable' if point.stable else 'not stable')}")
 
 
 def _point(point: FixedPoint) -> dict[str, Any]:
