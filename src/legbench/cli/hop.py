@@ -19,12 +19,19 @@ from legbench.design.statics import Support
 from legbench.errors import ConfigError
 from legbench.modes.basin import Axis, Fate, Question, map_basin
 from legbench.modes.drive import JumpLaw, Passive
-from legbench.modes.hop import Apex, FixedPoint, fixed_point, settle
+from legbench.modes.hop import Apex, Ending, FixedPoint, fixed_point, return_map, settle
 from legbench.modes.passive import FreeHop, depths, free_hop
 from legbench.modes.scene import make_scene
 from legbench.modes.slip import Slip, leg_groups, slip_groups
 from legbench.signals import Ints
 
+WHY = {
+    Ending.STANDS: "it stays on the ground; take a larger --dz2, or a --height that is nearer",
+    Ending.FELL: "it falls over; take a smaller --dz2, or a --height that is nearer",
+    Ending.FAULT: "the controller has lost step, it takes vibration in flight for the ground; take "
+    "a longer --release-time",
+}
+"""What to say of a leg that does not come to its next apex."""
 MATCHED = 1e-9
 """Polar set point of the motors that is rounding [rad]."""
 DROPS = (0.02, 0.05, 0.1)
@@ -67,12 +74,7 @@ class HopArguments:
 def main(arguments: list[str]) -> int:
     """Run the command."""
     flags = parse(HopArguments, "hop", arguments)
-    if flags.basin < 0:
-        raise ConfigError(f"basin is {flags.basin} points a side; it must be 0 (none) or more")
-    if flags.basin and flags.out is None:
-        raise ConfigError("a basin map needs --out, the folder that it is written to")
-    if flags.hops < 1:
-        raise ConfigError(f"hops is {flags.hops}; it must be 1 or more")
+    _check(flags)
     design = load_design(flags.design)
     content = _passive(flags, design) if flags.passive else _driven(flags, design)
     if flags.json:
@@ -80,6 +82,29 @@ def main(arguments: list[str]) -> int:
     if flags.out is not None:
         _save(flags.out, content)
     return 0
+
+
+def _check(flags: HopArguments) -> None:
+    """Refuse what would only be found after the leg has hopped."""
+    if flags.hops < 1:
+        raise ConfigError(f"hops is {flags.hops}; it must be 1 or more")
+    if flags.height is not None and not 0.0 < flags.height < math.inf:
+        raise ConfigError(f"height is {flags.height:g} m; an apex lies above the ground")
+    if flags.basin == 0:
+        return
+    if flags.basin < 2:
+        raise ConfigError(f"basin is {flags.basin} points a side; it must be 0 (none), 2 or more")
+    if flags.out is None:
+        raise ConfigError("a basin map needs --out, the folder that it is written to")
+    if flags.passive:
+        raise ConfigError(
+            "a passive leg gains no energy, so no hop draws others from all sides and there is no "
+            "basin to map; leave --basin or --passive away"
+        )
+    if flags.workers < 1:
+        raise ConfigError(f"workers is {flags.workers}; a map needs 1 process or more")
+    for name, span in ((flags.across, flags.across_span), (flags.up, flags.up_span)):
+        Axis(name=name, low=-span, high=span, count=flags.basin)
 
 
 def _driven(flags: HopArguments, design: LegDesign) -> dict[str, Any]:
@@ -92,9 +117,10 @@ def _driven(flags: HopArguments, design: LegDesign) -> dict[str, Any]:
     start = Apex(height=height, speed=0.0, z1=0.0, z2=z2, dz1=0.0, dz2=0.0)
     apexes = settle(leg, law, start, flags.hops)
     if len(apexes) <= flags.hops:
+        ending = return_map(leg, law, apexes[-1]).ending
         raise ConfigError(
             f"the leg stops hopping after {len(apexes) - 1} of {flags.hops} hops from an apex of "
-            f"{height:.4g} m; change --dz2 or --height"
+            f"{height:.4g} m: {WHY[ending]}"
         )
     point = fixed_point(leg, law, apexes[-1])
     content: dict[str, Any] = {
@@ -113,7 +139,12 @@ def _driven(flags: HopArguments, design: LegDesign) -> dict[str, Any]:
         _print_point(point)
     if flags.out is not None:
         _plot_return(flags.out, design, apexes, point)
-    if flags.basin and flags.out is not None:
+    if flags.basin and not point.stable:
+        note(
+            f"no basin: the periodic hop is not stable, its largest multiplier is "
+            f"{abs(point.multipliers[0]):.4g}; no start stays there"
+        )
+    elif flags.basin and flags.out is not None:
         fates = _basin(flags, design, point, flags.out)
         content["basin"] = _share(fates)
         if not flags.json:

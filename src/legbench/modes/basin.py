@@ -6,6 +6,7 @@ it stopped; the file begins with what was asked, and a different question is ref
 
 import json
 import multiprocessing
+import signal
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
@@ -144,6 +145,13 @@ def _start_worker(question: Question) -> None:
     _worker = (question, *question.tools())
 
 
+def _start_process(question: Question) -> None:
+    # ^C goes to the whole group; a worker that dies of it takes the queue's lock along, and the
+    # one who tidies up waits for ever.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _start_worker(question)
+
+
 def _row(index: int) -> tuple[int, list[int]]:
     if _worker is None:
         raise RuntimeError("the worker was not started")
@@ -183,8 +191,10 @@ def map_basin(
     """Fates (up, across) of the whole grid; written to `path` row by row.
 
     Raises:
-        ConfigError: `path` holds the rows of another question, or cannot be written.
+        ConfigError: `path` holds the rows of another question, or cannot be written; no worker.
     """
+    if workers < 1:
+        raise ConfigError(f"workers is {workers}; a map needs 1 process or more")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         rows = _read(path, question) if path.exists() else {}
@@ -224,7 +234,7 @@ def _pool(question: Question, workers: int) -> Iterator[ProcessPoolExecutor]:
     """Fresh processes: a compiled leg does not survive a fork."""
     context: Any = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(
-        workers, mp_context=context, initializer=_start_worker, initargs=(question,)
+        workers, mp_context=context, initializer=_start_process, initargs=(question,)
     )
     try:
         yield pool
