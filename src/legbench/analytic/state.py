@@ -1,7 +1,6 @@
 """Where a leg is, what it touches, and what happened on the way."""
 
 import math
-from dataclasses import dataclass
 from enum import StrEnum
 from typing import NamedTuple
 
@@ -49,8 +48,7 @@ class LegState(NamedTuple):
     """When the regime began; a start has always been in it [s]."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Transition:
+class Transition(NamedTuple):
     """A touchdown or a lift-off."""
 
     time: float

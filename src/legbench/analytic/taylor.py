@@ -18,8 +18,8 @@ from legbench.errors import ConfigError
 
 __all__ = ["MAP_TOLERANCE", "SILENT", "Levels", "TaylorLeg", "Watched"]
 
-MAP_TOLERANCE = 1e-10
-"""For maps of many hops: a hop then errs by some 1e-9 and costs two thirds."""
+MAP_TOLERANCE = 1e-9
+"""For maps of many hops: a hop then errs by some 1e-8 and costs two thirds."""
 
 
 @final
