@@ -2,8 +2,10 @@
 
 The same undamped leg and the same start in the air, through touchdown and lift-off to about the
 next apex. RK45 runs twice: as `solve_ivp` is usually fed, with matrices and a linear solve, and
-on this package's scalar equations, which are already several times faster. The yardstick is
-DOP853 at 1e-12. Compiling is done before the clock starts.
+on this package's scalar equations, which are already several times faster; the bound is on the
+first, the second is printed beside it. The yardstick is DOP853 at 1e-12. Compiling is done before
+the clock starts. The fast path runs at both of its tolerances, for reference and for maps. Rounds
+go through all paths in turn, so that a machine that slows down slows them all.
 """
 
 import time
@@ -18,7 +20,7 @@ from legbench.analytic import Accuracy, HybridLeg, LegModel, LegState, Method, f
 from legbench.analytic import matrices as mx
 from legbench.analytic.hybrid import switch
 from legbench.analytic.state import Regime
-from legbench.analytic.taylor import TaylorLeg
+from legbench.analytic.taylor import MAP_TOLERANCE, TaylorLeg
 from legbench.design import load_design
 from legbench.design.statics import Support, motor_holding
 from legbench.signals import Floats
@@ -26,18 +28,20 @@ from legbench.signals import Floats
 DESIGN = Path(__file__).parents[1] / "models" / "optimal.toml"
 SECONDS = 0.58
 BOUND = 50.0
+MAPS = f"fast, {MAP_TOLERANCE:g}"
 Motor = tuple[float, float]
 
 
-def best(function: Callable[[], Any], repeats: int, rounds: int = 5) -> float:
-    """Least mean wall time of a call over a few rounds [s]."""
-    times = []
+def best(paths: dict[str, tuple[Callable[[], Any], int]], rounds: int = 7) -> dict[str, float]:
+    """Least mean wall time of a call of each over a few rounds [s]."""
+    taken = dict.fromkeys(paths, float("inf"))
     for _ in range(rounds):
-        began = time.perf_counter()
-        for _ in range(repeats):
-            function()
-        times.append((time.perf_counter() - began) / repeats)
-    return min(times)
+        for name, (function, repeats) in paths.items():
+            began = time.perf_counter()
+            for _ in range(repeats):
+                function()
+            taken[name] = min(taken[name], (time.perf_counter() - began) / repeats)
+    return taken
 
 
 def matrix_hop(model: LegModel, start: LegState, motor: Motor) -> LegState:
@@ -122,23 +126,30 @@ def main() -> int:
     fast()
     compiled = time.perf_counter() - began
     scalar = Accuracy(method=Method.RK45, rtol=1e-6, atol=1e-6, max_step=1.0)
-    paths = {
+    slow = {
         "RK45, matrices": (lambda: matrix_hop(model, start, motor), 5),
         "RK45, scalars": (hops(HybridLeg(model, scalar)), 20),
+    }
+    paths = slow | {
         "DOP853, 1e-9": (hops(HybridLeg(model)), 10),
-        "fast": (fast, 500),
+        "fast, 1e-15": (fast, 300),
+        MAPS: (hops(TaylorLeg(model, tolerance=MAP_TOLERANCE)), 300),
     }
     print(f"one hop, {SECONDS} s, {len(events)} events; compiling takes {compiled:.2f} s")
-    print(f"{'path':<16}{'ms a hop':>10}{'error':>12}{'as fast':>10}")
-    taken, wrong = {}, {}
-    for name, (function, repeats) in paths.items():
-        end = function()
-        wrong[name] = float(np.max(np.abs(np.subtract(end.q + end.v, exact.q + exact.v))))
-        taken[name] = best(function, repeats)
-        ratio = taken["RK45, matrices"] / taken[name]
-        print(f"{name:<16}{1e3 * taken[name]:10.3f}{wrong[name]:12.1e}{ratio:10.1f}")
-    ratio = taken["RK45, matrices"] / taken["fast"]
-    good = ratio >= BOUND and wrong["fast"] < wrong["RK45, matrices"]
+    print(f"{'path':<16}{'ms a hop':>10}{'error':>12}{'/ matrices':>12}{'/ scalars':>12}")
+    ends = {name: function() for name, (function, _) in paths.items()}
+    wrong = {
+        name: float(np.max(np.abs(np.subtract(end.q + end.v, exact.q + exact.v))))
+        for name, end in ends.items()
+    }
+    taken = best(paths)
+    for name, seconds in taken.items():
+        ratios = [taken[other] / seconds for other in slow]
+        print(
+            f"{name:<16}{1e3 * seconds:10.3f}{wrong[name]:12.1e}{ratios[0]:12.1f}{ratios[1]:12.1f}"
+        )
+    ratio = taken["RK45, matrices"] / taken[MAPS]
+    good = ratio >= BOUND and wrong[MAPS] < min(wrong[other] for other in slow)
     print("ok" if good else f"below the bound of {BOUND:g} times at a smaller error")
     return 0 if good else 1
 

@@ -22,7 +22,7 @@ from legbench.errors import ConfigError, PlantFault
 
 pytest.importorskip("heyoka")
 
-from legbench.analytic.taylor import Levels, TaylorLeg, Watched
+from legbench.analytic.taylor import MAP_TOLERANCE, Levels, TaylorLeg, Watched
 
 EXACT = LegModel.of(exact_design(), stops=False)
 PROTOTYPE = LegModel.of(load_design(Path(__file__).parents[2] / "models" / "prototype.toml"))
@@ -147,6 +147,14 @@ def test_a_probe_stops_where_it_is_told(fast: TaylorLeg) -> None:
     assert end.time == risen.time + 1e-3
 
 
+def test_a_go_ends_at_its_time_to_the_last_bit(fast: TaylorLeg) -> None:
+    random = np.random.default_rng(34)
+    for _ in range(200):
+        began, until = random.uniform(0.0, 0.1), random.uniform(0.1, 0.2)
+        start = standing(EXACT, (-0.6, 0.6), time=began, pinned=True)
+        assert fast.watch(start, until, MOTOR, Levels())[0].time == until
+
+
 def test_a_runaway_is_a_fault(fast: TaylorLeg) -> None:
     start = standing(EXACT, (-0.6, 0.6), (1e200, -1e200), pinned=True)
     with pytest.raises(PlantFault, match="integration failed at t ="):
@@ -156,3 +164,14 @@ def test_a_runaway_is_a_fault(fast: TaylorLeg) -> None:
 def test_a_tolerance_of_zero_is_refused() -> None:
     with pytest.raises(ConfigError, match="tolerance is 0; it must be positive"):
         TaylorLeg(EXACT, tolerance=0.0)
+
+
+def test_the_tolerance_for_maps_costs_a_hop_no_more_than_it_says(fast: TaylorLeg) -> None:
+    loose = TaylorLeg(EXACT, tolerance=MAP_TOLERANCE)
+    assert loose.order(Regime.FLIGHT) < fast.order(Regime.FLIGHT)
+    random, worst = np.random.default_rng(33), 0.0
+    for _ in range(100):
+        start = random_start(EXACT, random)
+        one, other = (leg.advance(start, 0.3, MOTOR)[0] for leg in (fast, loose))
+        worst = max(worst, float(np.max(np.abs(np.subtract(one.q + one.v, other.q + other.v)))))
+    assert 0.0 < worst < 1e-7

@@ -1,7 +1,6 @@
 """Derivatives on the fast path against complex steps, differences and closed forms."""
 
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -42,7 +41,7 @@ def numbers(state: LegState) -> list[float]:
 def moved(state: LegState, values: list[float]) -> LegState:
     """The state with other angles, rates, trunk positions and velocities, in this order."""
     q1, q2, v1, v2, x, z, vx, vz = values
-    return replace(state, q=(q1, q2), v=(v1, v2), trunk_pos=(x, z), trunk_vel=(vx, vz))
+    return state._replace(q=(q1, q2), v=(v1, v2), trunk_pos=(x, z), trunk_vel=(vx, vz))
 
 
 def formula(x: complex, y: complex, ops: equations.Ops) -> complex:
@@ -90,7 +89,7 @@ def test_variational_equations_are_complex_steps_through_the_flow(
         wanted.append(path.y[:, -1].imag / TINY)
     q1, q2, v1, v2 = seeds(start)
     state = standing(EXACT, (-0.9, 0.8), (0.3, -0.2), pinned=True)
-    state = replace(state, regime=regime, q=(q1, q2), v=(v1, v2))
+    state = state._replace(regime=regime, q=(q1, q2), v=(v1, v2))
     end, what = fast.varied.watch(state, 0.4, MOTOR, SILENT)
     assert what is None
     got = [gradient(value) for value in (*end.q, *end.v)]
@@ -145,7 +144,7 @@ def test_touchdown_of_a_stone_moves_as_its_formula_says(fast: TaylorLeg) -> None
     drop, speed = 0.08, -0.5
     z, vz = seeds(np.array([drop - EXACT.foot_from_hip(q)[1], speed]))
     start = flying(EXACT, q, (0.0, 0.0), (0.0, float(z)), (0.2, speed))
-    start = replace(start, trunk_pos=(0.0, z), trunk_vel=(0.2, vz))
+    start = start._replace(trunk_pos=(0.0, z), trunk_vel=(0.2, vz))
     end, what = fast.varied.watch(start, 1.0, q, SILENT)
     assert what is Watched.CONTACT
     g = EXACT.floating.gravity

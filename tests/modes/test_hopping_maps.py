@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from exact_leg import exact_design  # pyright: ignore[reportMissingImports]
 from scipy.integrate import solve_ivp
+from scipy.optimize import least_squares
 
 from legbench.analytic import LegModel
 from legbench.control import Jump, JumpConfig, LegTargets
@@ -36,13 +37,15 @@ from legbench.modes.hop import (
     return_map,
     settle,
 )
-from legbench.modes.passive import free_hops
+from legbench.modes.passive import FreeHop, depths, free_hop, rebound
 from legbench.modes.slip import Slip, slip_groups
 
 PROTOTYPE = load_design(Path(__file__).parents[2] / "models" / "prototype.toml")
 JUMP = JumpConfig()
 START = Apex(height=0.27, speed=0.0, z1=0.0, z2=0.6, dz1=0.0, dz2=0.0)
 HELD = Passive((-0.456, 0.456))
+OPTIMAL = load_design(Path(__file__).parents[2] / "models" / "optimal.toml")
+DEEP = np.linspace(0.9 * math.sqrt(0.5), 1.45, 150)
 
 
 @pytest.fixture(scope="module")
@@ -63,6 +66,11 @@ def point(leg: TaylorLeg, law: JumpLaw) -> FixedPoint:
 @pytest.fixture(scope="module")
 def exact() -> TaylorLeg:
     return TaylorLeg(LegModel.of(exact_design()), probe=HELD.probe)
+
+
+@pytest.fixture(scope="module")
+def rounded() -> TaylorLeg:
+    return TaylorLeg(LegModel.of(OPTIMAL, undamped=True), probe=HELD.probe)
 
 
 def test_an_apex_is_what_its_state_says(leg: TaylorLeg) -> None:
@@ -127,16 +135,58 @@ def test_the_sampled_controller_hops_as_its_continuous_limit(point: FixedPoint) 
     assert np.max(np.abs(periods / point.hop.duration - 1.0)) < 0.02
 
 
+def is_free(leg: TaylorLeg, found: FreeHop) -> bool:
+    apex = found.point.apex
+    done = return_map(leg, Passive(found.motor), apex)
+    assert done.after is not None
+    back = np.max(np.abs(done.after.vector() - apex.vector()))
+    mirrored = abs(done.touchdown - (done.duration - done.liftoff)) < 1e-4
+    return bool(mirrored and back < 1e-9 and done.impact < 1e-12)
+
+
 def test_hops_without_impact_exist_and_lose_nothing(exact: TaylorLeg) -> None:
-    found = free_hops(exact, HELD, np.linspace(0.75, 1.4, 60))
+    half = HELD.motor[1]
+    found = depths(exact, half, np.linspace(0.75, 1.4, 60))
     assert len(found) >= 1
-    for apex in found[:1]:
-        done = return_map(exact, HELD, apex)
-        assert done.after is not None
-        assert abs(done.after.height - apex.height) < 1e-9
-        assert done.impact < 1e-12
-        assert abs(done.touchdown - (done.duration - done.liftoff)) < 1e-4
-        assert np.max(np.abs(done.after.vector()[[1, 2, 4]])) < 1e-9
+    first = free_hop(exact, half, found[0])
+    assert first is not None
+    assert is_free(exact, first)
+    assert np.max(np.abs(first.point.apex.vector()[[1, 2, 4, 5]])) < 1e-9
+    assert abs(first.motor_z1) < 1e-9
+    assert first.symmetric_loss < 1e-12
+
+
+def test_the_rounded_leg_hops_without_impact_at_a_polar_set_point(rounded: TaylorLeg) -> None:
+    half = 0.4113
+    found = [free_hop(rounded, half, depth) for depth in depths(rounded, half, DEEP)]
+    assert len(found) == 3
+    for one in found:
+        assert one is not None
+        assert is_free(rounded, one)
+        assert 1e-3 < abs(one.motor_z1) < 0.05
+        assert one.symmetric_loss > 1e-6
+
+
+@pytest.mark.parametrize(("name", "least", "most"), [("exact", 0.0, 1e-9), ("rounded", 1e-3, 1.0)])
+def test_motors_at_z1_zero_leave_one_condition_too_many(
+    name: str, least: float, most: float, request: pytest.FixtureRequest
+) -> None:
+    leg, half = request.getfixturevalue(name), 0.4113
+
+    def moving(posture: np.ndarray) -> list[float]:
+        folded, lean = posture.tolist()
+        apex = rebound(leg, (-half, half), (lean - folded, lean + folded))
+        return [1.0] * 3 if apex is None else [apex.dz1, apex.dz2, 10.0 * apex.speed]
+
+    depth = depths(leg, half, DEEP)[1]
+    best = least_squares(moving, [depth, 0.0], xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    assert least <= float(np.max(np.abs(best.fun))) <= most
+
+
+def test_a_free_hop_that_would_meet_a_stop_is_none() -> None:
+    undamped = TaylorLeg(LegModel.of(PROTOTYPE, undamped=True), probe=HELD.probe)
+    found = [free_hop(undamped, 0.3297, depth) for depth in depths(undamped, 0.3297, DEEP)]
+    assert [one is not None for one in found] == [True, False]
 
 
 def test_passive_hops_never_gain_and_lose_what_the_impact_takes(exact: TaylorLeg) -> None:

@@ -11,7 +11,7 @@ without search; so has a force that pulls because the motors were told to jump.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import final
 
 import numpy as np
@@ -113,17 +113,9 @@ def overdue(model: LegModel, state: LegState, motor: Pair) -> bool:
 
 def switch(model: LegModel, state: LegState) -> LegState:
     """The leg on the other side of its event."""
-    if state.regime is not Regime.STANCE:
-        return land(model, state)
-    return LegState(
-        time=state.time,
-        regime=Regime.FLIGHT,
-        q=state.q,
-        v=state.v,
-        trunk_pos=state.trunk_pos,
-        trunk_vel=state.trunk_vel,
-        since=state.time,
-    )
+    if state.regime is Regime.STANCE:
+        return state._replace(regime=Regime.FLIGHT, since=state.time)
+    return land(model, state)
 
 
 def land(model: LegModel, state: LegState) -> LegState:
@@ -133,12 +125,9 @@ def land(model: LegModel, state: LegState) -> LegState:
     foot_vel = state.trunk_vel[0] + relative[0], state.trunk_vel[1] + relative[1]
     after = touchdown_rates(model.ops, model.stance, model.floating, q, v, foot_vel)
     relative = model.foot_vel_from_hip(q, after)
-    return LegState(
-        time=state.time,
+    return state._replace(
         regime=Regime.STANCE,
-        q=q,
         v=after,
-        trunk_pos=state.trunk_pos,
         trunk_vel=(-relative[0], -relative[1]),
         since=state.time,
     )
@@ -152,8 +141,8 @@ def _flight(model: LegModel, state: LegState, motor: Pair) -> _Leg:
 
     def unpack(time: float, y: list[float]) -> LegState:
         x, z, q1, q2, vx, vz, v1, v2 = y
-        return replace(
-            state, time=time, q=(q1, q2), v=(v1, v2), trunk_pos=(x, z), trunk_vel=(vx, vz)
+        return state._replace(
+            time=time, q=(q1, q2), v=(v1, v2), trunk_pos=(x, z), trunk_vel=(vx, vz)
         )
 
     def height(y: list[float]) -> float:
@@ -182,8 +171,7 @@ def _stance(model: LegModel, state: LegState, motor: Pair) -> _Leg:
     def unpack(time: float, y: list[float]) -> LegState:
         q, v = (y[0], y[1]), (y[2], y[3])
         tip, tip_vel = model.foot_from_hip(q), model.foot_vel_from_hip(q, v)
-        return replace(
-            state,
+        return state._replace(
             time=time,
             q=q,
             v=v,
@@ -215,7 +203,7 @@ def _hanging(model: LegModel, state: LegState, motor: Pair) -> _Leg:
         return [v1, v2, *model.hanging_acceleration(motor, (q1, q2), (v1, v2))]
 
     def unpack(time: float, y: list[float]) -> LegState:
-        return replace(state, time=time, q=(y[0], y[1]), v=(y[2], y[3]))
+        return state._replace(time=time, q=(y[0], y[1]), v=(y[2], y[3]))
 
     pack = [*state.q, *state.v]
     return _Leg(rates=rates, pack=pack, unpack=unpack, event=None, near=lambda *_: False)

@@ -19,12 +19,21 @@ from legbench.design.statics import Support
 from legbench.errors import ConfigError
 from legbench.modes.basin import Axis, Fate, Question, map_basin
 from legbench.modes.drive import JumpLaw, Passive
-from legbench.modes.hop import Apex, FixedPoint, fixed_point, settle
-from legbench.modes.passive import free_hops
+from legbench.modes.hop import Apex, Ending, FixedPoint, fixed_point, return_map, settle
+from legbench.modes.passive import FreeHop, depths, free_hop
 from legbench.modes.scene import make_scene
 from legbench.modes.slip import Slip, leg_groups, slip_groups
 from legbench.signals import Ints
 
+WHY = {
+    Ending.STANDS: "it stays on the ground; take a larger --dz2, or a --height that is nearer",
+    Ending.FELL: "it falls over; take a smaller --dz2, or a --height that is nearer",
+    Ending.FAULT: "the controller has lost step, it takes vibration in flight for the ground; take "
+    "a longer --release-time",
+}
+"""What to say of a leg that does not come to its next apex."""
+MATCHED = 1e-9
+"""Polar set point of the motors that is rounding [rad]."""
 DROPS = (0.02, 0.05, 0.1)
 """From which leg and template are compared [m]."""
 
@@ -65,12 +74,7 @@ class HopArguments:
 def main(arguments: list[str]) -> int:
     """Run the command."""
     flags = parse(HopArguments, "hop", arguments)
-    if flags.basin < 0:
-        raise ConfigError(f"basin is {flags.basin} points a side; it must be 0 (none) or more")
-    if flags.basin and flags.out is None:
-        raise ConfigError("a basin map needs --out, the folder that it is written to")
-    if flags.hops < 1:
-        raise ConfigError(f"hops is {flags.hops}; it must be 1 or more")
+    _check(flags)
     design = load_design(flags.design)
     content = _passive(flags, design) if flags.passive else _driven(flags, design)
     if flags.json:
@@ -78,6 +82,29 @@ def main(arguments: list[str]) -> int:
     if flags.out is not None:
         _save(flags.out, content)
     return 0
+
+
+def _check(flags: HopArguments) -> None:
+    """Refuse what would only be found after the leg has hopped."""
+    if flags.hops < 1:
+        raise ConfigError(f"hops is {flags.hops}; it must be 1 or more")
+    if flags.height is not None and not 0.0 < flags.height < math.inf:
+        raise ConfigError(f"height is {flags.height:g} m; an apex lies above the ground")
+    if flags.basin == 0:
+        return
+    if flags.basin < 2:
+        raise ConfigError(f"basin is {flags.basin} points a side; it must be 0 (none), 2 or more")
+    if flags.out is None:
+        raise ConfigError("a basin map needs --out, the folder that it is written to")
+    if flags.passive:
+        raise ConfigError(
+            "a passive leg gains no energy, so no hop draws others from all sides and there is no "
+            "basin to map; leave --basin or --passive away"
+        )
+    if flags.workers < 1:
+        raise ConfigError(f"workers is {flags.workers}; a map needs 1 process or more")
+    for name, span in ((flags.across, flags.across_span), (flags.up, flags.up_span)):
+        Axis(name=name, low=-span, high=span, count=flags.basin)
 
 
 def _driven(flags: HopArguments, design: LegDesign) -> dict[str, Any]:
@@ -90,9 +117,10 @@ def _driven(flags: HopArguments, design: LegDesign) -> dict[str, Any]:
     start = Apex(height=height, speed=0.0, z1=0.0, z2=z2, dz1=0.0, dz2=0.0)
     apexes = settle(leg, law, start, flags.hops)
     if len(apexes) <= flags.hops:
+        ending = return_map(leg, law, apexes[-1]).ending
         raise ConfigError(
             f"the leg stops hopping after {len(apexes) - 1} of {flags.hops} hops from an apex of "
-            f"{height:.4g} m; change --dz2 or --height"
+            f"{height:.4g} m: {WHY[ending]}"
         )
     point = fixed_point(leg, law, apexes[-1])
     content: dict[str, Any] = {
@@ -111,7 +139,12 @@ def _driven(flags: HopArguments, design: LegDesign) -> dict[str, Any]:
         _print_point(point)
     if flags.out is not None:
         _plot_return(flags.out, design, apexes, point)
-    if flags.basin and flags.out is not None:
+    if flags.basin and not point.stable:
+        note(
+            f"no basin: the periodic hop is not stable, its largest multiplier is "
+            f"{abs(point.multipliers[0]):.4g}; no start stays there"
+        )
+    elif flags.basin and flags.out is not None:
         fates = _basin(flags, design, point, flags.out)
         content["basin"] = _share(fates)
         if not flags.json:
@@ -123,38 +156,59 @@ def _passive(flags: HopArguments, design: LegDesign) -> dict[str, Any]:
     from legbench.design.setup import SetupKind
 
     scene = make_scene(design, SetupKind.JUMP, flags.rest)
-    model, half = LegModel.of(design, undamped=True), 0.5 * (scene.motor[1] - scene.motor[0])
-    if abs(scene.motor[0] + scene.motor[1]) > 1e-12:
-        note("the motors are set symmetrically; this leg is not quite matched")
-    drive = Passive((-half, half))
-    leg = TaylorLeg(model, probe=drive.probe)
-    depth = np.linspace(scene.rest[1], 0.5 * design.limits.knee[1], 150)
-    points: list[FixedPoint] = []
-    for apex in free_hops(leg, drive, depth):
-        try:
-            points.append(fixed_point(leg, drive, apex))
-        except ConfigError as error:
-            note(f"not a hop of this leg: {error}")
-    slip = Slip.of(model, half)
+    half = 0.5 * (scene.motor[1] - scene.motor[0])
+    leg = TaylorLeg(LegModel.of(design, undamped=True), probe=Passive.probe)
+    hops = []
+    for depth in depths(leg, half, np.linspace(scene.rest[1], 0.5 * design.limits.knee[1], 150)):
+        found = free_hop(leg, half, depth)
+        if found is None:
+            note(
+                f"no hop without impact near a stance folded to {depth:.3f} rad: a joint meets "
+                "its stop on the way, or the leg is too far from matched"
+            )
+        else:
+            hops.append(found)
+    slip = Slip.of(leg.model, half)
     compared = [
         {"drop": drop, "leg": asdict(leg_groups(leg, slip, half, drop))}
         | {"slip": asdict(slip_groups(slip, drop))}
         for drop in DROPS
     ]
     if not flags.json:
-        print(f"{design.name}, motors held at half angle {half:.4f} rad, undamped")
-        print(f"\n{len(points)} hops without impact on x1 = 0")
-        for point in points:
-            _print_point(point)
+        print(f"{design.name}, motors held around half angle {half:.4f} rad, undamped")
+        _print_free(hops)
         _print_slip(slip, compared)
     return {
         "design": design.name,
         "drive": "passive",
         "support": str(Support.FOOT),
         "motor_half": half,
-        "fixed_points": [_point(point) for point in points],
+        "fixed_points": [_free(found) for found in hops],
         "slip": asdict(slip) | {"firmness": slip.firmness},
         "compared": compared,
+    }
+
+
+def _print_free(hops: list[FreeHop]) -> None:
+    print(f"\nhops without impact: {len(hops)}")
+    if any(abs(found.motor_z1) > MATCHED for found in hops):
+        print(
+            "This leg is not quite matched: x1 = 0 does not stay, and a hop without impact needs\n"
+            "the motors at a polar set point z1 of its own; at z1 = 0 there is none."
+        )
+    for found in hops:
+        _print_point(found.point, "indication only, the map is not smooth here")
+        print(
+            f"  motors at z1 {found.motor_z1:+.6f} rad; at z1 = 0 the hop from there loses "
+            f"{1e3 * found.symmetric_loss:.3g} mJ"
+        )
+
+
+def _free(found: FreeHop) -> dict[str, Any]:
+    return _point(found.point) | {
+        "motor": list(found.motor),
+        "motor_z1": found.motor_z1,
+        "symmetric_loss": found.symmetric_loss,
     }
 
 
@@ -170,7 +224,7 @@ def _print_slip(slip: Slip, compared: list[dict[str, Any]]) -> None:
             print(f"{who:<12}" + " ".join(f"{entry[who][name]:13.4f}" for name in names))
 
 
-def _print_point(point: FixedPoint) -> None:
+def _print_point(point: FixedPoint, verdict: str = "") -> None:
     apex, done = point.apex, point.hop
     flight = done.duration - (done.liftoff - done.touchdown)
     sizes = ", ".join(f"{abs(value):.4g}" for value in point.multipliers)
@@ -181,7 +235,7 @@ def _print_point(point: FixedPoint) -> None:
     print(
         f"  period {done.duration:.5f} s, flight {flight:.5f} s, impact {1e3 * done.impact:.3g} mJ"
     )
-    print(f"  multipliers {sizes}: {'stable' if point.stable else 'not stable'}")
+    print(f"  multipliers {sizes}: {verdict or ('stable' if point.stable else 'not stable')}")
 
 
 def _point(point: FixedPoint) -> dict[str, Any]:

@@ -22,7 +22,14 @@ from legbench.viz._matplotlib import (
 
 RADIAL, POLAR, GREY = "#00acc1", "#e69f00", "#808080"
 COLOURS = {"radial": RADIAL, "polar": POLAR}
-FATES = ["#2e7d32", "#c0ca33", "#9e9e9e", "#c62828", "#6a1b9a", "#e0e0e0"]
+FATES = {
+    Fate.RETURNS: ("#2e7d32", "ends in the periodic hop"),
+    Fate.WANDERS: ("#c0ca33", "hops on, otherwise"),
+    Fate.STANDS: ("#9e9e9e", "comes to stand"),
+    Fate.FELL: ("#c62828", "swings over"),
+    Fate.FAULT: ("#6a1b9a", "controller loses step"),
+    Fate.BURIED: ("#e0e0e0", "foot under the ground"),
+}
 DPI = 150
 
 
@@ -52,11 +59,16 @@ def plot_modes(scene: Scene, families: list[Family], path: Path) -> None:
             colour = COLOURS[family.mode.name]
             backbone.plot(freq, energies, "o-", ms=3, color=colour, label=family.mode.name)
             backbone.axvline(family.mode.freq, lw=0.8, ls=":", color=colour)
-        backbone.set(xlabel="frequency [Hz]", ylabel="energy [J]", title="backbone")
+        backbone.plot([], [], lw=0.8, ls=":", color=GREY, label="linear")
+        backbone.set(xlabel="frequency [Hz]", ylabel="energy above rest [J]", title="backbones")
         backbone.legend(frameon=False)
         for family in families:
             _portrait(phase, scene, family)
-        phase.set(xlabel="$z$ less rest [rad]", ylabel=r"$\dot z$ [rad/s]", title="phase portrait")
+        phase.set(
+            xlabel="$z_2$ (radial), $z_1$ (polar), from rest [rad]",
+            ylabel=r"$\dot z_2$, $\dot z_1$ [rad/s]",
+            title="phase portraits",
+        )
         title = f"{scene.design.name}, {scene.kind}, rest at z2 = {np.sqrt(2) * scene.rest[1]:.3g}"
         figure.suptitle(f"{title} rad, undamped")
         save(figure, path)
@@ -91,7 +103,22 @@ def _joint_space(axes, scene: Scene, families: list[Family]) -> None:  # type: i
         line = rest + reach * np.array([[sign, -1.0], [-sign, 1.0]])
         axes.plot(*line.T, lw=0.7, ls=":", color=GREY)
     axes.plot(*rest, "k+", ms=8)
-    axes.set(xlabel="$q_1$ [rad]", ylabel="$q_2$ [rad]", title="generator curves, widest orbits")
+    handles = [
+        Line2D([], [], marker="o", ms=2.5, ls="", color=GREY, label="ends of the orbits"),
+        Line2D([], [], lw=1.2, color=GREY, label="widest orbit"),
+        Line2D([], [], lw=0.7, ls=":", color=GREY, label="modal axes"),
+        Line2D([], [], lw=0.7, color="#cccccc", label="equal energy"),
+    ]
+    below = (0.5, -0.18)
+    axes.legend(
+        handles=handles,
+        loc="upper center",
+        bbox_to_anchor=below,
+        ncols=4,
+        fontsize=6,
+        frameon=False,
+    )
+    axes.set(xlabel="$q_1$ [rad]", ylabel="$q_2$ [rad]", title="generator curves")
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
     axes.set_aspect("equal")
@@ -112,11 +139,16 @@ def plot_return(heights: Floats, fixed: float | None, title: str, path: Path) ->
         figure = Figure(figsize=(4.6, 4.4), layout="constrained")
         axes = figure.subplots()
         span = [float(np.min(heights)), float(np.max(heights))]
-        axes.plot(span, span, lw=0.8, color=GREY)
-        axes.plot(*heights.T, "o-", ms=3, lw=0.9, color=RADIAL)
+        axes.plot(span, span, lw=0.8, color=GREY, label="same height again")
+        axes.plot(*heights.T, "o-", ms=3, lw=0.9, color=RADIAL, label="hops in a row")
         if fixed is not None:
-            axes.plot(fixed, fixed, "o", ms=7, mfc="none", color="k")
-        axes.set(xlabel="apex height [m]", ylabel="next apex height [m]", title=title)
+            axes.plot(fixed, fixed, "o", ms=7, mfc="none", color="k", ls="", label="periodic hop")
+        axes.legend(frameon=False)
+        axes.set(
+            xlabel="apex of the centre of mass [m]",
+            ylabel="next apex of the centre of mass [m]",
+            title=title,
+        )
         axes.set_aspect("equal")
         save(figure, path)
 
@@ -126,7 +158,7 @@ def plot_basin(question: Question, fates: Ints, path: Path) -> None:
     with styled():
         figure = Figure(figsize=(5.6, 4.4), layout="constrained")
         axes = figure.subplots()
-        colours = ListedColormap(FATES)
+        colours = ListedColormap([colour for colour, _ in FATES.values()])
         axes.pcolormesh(
             question.across.values(),
             question.up.values(),
@@ -138,16 +170,17 @@ def plot_basin(question: Question, fates: Ints, path: Path) -> None:
         centre = question.centre
         at = (getattr(centre, question.across.name), getattr(centre, question.up.name))
         axes.plot(*at, "k+", ms=10)
-        seen = [Fate(value) for value in np.unique(fates).tolist()]
-        handles = [
-            Line2D([], [], marker="s", ls="", color=FATES[fate], label=fate.name.lower())
-            for fate in seen
-        ]
+        handles = [Line2D([], [], marker="+", ls="", color="k", ms=10, label="periodic hop")]
+        for value in np.unique(fates).tolist():
+            colour, label = FATES[Fate(value)]
+            handles.append(Line2D([], [], marker="s", ls="", color=colour, label=label))
         axes.legend(handles=handles, frameon=True, loc="upper right")
         units = {"height": "m", "speed": "m/s", "dz1": "rad/s", "dz2": "rad/s"}
         labels = [
             f"{name} at the apex [{units.get(name, 'rad')}]"
             for name in (question.across.name, question.up.name)
         ]
-        axes.set(xlabel=labels[0], ylabel=labels[1], title=f"{question.design.name}: basin")
+        axes.set(
+            xlabel=labels[0], ylabel=labels[1], title=f"{question.design.name}: where a hop leads"
+        )
         save(figure, path)

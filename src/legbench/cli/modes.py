@@ -1,6 +1,7 @@
 """`legbench modes`: linear and nonlinear modes of a leg around an equilibrium."""
 
 import json
+import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,7 +16,7 @@ from legbench.errors import ConfigError
 from legbench.modes.brake import BrakeOrbit, Family, at_energy, floquet, follow
 from legbench.modes.linear import LinearMode, linear_modes
 from legbench.modes.scene import Scene, make_scene
-from legbench.modes.strict import Strictness, check, radial_line
+from legbench.modes.strict import Strictness, check, radial_line, radial_reach
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,7 +34,7 @@ class ModesArguments:
     at: float | None = None
     """Show the orbits of just this energy instead of the last ones [J]."""
     reach: float = 0.3
-    """Range of z2 either way over which strictness is checked [rad]."""
+    """Range of z2 either way over which strictness is checked, within the joint limits [rad]."""
     out: Path | None = None
     """Folder for modes.json and modes.png; none: nothing is written."""
     json: bool = False
@@ -43,9 +44,17 @@ class ModesArguments:
 def main(arguments: list[str]) -> int:
     """Run the command."""
     flags = parse(ModesArguments, "modes", arguments)
+    for name in ("energy", "at", "reach"):
+        value = getattr(flags, name)
+        if value is not None and not 0.0 < value < math.inf:
+            unit = "rad" if name == "reach" else "J"
+            raise ConfigError(f"{name} is {value:g} {unit}; it must be positive")
     scene = make_scene(load_design(flags.design), flags.setup, flags.z2)
     linear = linear_modes(scene)
-    strict = check(scene, radial_line(scene, flags.reach), 2.0 / linear["radial"].freq)
+    reach = min(flags.reach, radial_reach(scene))
+    if reach < flags.reach:
+        note(f"strictness is checked {reach:.3f} rad either way: there a joint reaches its limit")
+    strict = check(scene, radial_line(scene, reach), 2.0 / linear["radial"].freq)
     families = [
         follow(scene, name, max(flags.energy, flags.at or 0.0), progress=progress)
         for name in ("radial", "polar")
@@ -54,7 +63,7 @@ def main(arguments: list[str]) -> int:
     for family in families:
         found = family.orbits[-1] if flags.at is None else at_energy(scene, family, flags.at)
         shown[family.mode.name] = (found, floquet(scene, found))
-    content = _content(scene, linear, strict, families, shown)
+    content = _content(scene, linear, strict, families, shown) | {"reach": reach}
     if flags.json:
         print_json(content)
     else:

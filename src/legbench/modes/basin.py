@@ -6,6 +6,7 @@ it stopped; the file begins with what was asked, and a different question is ref
 
 import json
 import multiprocessing
+import signal
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
@@ -17,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from legbench.analytic import LegModel
-from legbench.analytic.taylor import TaylorLeg
+from legbench.analytic.taylor import MAP_TOLERANCE, TaylorLeg
 from legbench.control import JumpConfig
 from legbench.design import LegDesign
 from legbench.design.toml import design_to_mapping
@@ -97,6 +98,8 @@ class Question:
     up: Axis
     hops: int = 25
     """Until a start is said to wander."""
+    tolerance: float = MAP_TOLERANCE
+    """Of the integration; far below `near`, which decides [-]."""
     near: float = 0.05
     """Distance from the periodic hop that counts as returned, in units of `hop.UNITS` [-]."""
 
@@ -115,7 +118,7 @@ class Question:
         """The compiled leg and its drive."""
         model = LegModel.of(self.design, undamped=self.undamped)
         drive = JumpLaw(self.jump, self.design) if self.jump else Passive(self.motor)
-        return TaylorLeg(model, probe=drive.probe), drive
+        return TaylorLeg(model, probe=drive.probe, tolerance=self.tolerance), drive
 
 
 def fate_of(leg: TaylorLeg, drive: AbstractDrive, question: Question, start: Apex) -> Fate:
@@ -140,6 +143,13 @@ _worker: tuple[Question, TaylorLeg, AbstractDrive] | None = None
 def _start_worker(question: Question) -> None:
     global _worker
     _worker = (question, *question.tools())
+
+
+def _start_process(question: Question) -> None:
+    # ^C goes to the whole group; a worker that dies of it takes the queue's lock along, and the
+    # one who tidies up waits for ever.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _start_worker(question)
 
 
 def _row(index: int) -> tuple[int, list[int]]:
@@ -181,8 +191,10 @@ def map_basin(
     """Fates (up, across) of the whole grid; written to `path` row by row.
 
     Raises:
-        ConfigError: `path` holds the rows of another question, or cannot be written.
+        ConfigError: `path` holds the rows of another question, or cannot be written; no worker.
     """
+    if workers < 1:
+        raise ConfigError(f"workers is {workers}; a map needs 1 process or more")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         rows = _read(path, question) if path.exists() else {}
@@ -222,7 +234,7 @@ def _pool(question: Question, workers: int) -> Iterator[ProcessPoolExecutor]:
     """Fresh processes: a compiled leg does not survive a fork."""
     context: Any = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(
-        workers, mp_context=context, initializer=_start_worker, initargs=(question,)
+        workers, mp_context=context, initializer=_start_process, initargs=(question,)
     )
     try:
         yield pool

@@ -1,34 +1,65 @@
 """Hopping without motors: the hops at which touchdown costs nothing.
 
 A plastic impact takes `m v^2 / 2` of the foot, so an undamped leg loses height at every hop,
-unless its own oscillation in flight brings the foot down with no speed. By time reversal that
-happens when the leg's length stands still at the apex: the flight is then its own mirror image,
-and ends as it began. On x1 = 0 this is one condition on one number, the depth of the stance.
+unless its own oscillation in flight brings the foot down at rest. By time reversal that happens
+when the stance turns round at rest and the flight at an apex where nothing but the fall moves:
+each is then its own mirror image, and the hop ends as it began.
+
+A stance that turns round at rest is two numbers, q1 and q2; the apex is three conditions, dz1 =
+dz2 = speed = 0. So hops without impact exist at isolated values of one more number, taken here to
+be z1 of the motors. On a matched leg that value is zero, because x1 = 0 meets two of the
+conditions by itself, and the third one picks the depth of the stance.
 """
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import root_scalar
+from scipy.optimize import root, root_scalar
 
+from legbench.analytic.equations import Pair
 from legbench.analytic.hybrid import switch
 from legbench.analytic.state import standing
 from legbench.analytic.taylor import SILENT, TaylorLeg, Watched
 from legbench.modes.drive import Passive
-from legbench.modes.hop import Apex, apex_of
+from legbench.modes.hop import SCALE, UNITS, Apex, FixedPoint, apex_of, differences, return_map
 from legbench.signals import Floats
 
 STANCE = 2.0
 """Longest [s]."""
+STILL = 1e-9
+"""Speeds left at the apex of a solved hop [m/s, rad/s]."""
+CLOSED = 1e-5
+"""Distance between an apex and the next one of a hop without impact, in `UNITS` [-]."""
+NUDGE = 1e-10
+"""The foot may only touch the ground tangentially; so much lower it surely lands [m]."""
 
 
-def rebound(leg: TaylorLeg, drive: Passive, half: float) -> Apex | None:
-    """Apex after a leg is let go at rest, on x1 = 0, folded to a half angle [rad].
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FreeHop:
+    """A hop without impact."""
+
+    motor: Pair
+    """[rad]"""
+    point: FixedPoint
+    """Multipliers from differences: the foot lands as the square or the cube of time, so the map
+    is not smooth there and they are an indication."""
+    symmetric_loss: float
+    """What the ground takes when the motors stand at z1 = 0 instead, z2 the same [J]."""
+
+    @property
+    def motor_z1(self) -> float:
+        """Polar set point of the motors [rad]."""
+        return SCALE * (self.motor[0] + self.motor[1])
+
+
+def rebound(leg: TaylorLeg, motor: Pair, posture: Pair) -> Apex | None:
+    """Apex after a leg is let go at rest from a standing posture (q1, q2) [rad].
 
     None if it does not fly, or meets the ground before its apex.
     """
-    state = standing(leg.model, (-half, half))
-    state, what = leg.watch(state, STANCE, drive.motor, SILENT)
+    state = standing(leg.model, posture)
+    state, what = leg.watch(state, STANCE, motor, SILENT)
     if what is not Watched.CONTACT:
         return None
     state = switch(leg.model, state)
@@ -36,26 +67,72 @@ def rebound(leg: TaylorLeg, drive: Passive, half: float) -> Apex | None:
     rise = (state.trunk_vel[1] + moved) / leg.model.floating.gravity
     if rise <= 0.0:
         return None
-    state, what = leg.watch(state, state.time + rise, drive.motor, SILENT)
+    state, what = leg.watch(state, state.time + rise, motor, SILENT)
     return None if what is not None else apex_of(leg.model, state)
 
 
-def free_hops(leg: TaylorLeg, drive: Passive, halves: Floats) -> list[Apex]:
-    """Apexes of all hops on x1 = 0 without impact, for depths between `halves` (n,) [rad]."""
+def depths(leg: TaylorLeg, half: float, halves: Floats) -> list[float]:
+    """Depths on x1 = 0, among `halves` (n,), from which z2 stands still at the apex [rad].
 
-    def still(half: float) -> float:
-        apex = rebound(leg, drive, half)
+    The motors stand at (-half, half). On a matched leg these are the hops without impact.
+    """
+
+    def still(depth: float) -> float:
+        apex = rebound(leg, (-half, half), (-depth, depth))
         return math.nan if apex is None else apex.dz2
 
-    values = np.array([still(float(half)) for half in halves])
+    values = np.array([still(float(depth)) for depth in halves])
     found = []
     for low, high, before, after in zip(
         halves[:-1], halves[1:], values[:-1], values[1:], strict=True
     ):
-        if not before * after < 0.0:
-            continue
-        half = float(root_scalar(still, bracket=(low, high), xtol=1e-14).root)
-        apex = rebound(leg, drive, half)
-        if apex is not None and abs(apex.dz2) < 1e-6:
-            found.append(apex)
+        if before * after < 0.0:
+            depth = float(root_scalar(still, bracket=(low, high), xtol=1e-14).root)
+            if abs(still(depth)) < 1e-6:  # else a jump, not a zero
+                found.append(depth)
     return found
+
+
+def free_hop(leg: TaylorLeg, half: float, depth: float) -> FreeHop | None:
+    """The hop without impact near a depth of `depths`; None if there is none.
+
+    Unknown are the posture in which the stance turns round and z1 of the motors.
+    """
+
+    def motor_of(z1: float) -> Pair:
+        return SCALE * z1 - half, SCALE * z1 + half
+
+    def let_go(unknown: Floats) -> Apex | None:
+        folded, lean, z1 = unknown.tolist()
+        return rebound(leg, motor_of(z1), (lean - folded, lean + folded))
+
+    def moving(unknown: Floats) -> list[float]:
+        apex = let_go(unknown)
+        return [math.nan] * 3 if apex is None else [apex.dz1, apex.dz2, 10.0 * apex.speed]
+
+    solved = root(moving, [depth, 0.0, 0.0], tol=1e-13)
+    apex = let_go(solved.x)
+    if apex is None or not np.max(np.abs(moving(solved.x))) < STILL:
+        return None
+    motor = motor_of(float(solved.x[2]))
+    point = _closed(leg, Passive(motor), apex)
+    if point is None:
+        return None
+    loss = return_map(leg, Passive(motor_of(0.0)), apex).impact
+    return FreeHop(motor=motor, point=point, symmetric_loss=loss)
+
+
+def _closed(leg: TaylorLeg, drive: Passive, apex: Apex) -> FixedPoint | None:
+    """The whole hop, if it comes back: a leg that met a joint stop does not."""
+    for lower in (0.0, NUDGE):
+        start = Apex.of(apex.vector() - lower * np.eye(6)[0])
+        done = return_map(leg, drive, start)
+        if done.after is None:
+            continue
+        residual = float(np.max(np.abs(done.after.vector() - apex.vector()) / UNITS))
+        if residual < CLOSED:
+            values = np.linalg.eigvals(differences(leg, drive, start))
+            values = values[np.argsort(-np.abs(values))]
+            multipliers = tuple(complex(value) for value in values)
+            return FixedPoint(apex=apex, hop=done, multipliers=multipliers, residual=residual)
+    return None

@@ -1,5 +1,6 @@
 """A leg without damping around an equilibrium: what all mode analysis starts from."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -77,6 +78,8 @@ def make_scene(design: LegDesign, kind: SetupKind, z2: float) -> Scene:
     Raises:
         ConfigError: the set point lies outside the joint limits, or gravity folds the leg there.
     """
+    if not math.isfinite(z2):
+        raise ConfigError(f"set point z2 is {z2:g} rad; it must be a number")
     gravity = 0.0 if kind is SetupKind.HFTS else GRAVITY
     model = LegModel.of(design, gravity=gravity, stops=False, undamped=True)
     support = SUPPORTED[kind]

@@ -41,6 +41,18 @@ class Strictness:
     """Largest distance from the curve of a leg started on it at rest [rad]."""
 
 
+def radial_reach(scene: Scene) -> float:
+    """How far z2 can go either way from rest before a joint reaches its limit [rad]."""
+    (q1, q2), limits = scene.rest, scene.design.limits
+    knee, hip = q2 - q1, q1
+    return float(
+        min(
+            min(knee - limits.knee[0], limits.knee[1] - knee) / np.sqrt(2.0),
+            min(hip - limits.hip[0], limits.hip[1] - hip) * np.sqrt(2.0),
+        )
+    )
+
+
 def radial_line(scene: Scene, reach: float) -> Curve:
     """The line x1 = 0 through the rest posture, `reach` either way along z2 [rad]."""
     along = np.linspace(-reach, reach, KNOTS)[:, np.newaxis]

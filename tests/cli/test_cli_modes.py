@@ -1,0 +1,92 @@
+"""`legbench modes` and `legbench hop`: what they answer, what they refuse, how they stop."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from commands import MODELS, called
+
+pytest.importorskip("heyoka")
+
+PROTOTYPE, OPTIMAL = MODELS / "prototype.toml", MODELS / "optimal.toml"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("modes", "--z2", "2.6"), ("set point z2 = 2.6 rad", "allows (-2.2, 0.9)")),
+        (("modes", "--z2", "nan"), ("z2 is nan rad; it must be a number",)),
+        (("modes", "--at", "50"), ("mode does not exist at 50 J", "a joint reaches its limit")),
+        (("modes", "--at", "-1"), ("at is -1 J; it must be positive",)),
+        (("modes", "--energy", "-1"), ("energy is -1 J; it must be positive",)),
+        (("modes", "--reach", "0"), ("reach is 0 rad; it must be positive",)),
+        (("hop", "--height", "0.1"), ("mm below the ground; raise the trunk from",)),
+        (("hop", "--height", "nan"), ("height is nan m; an apex lies above the ground",)),
+        (("hop", "--z2", "3"), ("z2 + dz2",)),
+        (("hop", "--passive", "--rest", "2.6"), ("set point z2 = 2.6 rad",)),
+        (("hop", "--basin", "5"), ("a basin map needs --out",)),
+        (("hop", "--basin", "1", "--out", "x"), ("basin is 1 points a side; it must be 0",)),
+        (("hop", "--basin", "5", "--out", "x", "--workers", "0"), ("workers is 0",)),
+        (("hop", "--basin", "5", "--out", "x", "--up", "width"), ("axis 'width' is unknown",)),
+        (("hop", "--basin", "5", "--out", "x", "--passive"), ("there is no basin to map",)),
+    ],
+    ids=lambda value: " ".join(value) if value[0] in ("modes", "hop") else "",
+)
+def test_a_question_that_makes_no_sense(
+    arguments: tuple[str, ...], words: tuple[str, ...], capfd: pytest.CaptureFixture[str]
+) -> None:
+    called(capfd, arguments[0], PROTOTYPE, *arguments[1:], "--json").refused(*words)
+
+
+def test_strictness_is_checked_as_far_as_the_joints_go(capfd: pytest.CaptureFixture[str]) -> None:
+    done = called(capfd, "modes", OPTIMAL, "--reach", "2", "--energy", "0.02", "--json")
+    assert done.status == 0
+    assert "there a joint reaches its limit" in done.err
+    content = json.loads(done.out)
+    assert 0.5 < content["reach"] < 0.7
+    assert set(content["modes"]) == {"radial", "polar"}
+
+
+def test_a_leg_that_is_not_quite_matched_is_told_what_its_free_hops_need(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    done = called(capfd, "hop", OPTIMAL, "--passive", "--out", tmp_path)
+    assert done.status == 0
+    assert "hops without impact: 3" in done.out
+    assert "at z1 = 0 there is none" in done.out
+    assert "indication only, the map is not smooth here" in done.out
+    points = json.loads((tmp_path / "hop.json").read_text(encoding="utf-8"))["fixed_points"]
+    assert all(point["impact"] < 1e-12 < point["symmetric_loss"] for point in points)
+    assert all(abs(point["motor_z1"]) > 1e-3 for point in points)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of a terminal")
+def test_a_map_that_is_interrupted_ends_and_keeps_its_rows(tmp_path: Path) -> None:
+    rows = tmp_path / "basin.jsonl"
+    command = [sys.executable, "-m", "legbench", "hop", str(PROTOTYPE), "--basin", "300"]
+    process = subprocess.Popen(
+        [*command, "--out", str(tmp_path)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    try:
+        while not (rows.exists() and rows.read_text(encoding="utf-8").count("\n") > 2):
+            assert process.poll() is None
+            time.sleep(0.05)
+        os.killpg(process.pid, signal.SIGINT)
+        _, said = process.communicate(timeout=60)
+    finally:
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+    assert process.returncode == 130
+    assert said.endswith("legbench: interrupted\n")
+    lines = rows.read_text(encoding="utf-8").splitlines()
+    assert all(len(json.loads(line)["fates"]) == 300 for line in lines[1:])
