@@ -13,7 +13,7 @@ from commands import MODELS, called
 
 pytest.importorskip("heyoka")
 
-PROTOTYPE, OPTIMAL = MODELS / "prototype.toml", MODELS / "optimal.toml"
+PROTOTYPE, TABLE_2 = MODELS / "prototype.toml", MODELS / "table2.toml"
 
 
 @pytest.mark.parametrize(
@@ -44,7 +44,7 @@ def test_a_question_that_makes_no_sense(
 
 
 def test_strictness_is_checked_as_far_as_the_joints_go(capfd: pytest.CaptureFixture[str]) -> None:
-    done = called(capfd, "modes", OPTIMAL, "--reach", "2", "--energy", "0.02", "--json")
+    done = called(capfd, "modes", TABLE_2, "--reach", "2", "--energy", "0.02", "--json")
     assert done.status == 0
     assert "there a joint reaches its limit" in done.err
     content = json.loads(done.out)
@@ -55,7 +55,7 @@ def test_strictness_is_checked_as_far_as_the_joints_go(capfd: pytest.CaptureFixt
 def test_a_leg_that_is_not_quite_matched_is_told_what_its_free_hops_need(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    done = called(capfd, "hop", OPTIMAL, "--passive", "--out", tmp_path)
+    done = called(capfd, "hop", TABLE_2, "--passive", "--out", tmp_path)
     assert done.status == 0
     assert "hops without impact: 3" in done.out
     assert "at z1 = 0 there is none" in done.out

@@ -44,7 +44,7 @@ PROTOTYPE = load_design(Path(__file__).parents[2] / "models" / "prototype.toml")
 JUMP = JumpConfig()
 START = Apex(height=0.27, speed=0.0, z1=0.0, z2=0.6, dz1=0.0, dz2=0.0)
 HELD = Passive((-0.456, 0.456))
-OPTIMAL = load_design(Path(__file__).parents[2] / "models" / "optimal.toml")
+TABLE_2 = load_design(Path(__file__).parents[2] / "models" / "table2.toml")
 DEEP = np.linspace(0.9 * math.sqrt(0.5), 1.45, 150)
 
 
@@ -70,7 +70,7 @@ def exact() -> TaylorLeg:
 
 @pytest.fixture(scope="module")
 def rounded() -> TaylorLeg:
-    return TaylorLeg(LegModel.of(OPTIMAL, undamped=True), probe=HELD.probe)
+    return TaylorLeg(LegModel.of(TABLE_2, undamped=True), probe=HELD.probe)
 
 
 def test_an_apex_is_what_its_state_says(leg: TaylorLeg) -> None:
