@@ -90,3 +90,22 @@ def test_a_map_that_is_interrupted_ends_and_keeps_its_rows(tmp_path: Path) -> No
     assert said.endswith("legbench: interrupted\n")
     lines = rows.read_text(encoding="utf-8").splitlines()
     assert all(len(json.loads(line)["fates"]) == 300 for line in lines[1:])
+
+
+def test_an_output_that_nobody_reads_ends_the_command_quietly(tmp_path: Path) -> None:
+    read, write = os.pipe()
+    os.close(read)
+    command = [sys.executable, "-m", "legbench", "modes", str(PROTOTYPE), "--energy", "0.01"]
+    done = subprocess.run(
+        [*command, "--json"],
+        stdout=write,
+        stderr=subprocess.PIPE,
+        text=True,
+        check=False,
+        timeout=60,
+        cwd=tmp_path,
+    )
+    os.close(write)
+    assert done.returncode == 141
+    assert "Traceback" not in done.stderr
+    assert "BrokenPipe" not in done.stderr

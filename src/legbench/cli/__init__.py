@@ -1,5 +1,7 @@
 """The command line: wiring only. A command's module is imported when it is called."""
 
+import os
+import select
 import sys
 from importlib import import_module
 
@@ -41,7 +43,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Run a command; 0 when all went well, 1 for a refusal or a fault, 2 for wrong usage.
 
     Every `LegbenchError` becomes one line on stderr, never a traceback; so does ^C outside of a
-    run, with 130.
+    run, with 130. An output that nobody reads any more ends the command quietly, with 141.
     """
     arguments = sys.argv[1:] if arguments is None else arguments
     if not arguments or arguments[0] in ("-h", "--help", "help"):
@@ -55,10 +57,27 @@ def main(arguments: list[str] | None = None) -> int:
         report_error(f"no command '{name}'; there are {', '.join(COMMANDS)}")
         return 2
     try:
-        return import_module(f"legbench.cli.{name}").main(rest)
+        status = import_module(f"legbench.cli.{name}").main(rest)
+        sys.stdout.flush()
+        return status
     except LegbenchError as error:
         report_error(str(error))
         return 1
     except KeyboardInterrupt:
         report_error("interrupted")
         return 130
+    except BrokenPipeError:
+        if not _reader_left():
+            raise
+        return 141
+
+
+def _reader_left() -> bool:
+    """Whether what reads our output has gone (`| head`); what is still to come is then dropped."""
+    output = sys.stdout.fileno()
+    watch = select.poll()
+    watch.register(output, 0)
+    if not any(happened & select.POLLERR for _, happened in watch.poll(0)):
+        return False
+    os.dup2(os.open(os.devnull, os.O_WRONLY), output)
+    return True
