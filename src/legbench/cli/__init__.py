@@ -58,7 +58,8 @@ def main(arguments: list[str] | None = None) -> int:
         return 2
     try:
         status = import_module(f"legbench.cli.{name}").main(rest)
-        sys.stdout.flush()
+        if sys.stdout is not None:  # as in a process without a terminal
+            sys.stdout.flush()
         return status
     except LegbenchError as error:
         report_error(str(error))
