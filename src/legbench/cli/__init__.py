@@ -1,6 +1,7 @@
 """The command line: wiring only. A command's module is imported when it is called."""
 
 import os
+import select
 import sys
 from importlib import import_module
 
@@ -51,8 +52,20 @@ def main(arguments: list[str] | None = None) -> int:
             if sys.stdout is not None:  # as under a service manager that gives none
                 sys.stdout.flush()
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # the interpreter flushes once more
+        if not _reader_left():
+            raise
         return 141
+
+
+def _reader_left() -> bool:
+    """Whether what reads our output has gone; what is still to be flushed is then dropped."""
+    output = sys.stdout.fileno()
+    watch = select.poll()
+    watch.register(output, 0)
+    if not any(happened & select.POLLERR for _, happened in watch.poll(0)):
+        return False
+    os.dup2(os.open(os.devnull, os.O_WRONLY), output)
+    return True
 
 
 def _run(arguments: list[str] | None) -> int:

@@ -32,8 +32,8 @@ WHY = {
     "a longer --release-time",
 }
 """What to say of a leg that does not come to its next apex."""
-MATCHED = 1e-9
-"""Polar set point of the motors that is rounding [rad]."""
+MATCHED = 1e-5
+"""Polar set point of the motors that is smaller than a count of most encoders [rad]."""
 DROPS = (0.02, 0.05, 0.1)
 """From which leg and template are compared [m]."""
 
