@@ -1,5 +1,6 @@
 """Frames over any python-can bus; whatever a driver raises becomes one `BusError`."""
 
+import time
 from collections.abc import Callable
 from typing import final
 
@@ -12,6 +13,8 @@ from legbench.errors import LegbenchError
 
 Listener = Callable[[can.Message], None]
 """Sees every frame that is sent or received, in order."""
+OLDEST_S = 10.0
+"""A frame that was waiting for longer was stamped by another clock."""
 HINT = "look at `ip -details link show`, at the txqueuelen and at the wiring"
 
 
@@ -72,12 +75,25 @@ class Port:
             if message is None:
                 return None
             if self._listener is not None:
+                message.timestamp = self._came_at(message.timestamp)
                 self._tell(message)
             if message.is_extended_id or message.is_remote_frame:
                 if left <= 0.0:
                     return None
                 continue
             return message
+
+    def _came_at(self, stamp: float) -> float:
+        """A driver's stamp on our time base [s].
+
+        SocketCAN and slcan stamp by the system's clock, adapters by one of their own, which says
+        nothing here: then it is now.
+        """
+        now = 1e-9 * self.timebase.now_ns()
+        if 0.0 <= now - stamp < OLDEST_S:
+            return stamp
+        age = time.time() - stamp
+        return now - age if 0.0 <= age < OLDEST_S else now
 
     def _tell(self, message: can.Message) -> None:
         """A listener that fails hears nothing more: no stop may depend on it."""
