@@ -1,5 +1,6 @@
 """Frames over any python-can bus; whatever a driver raises becomes one `BusError`."""
 
+import socket
 import time
 from collections.abc import Callable
 from typing import final
@@ -32,6 +33,14 @@ class Port:
     ) -> None:
         self.bus, self.timebase = bus, timebase
         self._listener = listener
+        self._echoes = _echoes(bus)
+
+    def foreign(self, message: can.Message) -> bool:
+        """Whether somebody else sent a received frame.
+
+        SocketCAN marks those of every process of this machine as sent, not only our own.
+        """
+        return message.is_rx or not self._echoes
 
     def send(self, cob_id: int, data: bytes = b"") -> None:
         """Send a frame.
@@ -113,3 +122,11 @@ class Port:
             return self.bus.state is can.BusState.ERROR
         except Exception:
             return False
+
+
+def _echoes(bus: can.BusABC) -> bool:
+    """Whether a bus may give back what we send; a SocketCAN socket says so."""
+    raw = getattr(bus, "socket", None)
+    if not isinstance(raw, socket.socket) or raw.family != getattr(socket, "AF_CAN", None):
+        return True
+    return bool(raw.getsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_RECV_OWN_MSGS))
