@@ -3,6 +3,7 @@
 cd "$(dirname "$0")/../.." || exit 3
 python=.venv/bin/python
 ip link add dev vcan0 type vcan || exit 3
+export PYTEST_DISABLE_PLUGIN_AUTOLOAD=1
 $python -m pytest -c pyproject.toml -p no:cacheprovider -v -v --color=no scripts/socketcan/test_vcan.py
 tests=$?
 $python scripts/socketcan/cadence.py || exit 1
