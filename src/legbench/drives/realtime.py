@@ -28,15 +28,16 @@ class Granted:
     preemption: str
 
 
-def ask(cpu: int | None = None) -> Granted:
+def ask(cpu: int | None = None, priority: int = PRIORITY) -> Granted:
     """Ask for real-time scheduling, locked memory and a processor of one's own.
 
     Garbage is no longer collected. All of it stays so until the process ends.
 
     Args:
         cpu: to stay on; none leaves the choice to the kernel.
+        priority: of SCHED_FIFO.
     """
-    fifo, granted = _fifo()
+    fifo, granted = _fifo(priority)
     gc.collect()
     gc.freeze()
     gc.disable()
@@ -51,12 +52,12 @@ def ask(cpu: int | None = None) -> Granted:
     )
 
 
-def _fifo() -> tuple[str, bool]:
+def _fifo(priority: int) -> tuple[str, bool]:
     try:
-        os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(PRIORITY))
+        os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(priority))
     except OSError as error:
         return f"refused ({error.strerror}); see hardware/limits.conf", False
-    return f"priority {PRIORITY}", True
+    return f"priority {priority}", True
 
 
 def _lock_memory() -> str:
