@@ -77,8 +77,9 @@ def told(recording: Recording, cycles: int, shares: Shares) -> bool:
     print(row("wake-up", recording["late_us"]))
     print(row("exchange", exchange))
     print(row("cycle", recording["cycle_us"][1:]))
-    for name, values in zip(("master", "drives and leg"), zip(*shares, strict=True), strict=True):
-        print(f"processor, {name:<15} {1e3 * float(np.median(values)):6.1f} a cycle")
+    for place, name in enumerate(("master", "drives and leg") if shares else ()):
+        part = float(np.median([share[place] for share in shares]))
+        print(f"processor, {name:<15} {1e3 * part:6.1f} a cycle")
     lost = sum(bus["lost_cycles"])
     print(f"{bus['skipped_cycles']} overruns, {lost} lost, {bus['late_frames']} late frames")
     whole = status == "complete" and rows == cycles and len(exchange) >= cycles

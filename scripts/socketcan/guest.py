@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from threading import Timer
 
 ROOT = Path(__file__).parents[2]
 CACHE = ROOT / ".cache" / "socketcan"
@@ -90,6 +91,8 @@ def module_order(folder: Path) -> list[Path]:
         order.append(path)
 
     for name in MODULES:
+        if name.replace("-", "_") not in files:
+            raise GuestError(f"{KERNEL} has no module {name}")
         add(name)
     return order
 
@@ -157,7 +160,9 @@ def boot(command: str, timeout: float, instructions: int) -> int:
         image = pack(files, Path(folder), command)
         status = watched(machine(kernel, image, instructions), timeout)
     if status is None:
-        raise GuestError(f"the guest has not come to its end within {timeout:g} s")
+        raise GuestError(
+            f"the guest has not come to its end, for which it has {timeout:g} s; see --timeout"
+        )
     return status
 
 
@@ -165,7 +170,7 @@ def watched(arguments: list[str], timeout: float) -> int | None:
     """Show what the guest prints; what it says that its command ended with."""
     status = None
     with subprocess.Popen(
-        ["timeout", f"{timeout:g}", *arguments],
+        arguments,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
@@ -173,12 +178,18 @@ def watched(arguments: list[str], timeout: float) -> int | None:
         errors="replace",
     ) as guest:
         assert guest.stdout is not None
-        for line in guest.stdout:
-            before, mark, code = line.rstrip().partition(END)
-            if mark:
-                status = int(code)
-            elif before:
-                print(before, flush=True)
+        patience = Timer(timeout, guest.kill)
+        patience.start()
+        try:
+            for line in guest.stdout:
+                before, mark, code = line.rstrip().partition(END)
+                if mark:
+                    status = int(code)
+                elif before:
+                    print(before, flush=True)
+        finally:
+            patience.cancel()
+            guest.kill()
     return status
 
 
@@ -194,6 +205,8 @@ def main() -> int:
     except GuestError as error:
         print(f"socketcan: {error}", file=sys.stderr)
         return 3
+    except KeyboardInterrupt:
+        return 130
 
 
 if __name__ == "__main__":
