@@ -1,5 +1,5 @@
 .DEFAULT_GOAL := help
-.PHONY: help setup jump test test-engine check bench models clean
+.PHONY: help setup jump test test-engine test-socketcan check bench models clean
 
 PYTHON ?= python3.11
 BIN := .venv/bin
@@ -34,6 +34,9 @@ test: check ## check, then the tests
 test-engine: $(STAMP) ## the tests against Pinocchio, which is installed for them
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[pinocchio]'
 	$(BIN)/pytest tests/analytic/test_against_pinocchio.py
+
+test-socketcan: $(STAMP) ## a run over vcan in a QEMU guest at 1 kHz, in virtual time; about 15 minutes
+	$(BIN)/python scripts/socketcan/guest.py 'sh $(CURDIR)/scripts/socketcan/all.sh'
 
 bench: $(STAMP) ## performance targets as ratios against a baseline in the same run
 	$(BIN)/python scripts/bench.py

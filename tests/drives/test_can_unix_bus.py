@@ -1,5 +1,7 @@
 """The AF_UNIX bus and the servers of emulated drives, in one process, with the test's clock."""
 
+import errno
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import final
@@ -118,6 +120,47 @@ def test_drives_on_any_bus_of_python_can() -> None:
             server.poll()
         heard = {message.arbitration_id for message in iter(lambda: here.recv(0.0), None)}
     assert heard == {0x701, 0x702}
+
+
+class Failing(can.BusABC):
+    """An interface whose errors are as asked for."""
+
+    def __init__(self, *, send: int | None = None, receive: int | None = None) -> None:
+        self.codes = {"send": send, "receive": receive}
+        super().__init__(channel="failing")
+
+    def _fail(self, name: str) -> None:
+        code = self.codes[name]
+        if code is not None:
+            raise can.CanOperationError(os.strerror(code), error_code=code)
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        self._fail("send")
+
+    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+        self._fail("receive")
+        return None, True
+
+
+@pytest.mark.parametrize(
+    ("send", "receive"), [(errno.ENOBUFS, None), (errno.ENETDOWN, errno.ENETDOWN)]
+)
+def test_drives_lose_frames_and_outlive_an_interface_that_goes_down(
+    send: int, receive: int | None
+) -> None:
+    bus = Failing(send=send, receive=receive)
+    with BusServer(emulate(load_bus(BUS)), bus, Time()) as server:
+        for _ in range(200):
+            server.poll()
+        assert server.network.now_ns > 10 * MS
+
+
+def test_drives_end_with_an_interface_that_is_gone() -> None:
+    with (
+        BusServer(emulate(load_bus(BUS)), Failing(receive=errno.ENODEV), Time()) as server,
+        pytest.raises(BusError, match="No such device"),
+    ):
+        server.poll()
 
 
 def test_a_ramp_that_is_too_long_is_refused() -> None:

@@ -22,6 +22,7 @@ from legbench.drives.errors import BusError, DriveError
 from legbench.drives.link import Link
 from legbench.drives.master.bus_log import BusLog
 from legbench.drives.master.lock import ChannelLock
+from legbench.drives.master.port import Port
 from legbench.drives.open_bus import adapter_of, open_bus, timebase_of
 from legbench.drives.timebase import NetworkTime, SystemTime
 from legbench.errors import ConfigError, PlantFault
@@ -249,3 +250,49 @@ def test_a_drive_that_is_found_enabled_is_stopped_before_it_is_configured(tmp_pa
         assert it.angles == pytest.approx(before, abs=1e-5)
         link.close()
         again.shutdown()
+
+
+class Fixed:
+    """A time base that stands still at 100 s."""
+
+    def now_ns(self) -> int:
+        return 100_000_000_000
+
+    def wait_until(self, at_ns: int) -> None:
+        pass
+
+
+class Stamping(can.BusABC):
+    """A driver with one frame, stamped by a clock of its choice."""
+
+    def __init__(self, stamp: float) -> None:
+        self.frames = [can.Message(arbitration_id=0x181, is_extended_id=False, timestamp=stamp)]
+        super().__init__(channel="stamping")
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        raise NotImplementedError
+
+    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+        return self.frames.pop(), True
+
+
+@pytest.mark.parametrize(
+    ("stamp", "shown"),
+    [
+        pytest.param(97.5, 97.5, id="the time base's own"),
+        pytest.param(time.time() + 5000.0, 100.0, id="a clock of the adapter's"),
+        pytest.param(0.0, 100.0, id="none"),
+    ],
+)
+def test_received_frames_are_logged_on_the_time_base(stamp: float, shown: float) -> None:
+    with Stamping(stamp) as bus:
+        heard: list[can.Message] = []
+        Port(bus, Fixed(), heard.append).receive(0)
+    assert heard[0].timestamp == shown
+
+
+def test_a_stamp_of_the_system_clock_keeps_its_age() -> None:
+    with Stamping(time.time() - 4.0) as bus:
+        heard: list[can.Message] = []
+        Port(bus, Fixed(), heard.append).receive(0)
+    assert 90.0 < heard[0].timestamp < 96.1

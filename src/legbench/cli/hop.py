@@ -29,7 +29,7 @@ WHY = {
     Ending.STANDS: "it stays on the ground; take a larger --dz2, or a --height that is nearer",
     Ending.FELL: "it falls over; take a smaller --dz2, or a --height that is nearer",
     Ending.FAULT: "the controller has lost step, it takes vibration in flight for the ground; take "
-    "a longer --release-time",
+    "a longer --touchdown-time",
 }
 """What to say of a leg that does not come to its next apex."""
 MATCHED = 1e-5

@@ -9,7 +9,7 @@ from legbench.drives.config import BusConfig
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.build import emulate
 from legbench.drives.emulated.network import Body, Network, stiff_body
-from legbench.drives.realtime import ask
+from legbench.drives.realtime import PRIORITY, ask
 from legbench.drives.slcan_server import SlcanServer
 from legbench.drives.unix_server import UnixServer
 
@@ -57,7 +57,8 @@ def serve(
         )
         for pos in start_pos
     ]
-    ask()
+    # A master on the same processor goes first, as it would on one of its own.
+    ask(priority=PRIORITY - 1)
     network = emulate(config, behaviours, body=body)
     shown: dict[str, DriveState] = {}
     began = time.monotonic()

@@ -1,7 +1,9 @@
 """Emulated drives on any python-can bus, paced by the machine's clock, such as a vcan."""
 
+import errno
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from types import TracebackType
 from typing import Self, final
 
@@ -32,15 +34,24 @@ class BusServer:
             BusError: the bus has failed.
         """
         try:
-            message = self._bus.recv(self._pacer.wait_s())
+            message = self._receive(self._pacer.wait_s())
             self._pacer.advance()
             while message is not None:
                 self._take(message)
-                message = self._bus.recv(0.0)
+                message = self._receive(0.0)
             self._pacer.advance()
             self._give()
         except (can.CanError, OSError) as error:
             raise BusError(f"{self._bus.channel_info}: {error}") from error
+
+    def _receive(self, timeout: float) -> can.Message | None:
+        """The next frame; an interface that is taken down is a cable pulled, it may come back."""
+        try:
+            return self._bus.recv(timeout)
+        except can.CanOperationError as error:
+            if error.error_code != errno.ENETDOWN:
+                raise
+            return None
 
     def _take(self, message: can.Message) -> None:
         if message.is_error_frame:
@@ -61,14 +72,16 @@ class BusServer:
         while self._station.received:
             _, frame = self._station.received.popleft()
             if not frame.error:
-                self._bus.send(
-                    can.Message(
-                        arbitration_id=frame.cob_id,
-                        data=frame.data,
-                        is_extended_id=frame.extended,
-                        is_remote_frame=frame.remote,
+                # As on a real bus: a full queue or a pulled cable loses the frame.
+                with suppress(can.CanOperationError):
+                    self._bus.send(
+                        can.Message(
+                            arbitration_id=frame.cob_id,
+                            data=frame.data,
+                            is_extended_id=frame.extended,
+                            is_remote_frame=frame.remote,
+                        )
                     )
-                )
 
     def close(self) -> None:
         """Unplug; may be called twice."""

@@ -12,7 +12,7 @@ PRIORITY = 80
 """Of SCHED_FIFO: above everything that is not the kernel's own."""
 SPIN_NS = 100_000
 """Last part of every wait that is spent awake, where SCHED_FIFO is granted [ns]."""
-MCL_CURRENT, MCL_FUTURE = 1, 2
+MCL_CURRENT, MCL_FUTURE, MCL_ONFAULT = 1, 2, 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,15 +28,16 @@ class Granted:
     preemption: str
 
 
-def ask(cpu: int | None = None) -> Granted:
+def ask(cpu: int | None = None, priority: int = PRIORITY) -> Granted:
     """Ask for real-time scheduling, locked memory and a processor of one's own.
 
     Garbage is no longer collected. All of it stays so until the process ends.
 
     Args:
         cpu: to stay on; none leaves the choice to the kernel.
+        priority: of SCHED_FIFO.
     """
-    fifo, granted = _fifo()
+    fifo, granted = _fifo(priority)
     gc.collect()
     gc.freeze()
     gc.disable()
@@ -51,17 +52,25 @@ def ask(cpu: int | None = None) -> Granted:
     )
 
 
-def _fifo() -> tuple[str, bool]:
+def _fifo(priority: int) -> tuple[str, bool]:
     try:
-        os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(PRIORITY))
+        os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(priority))
     except OSError as error:
         return f"refused ({error.strerror}); see hardware/limits.conf", False
-    return f"priority {PRIORITY}", True
+    return f"priority {priority}", True
 
 
 def _lock_memory() -> str:
+    """Memory that is there is fetched now; what comes later stays once it is used.
+
+    Without the second, an allocator that reserves a gigabyte in advance, as Arrow's does, would get
+    all of it, half a second later.
+    """
     library = ctypes.CDLL(ctypes.util.find_library("c"), use_errno=True)
-    if library.mlockall(MCL_CURRENT | MCL_FUTURE) == 0:
+    if all(
+        library.mlockall(flags) == 0
+        for flags in (MCL_CURRENT, MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT)
+    ):
         return "granted"
     return f"refused ({os.strerror(ctypes.get_errno())}); see hardware/limits.conf"
 

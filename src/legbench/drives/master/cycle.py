@@ -242,8 +242,8 @@ class Cycle:
             self.error_frames += 1
             self.bus_off = self.bus_off or bool(cob_id & ERROR_FRAME_BUS_OFF)
             return
-        if cob_id in self._ours and message.is_rx:
-            # Only a master sends these, and an echo of our own is not received.
+        if cob_id in self._ours and self._port.foreign(message):
+            # Only a master sends these.
             self.stranger = cob_id
             return
         node_id = cob_id & LAST_NODE

@@ -1,5 +1,7 @@
 """Frames over any python-can bus; whatever a driver raises becomes one `BusError`."""
 
+import socket
+import time
 from collections.abc import Callable
 from typing import final
 
@@ -13,6 +15,8 @@ from legbench.errors import LegbenchError
 
 Listener = Callable[[can.Message], None]
 """Sees every frame that is sent or received, in order."""
+OLDEST_S = 10.0
+"""A frame that was waiting for longer was stamped by another clock."""
 HINT = "look at `ip -details link show`, at the txqueuelen and at the wiring"
 
 
@@ -35,6 +39,14 @@ class Port:
         self.listener = listener
         self.error_frames = 0
         self.may_send: MaySend | None = None
+        self._echoes = _echoes(bus)
+
+    def foreign(self, message: can.Message) -> bool:
+        """Whether somebody else sent a received frame.
+
+        SocketCAN marks those of every process of this machine as sent, not only our own.
+        """
+        return message.is_rx or not self._echoes
 
     def send(self, cob_id: int, data: bytes = b"") -> None:
         """Send a frame.
@@ -98,6 +110,7 @@ class Port:
         except Exception as error:
             raise BusError(f"{self.bus.channel_info}: cannot receive: {error}; {HINT}") from error
         if message is not None and self.listener is not None:
+            message.timestamp = self._came_at(message.timestamp)
             self._tell(message)
         return message
 
@@ -106,6 +119,18 @@ class Port:
             self.error_frames += 1
             return True
         return not (message.is_extended_id or message.is_remote_frame)
+
+    def _came_at(self, stamp: float) -> float:
+        """A driver's stamp on our time base [s].
+
+        SocketCAN and slcan stamp by the system's clock, adapters by one of their own, which says
+        nothing here: then it is now.
+        """
+        now = 1e-9 * self.timebase.now_ns()
+        if 0.0 <= now - stamp < OLDEST_S:
+            return stamp
+        age = time.time() - stamp
+        return now - age if 0.0 <= age < OLDEST_S else now
 
     def _tell(self, message: can.Message) -> None:
         """A listener that fails hears nothing more: no stop may depend on it."""
@@ -125,3 +150,11 @@ class Port:
             return self.bus.state is can.BusState.ERROR
         except Exception:
             return False
+
+
+def _echoes(bus: can.BusABC) -> bool:
+    """Whether a bus may give back what we send; a SocketCAN socket says so."""
+    raw = getattr(bus, "socket", None)
+    if not isinstance(raw, socket.socket) or raw.family != getattr(socket, "AF_CAN", None):
+        return True
+    return bool(raw.getsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_RECV_OWN_MSGS))
