@@ -55,6 +55,14 @@ class Child:
                 self.status = os.waitstatus_to_exitcode(status)
         return self.status is not None
 
+    def wait_for(self, happened: Callable[[], bool]) -> None:
+        """Until something has happened while it runs; raises TooLateError."""
+        until = time.monotonic() + PATIENCE
+        while not happened():
+            if self.ended() or time.monotonic() > until:
+                raise TooLateError(f"process {self.pid} has not got so far: {self.text}")
+            time.sleep(0.01)
+
     def wait(self) -> int:
         """Exit status in the end; raises TooLateError."""
         until = time.monotonic() + PATIENCE
