@@ -119,7 +119,7 @@ class Jump(AbstractController):
         )
         self._standing: Floats = np.ones(self._folded.shape[:-1])
         self._since: Floats = np.zeros(self._folded.shape[:-1])
-        self._extreme: Floats = np.zeros(self._folded.shape[:-1])
+        self._furthest: Floats = np.zeros(self._folded.shape[:-1])
         self._enter(np.full(self._folded.shape[:-1], Phase.REST, dtype=np.int64))
 
     @property
@@ -133,22 +133,23 @@ class Jump(AbstractController):
         if not np.all(self._standing > 0.0):
             raise ConfigError(STANDING_ONLY)
         self._since = np.zeros(self._standing.shape)
-        self._extreme = np.zeros(self._standing.shape)
+        self._furthest = np.zeros(self._standing.shape)
         self._enter(np.full(self._standing.shape, Phase.REST, dtype=np.int64))
 
     def step(self, observation: Observation) -> Command:
         """Leave the phase whose end has come, command the equilibrium that belongs to the next."""
         torque = self._targets.radial(observation.spring_torque)
         fold = self._targets.radial(observation.motor_pos) - torque / self._stiffness
-        self._extreme = self._apex * np.maximum(self._apex * self._extreme, self._apex * fold)
-        at_apex = self._apex * (self._extreme - fold) > self._apex_turn
+        towards = self._apex * fold
+        self._furthest = np.maximum(self._furthest, towards)
+        at_apex = self._furthest - towards > self._apex_turn
         holds = self._sense * (-torque / self._standing - self._load) > 0.0
         self._since = np.where(holds, self._since, observation.time)
         leaving = at_apex | (holds & (observation.time - self._since >= self._dwell))
-        if leaving.any():
+        if np.count_nonzero(leaving):
             self._since = np.where(leaving, observation.time, self._since)
-            self._extreme = np.where(leaving, fold, self._extreme)
             self._enter(np.where(leaving, NEXT[self._phase], self._phase))
+            self._furthest = np.where(leaving, self._apex * fold, self._furthest)
         return self._command
 
     def _enter(self, phase: Ints) -> None:
