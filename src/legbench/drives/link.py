@@ -111,7 +111,7 @@ class Link:
         self._start_up = StartUp(self._port, self.cycle, config, read_only=read_only)
         self._last = Tick(0, 0, 0, 0, False)
         self._expected: list[tuple[float, ...]] = []
-        self._holds = False
+        self._holds = self._closed = False
         self.listening = False
 
     def tell(self, listener: Listener) -> None:
@@ -389,18 +389,19 @@ class Link:
                 StopLadder(self.cycle).run()
 
     def close(self) -> None:
-        """Stop, leave the drives in pre-operational, release the channel; never raises.
+        """Stop, leave the drives in pre-operational, release the channel; never raises, twice is once.
 
         A link that only looks leaves the drives of another master alone.
         """
-        if self.state is LinkState.NEW:
+        if self.state is LinkState.NEW or self._closed:
             return
+        self._closed = True
         looked = self.listening or self.state is LinkState.CONFIGURED
         try:
             self.stop()
         finally:
             try:
-                if not (self._read_only and (looked or self.cycle.stranger is not None)):
+                if not (self._read_only and (looked or self.cycle.led_by_another())):
                     self.bring_up.pre_operational()
             except BusError as error:
                 self.cycle.bus_error = error
