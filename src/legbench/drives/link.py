@@ -389,9 +389,9 @@ class Link:
                 StopLadder(self.cycle).run()
 
     def close(self) -> None:
-        """Stop, leave the drives in pre-operational, release the channel; never raises, twice is once.
+        """Stop, leave the drives in pre-operational, release the channel; never raises.
 
-        A link that only looks leaves the drives of another master alone.
+        Twice is once. A link that only looks leaves the drives of another master alone.
         """
         if self.state is LinkState.NEW or self._closed:
             return
