@@ -220,6 +220,24 @@ def test_a_drive_that_somebody_leads_without_sync_is_left_alone(
         assert all(may_read(frame.cob_id, frame.data) for frame in sent(it.network))
 
 
+@pytest.mark.parametrize(
+    "frame",
+    [heartbeat_frame(MASTER, NmtState.OPERATIONAL), nmt_frame(NmtCommand.ENTER_PRE_OPERATIONAL)],
+    ids=str,
+)
+def test_a_master_that_has_not_sent_sync_yet_is_not_disturbed(tmp_path: Path, frame: Frame) -> None:
+    with rig(tmp_path, read_only=True, configured=True) as it:
+        it.network.advance(20 * MS)
+        it.network.send(it.network.attach(), frame)
+        with pytest.raises(PlantFault, match=f"somebody else sends {frame.cob_id:03X}h"):
+            it.link.open()
+        it.link.close()
+        it.network.advance(it.network.now_ns + MS)
+        said = [one for one in sent(it.network) if one != frame]
+        assert all(may_read(one.cob_id, one.data) for one in said)
+        ChannelLock("rig", tmp_path).acquire()
+
+
 def test_a_master_that_comes_later_is_not_disturbed(tmp_path: Path) -> None:
     with rig(tmp_path, read_only=True, configured=True) as it:
         it.link.start()

@@ -243,7 +243,7 @@ def test_an_adapter_that_takes_nothing_more_is_named_and_holds_nobody_up(
     # Nobody polls the server: the line fills up.
     with pytest.raises(can.CanOperationError, match=f"{server.path}: .*takes no frame any more"):
         send_for_ever()
-    with pytest.raises(can.CanOperationError):
+    with suppress(can.CanOperationError):  # It comes back, whatever room there is by then.
         bus.shutdown()
 
 

@@ -130,6 +130,7 @@ class Link:
             BusError: the channel has a master, or the interface does not work.
             DriveError: a drive is missing, is another one, or refuses its configuration; or, in
                 read-only, is not configured.
+            PlantFault: in read-only, somebody else is about to lead the drives.
         """
         if self.state is not LinkState.NEW:
             return
@@ -172,6 +173,7 @@ class Link:
         Raises:
             BusError: a master of this computer holds the channel, and sends no SYNC yet.
             DriveError: a drive is not configured, or somebody leads it without SYNC.
+            PlantFault: somebody else is about to lead them.
         """
         self._port.may_send = may_read
         now_ns = self._port.timebase.now_ns()
@@ -191,6 +193,7 @@ class Link:
                     f"{'has power' if powered else 'is operational'}, though nobody sends SYNC: "
                     "somebody else leads it, and read-only does not interfere; end that program"
                 )
+        self._supervisor.alone()
         self._port.may_send = may_pace(self._config.master_id)
 
     def start(self, *, clear_faults: bool = False) -> Sample:

@@ -76,7 +76,7 @@ class Cycle:
         self.stopping = False
         self._tpdos = {cob: axis for axis in self.axes for cob in axis.tpdo_ids}
         self._expected = len(self._tpdos)
-        self._masters = self._ours = frozenset(
+        self._ours = frozenset(
             {NMT_ID, SYNC_ID, HEARTBEAT_BASE + config.master_id}
             | {node.rpdo_id(pdo) for node in config.nodes for pdo in node.rpdos}
         )
@@ -150,10 +150,9 @@ class Cycle:
         Raises:
             BusError: the bus has failed.
         """
-        self._ours = frozenset[int]()
         heard = self._await_sync(until_ns) is not None
-        if not heard:
-            self._ours = self._masters
+        if heard:
+            self._ours, self.stranger = frozenset[int](), None
         return heard
 
     def follow(self) -> Tick:
