@@ -24,8 +24,8 @@ def first_contact(port: Port, config: BusConfig) -> Iterator[None]:
             where = f"{who}{port.bus.channel_info}"
             off = ", the controller has gone bus-off" if port.off_bus else ""
             raise BusError(
-                f"{where}: {port.error_frames} error frames and no answer{off}; another bitrate than "
-                f"the drives', or a fault of the wiring: {config.bitrate_text}"
+                f"{where}: {port.error_frames} error frames and no answer{off}; another bitrate "
+                f"than the drives', or a fault of the wiring: {config.bitrate_text}"
             ) from error
         if isinstance(error, NoAnswerError):
             raise NoAnswerError(f"{error}; {config.bitrate_text}") from error
