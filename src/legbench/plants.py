@@ -14,7 +14,6 @@ from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.build import emulate
 from legbench.drives.emulated.faults import Fault
 from legbench.drives.emulated.network import Network
-from legbench.drives.errors import BusError
 from legbench.drives.limits import UNLIMITED, Range, SafetyLimits
 from legbench.drives.link import Link
 from legbench.drives.master.lock import ChannelLock
@@ -275,7 +274,7 @@ def open_session(
             lock.acquire()
         try:
             bus = open_bus(config.at(choice.bitrate), adapter)
-        except BusError:
+        except BaseException:
             lock.release()
             raise
         return Session(bus, config.at(choice.bitrate), lock=lock)

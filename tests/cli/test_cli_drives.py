@@ -189,6 +189,7 @@ JUMP = ("run", "jump", "--plant", "can", "--duration", "0.05", *DESIGN)
     ("flags", "words"),
     [
         (("--interface", "teleport"), ("cannot open teleport", "Unknown interface")),
+        (("--interface", "socketcand"), ("cannot open socketcand", "'host'", "can.conf")),
         (("--interface", "socketcan", "--channel", "none0"), ("cannot open socketcan none0",)),
         (("--interface", "legbench_unix", "--channel", "none.sock"), ("none.sock", "emulate")),
         (("--bus", "nowhere.toml"), ("nowhere.toml: no such file",)),

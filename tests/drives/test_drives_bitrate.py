@@ -14,6 +14,7 @@ from legbench.drives.cia402 import DriveState
 from legbench.drives.codec.frame import Frame
 from legbench.drives.codec.nmt import NmtCommand, nmt_frame
 from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.faults import NodeFault, NodeFaultKind
 from legbench.drives.emulated.network import BUS_OFF, BUS_OFF_FRAME, ERROR_FRAME, PASSIVE
 from legbench.drives.errors import BusError
 from legbench.drives.link import Link
@@ -81,6 +82,16 @@ def test_a_link_at_a_wrong_bitrate_says_so_before_anything_is_enabled(
         assert bus.state is can.BusState.ERROR
     assert not any(0x200 < frame.cob_id < 0x280 for _, frame in network.log or [])
     assert {drive.axis.power.state for drive in network.drives} == {DriveState.SWITCH_ON_DISABLED}
+
+
+def test_an_error_frame_does_not_hide_who_keeps_silent(tmp_path: Path) -> None:
+    network = emulate(config())
+    network.inject(NodeFault(kind=NodeFaultKind.SILENT, node_id=2, start_ns=0))
+    with LockstepBus("rig", network=network) as bus:
+        link = Link(bus, config(), stiffness=STIFFNESS, lock=ChannelLock("rig", tmp_path))
+        bus.inject(ERROR_FRAME)
+        with pytest.raises(BusError, match=r"node 2 on .* does not answer .*1 error frames"):
+            link.start()
 
 
 def test_a_bitrate_of_drives_that_the_bus_file_does_not_know_is_suspected(tmp_path: Path) -> None:

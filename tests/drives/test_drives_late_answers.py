@@ -3,8 +3,11 @@
 import random
 import struct
 from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
+import can
 import pytest
 from drives_rig import LIMITS, MS, START, Rig, config, rig
 
@@ -144,6 +147,46 @@ def test_a_late_answer_behind_a_frame_of_others_is_found_too(tmp_path: Path) -> 
             Frame(KNEE, struct.pack("<Hih", 0x1237, old, 0)),
         ):
             it.network.send(other, frame)
+        it.link.exchange()
+        assert it.link.cycle.late_frames == 1
+        assert it.link.cycle.axes[1].motor_counts != old
+
+
+def test_silent_ticks_neither_follow_each_other_nor_stretch_the_heartbeat(tmp_path: Path) -> None:
+    with rig(tmp_path, limits=replace(LIMITS, lost_frames=1000)) as it:
+        it.link.start()
+        start_ns = it.network.now_ns // MS * MS + MS
+        it.network.inject(FrameFault(kind=FrameFaultKind.DROP, cob_id=KNEE, start_ns=start_ns))
+        it.run(200)
+        assert it.link.cycle.silent_total > 190
+
+        def gaps(cob_id: int) -> list[int]:
+            log = it.network.log or []
+            times = [at for at, frame in log if frame.cob_id == cob_id and at > start_ns]
+            return [after - before for before, after in pairwise(times)]
+
+        assert max(gaps(0x080)) < 2.1 * MS
+        assert max(gaps(0x202)) < 2.1 * MS  # its deadline in the drive is 20 ms (1400h:05)
+        beat_ns = it.config.master_heartbeat_ms * MS
+        assert max(gaps(0x700 + it.config.master_id)) < beat_ns + 2.1 * MS
+
+
+def test_what_could_not_be_read_before_sync_never_counts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with rig(tmp_path) as it:
+        it.link.start()
+        it.run(5)
+        receive, failures = it.bus.recv, ["Network is down"]
+
+        def recv(timeout: float | None = None) -> can.Message | None:
+            if failures:
+                raise can.CanOperationError(failures.pop())
+            return receive(timeout)
+
+        monkeypatch.setattr(it.bus, "recv", recv)
+        old = it.link.cycle.axes[1].motor_counts + 5000
+        it.bus.inject(Frame(KNEE, struct.pack("<Hih", 0x1237, old, 0)))
         it.link.exchange()
         assert it.link.cycle.late_frames == 1
         assert it.link.cycle.axes[1].motor_counts != old

@@ -148,6 +148,25 @@ def test_a_sync_that_ends_ends_the_look(tmp_path: Path) -> None:
         assert not it.link.cycle.bus_off
 
 
+@pytest.mark.parametrize("missed", [1, 2])
+def test_time_goes_on_where_sync_is_missing(tmp_path: Path, missed: int) -> None:
+    with beside(tmp_path) as (_, it):
+        it.link.start()
+        began_ns = it.link.exchange().time_ns
+        start_ns = it.network.now_ns // MS * MS + 5 * MS
+        it.network.inject(
+            FrameFault(
+                kind=FrameFaultKind.DROP,
+                cob_id=0x080,
+                start_ns=start_ns,
+                end_ns=start_ns + missed * MS,
+            )
+        )
+        samples = [it.link.exchange() for _ in range(20)]
+        periods = sum(1 + sample.skipped for sample in samples)
+        assert samples[-1].time_ns - began_ns == periods * MS
+
+
 def test_a_sync_that_is_missed_is_counted(tmp_path: Path) -> None:
     with beside(tmp_path) as (_, it):
         it.link.start()
@@ -201,6 +220,24 @@ def test_a_drive_that_somebody_leads_without_sync_is_left_alone(
         assert all(may_read(frame.cob_id, frame.data) for frame in sent(it.network))
 
 
+@pytest.mark.parametrize(
+    "frame",
+    [heartbeat_frame(MASTER, NmtState.OPERATIONAL), nmt_frame(NmtCommand.ENTER_PRE_OPERATIONAL)],
+    ids=str,
+)
+def test_a_master_that_has_not_sent_sync_yet_is_not_disturbed(tmp_path: Path, frame: Frame) -> None:
+    with rig(tmp_path, read_only=True, configured=True) as it:
+        it.network.advance(20 * MS)
+        it.network.send(it.network.attach(), frame)
+        with pytest.raises(PlantFault, match=f"somebody else sends {frame.cob_id:03X}h"):
+            it.link.open()
+        it.link.close()
+        it.network.advance(it.network.now_ns + MS)
+        said = [one for one in sent(it.network) if one != frame]
+        assert all(may_read(one.cob_id, one.data) for one in said)
+        ChannelLock("rig", tmp_path).acquire()
+
+
 def test_a_master_that_comes_later_is_not_disturbed(tmp_path: Path) -> None:
     with rig(tmp_path, read_only=True, configured=True) as it:
         it.link.start()
@@ -209,8 +246,35 @@ def test_a_master_that_comes_later_is_not_disturbed(tmp_path: Path) -> None:
         with pytest.raises(PlantFault, match="somebody else sends 201h"):
             observe(it.link, 5)
         it.link.close()
+        it.network.advance(it.network.now_ns + MS)
         orders = [frame for frame in sent(it.network) if frame.cob_id == 0x000]
         assert [order.data[0] for order in orders] == [NmtCommand.START] * 2
+
+
+def test_a_master_that_came_after_the_last_look_is_not_disturbed(tmp_path: Path) -> None:
+    with rig(tmp_path, read_only=True, configured=True) as it:
+        it.link.start()
+        observe(it.link, 10)
+        it.network.send(it.network.attach(), Frame(0x080))
+        it.network.advance(it.network.now_ns + MS)
+        it.link.close()
+        it.network.advance(it.network.now_ns + MS)
+        orders = [frame for frame in sent(it.network) if frame.cob_id == 0x000]
+        assert [order.data[0] for order in orders] == [NmtCommand.START] * 2
+
+
+@pytest.mark.parametrize("started", [False, True])
+def test_a_link_that_is_closed_says_nothing_more(tmp_path: Path, started: bool) -> None:
+    with rig(tmp_path, read_only=True, configured=True) as it:
+        it.link.open()
+        if started:
+            it.link.start()
+        it.link.close()
+        it.network.advance(it.network.now_ns + MS)
+        before = len(sent(it.network))
+        it.link.close()
+        it.network.advance(it.network.now_ns + MS)
+        assert len(sent(it.network)) == before
 
 
 def test_a_master_of_this_computer_that_sends_no_sync_yet_is_waited_for(tmp_path: Path) -> None:

@@ -7,22 +7,25 @@ from pathlib import Path
 
 import can
 import pytest
-from drives_rig import LIMITS, MS, START, Rig, config, rig
+from drives_rig import LIMITS, MS, START, STIFFNESS, Rig, config, rig
 
+from legbench.drives.bus import LockstepBus
 from legbench.drives.bus_file import bus_from_mapping
 from legbench.drives.cia402 import Controlword, DriveState, Goal, PowerMachine, decode_state
 from legbench.drives.codec.datatypes import DataType
 from legbench.drives.codec.frame import Frame
 from legbench.drives.codec.pdo import Mapped
 from legbench.drives.config import BusConfig, Parameter
+from legbench.drives.emulated.build import emulate
 from legbench.drives.emulated.faults import FrameFault, FrameFaultKind
 from legbench.drives.errors import BusError, DriveError
 from legbench.drives.limits import SafetyLimits
 from legbench.drives.link import Link, LinkState
 from legbench.drives.master.bus_log import BusLog
-from legbench.drives.master.lock import ChannelLock
+from legbench.drives.master.lock import FOLDERS, ChannelLock
 from legbench.drives.master.port import Port
 from legbench.drives.master.sdo_port import SdoPort
+from legbench.drives.session import Session
 from legbench.drives.stopping import check_stopping
 from legbench.errors import ConfigError, PlantFault
 
@@ -494,12 +497,35 @@ def test_a_second_name_of_a_device_does_not_get_past_its_lock(
     monkeypatch.chdir(tmp_path)
     with pytest.raises(BusError, match="already has a master"):
         ChannelLock.of_channel("slcan", "by-id", tmp_path).acquire()
+    # python-can takes the speed of the line behind the name.
+    for channel in (f"{device}@115200", "by-id@9600"):
+        with pytest.raises(BusError, match="already has a master"):
+            ChannelLock.of_channel("slcan", channel, tmp_path).acquire()
     # A file that happens to bear the name of an interface is not that interface.
     (tmp_path / "can0").touch()
     assert "can0" in ChannelLock.of_channel("socketcan", "can0", tmp_path)._path.name
     assert str(tmp_path.name) not in ChannelLock.of_channel("socketcan", "can0")._path.name
     ChannelLock.of_channel("socketcan", "can0", tmp_path).acquire()
     first.release()
+
+
+def test_an_address_is_no_path_and_the_same_from_everywhere(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    where = "socket://10.0.0.7:3333"
+    first = ChannelLock.of_channel("slcan", where, tmp_path)
+    monkeypatch.chdir(tmp_path)
+    assert ChannelLock.of_channel("slcan", where, tmp_path)._path == first._path
+
+
+def test_an_emulated_bus_of_this_process_leaves_no_lock_behind() -> None:
+    with LockstepBus("mine", network=emulate(config())) as bus:
+        mine = f"legbench-*{id(bus):x}*"
+        with Session(bus, config()) as session:
+            session.hold()
+            with session.link(LIMITS, STIFFNESS) as link:
+                link.start()
+        assert [path for folder in FOLDERS for path in folder.glob(mine)] == []
 
 
 def test_a_lock_lies_where_nobody_can_move_it(

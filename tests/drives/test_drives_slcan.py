@@ -229,3 +229,35 @@ def test_no_bytes_hurt_either_side(network: Network, server: SlcanServer) -> Non
             os.write(server._ours, chunk)
             while bus.recv(0.0) is not None:
                 continue
+
+
+def test_an_adapter_that_takes_nothing_more_is_named_and_holds_nobody_up(
+    server: SlcanServer,
+) -> None:
+    bus = opened(server)
+
+    def send_for_ever() -> None:
+        while True:
+            bus.send(ASK)
+
+    # Nobody polls the server: the line fills up.
+    with pytest.raises(can.CanOperationError, match=f"{server.path}: .*takes no frame any more"):
+        send_for_ever()
+    with suppress(can.CanOperationError):  # It comes back, whatever room there is by then.
+        bus.shutdown()
+
+
+def test_a_line_that_was_cut_is_ended_before_the_next_one(
+    server: SlcanServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bus = opened(server)
+    write = os.write
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "write", lambda line, data: write(line, data[:5]))
+        with pytest.raises(can.CanOperationError, match="takes no frame any more"):
+            bus.send(ASK)
+    bus.send(ASK)
+    first, second = answered(server, bus, 0x581), answered(server, bus, 0x581)
+    assert first is not None
+    assert second is not None
+    bus.shutdown()

@@ -111,7 +111,7 @@ class Link:
         self._start_up = StartUp(self._port, self.cycle, config, read_only=read_only)
         self._last = Tick(0, 0, 0, 0, False)
         self._expected: list[tuple[float, ...]] = []
-        self._holds = False
+        self._holds = self._closed = False
         self.listening = False
 
     def tell(self, listener: Listener) -> None:
@@ -130,6 +130,7 @@ class Link:
             BusError: the channel has a master, or the interface does not work.
             DriveError: a drive is missing, is another one, or refuses its configuration; or, in
                 read-only, is not configured.
+            PlantFault: in read-only, somebody else is about to lead the drives.
         """
         if self.state is not LinkState.NEW:
             return
@@ -172,6 +173,7 @@ class Link:
         Raises:
             BusError: a master of this computer holds the channel, and sends no SYNC yet.
             DriveError: a drive is not configured, or somebody leads it without SYNC.
+            PlantFault: somebody else is about to lead them.
         """
         self._port.may_send = may_read
         now_ns = self._port.timebase.now_ns()
@@ -191,6 +193,7 @@ class Link:
                     f"{'has power' if powered else 'is operational'}, though nobody sends SYNC: "
                     "somebody else leads it, and read-only does not interfere; end that program"
                 )
+        self._supervisor.alone()
         self._port.may_send = may_pace(self._config.master_id)
 
     def start(self, *, clear_faults: bool = False) -> Sample:
@@ -391,16 +394,17 @@ class Link:
     def close(self) -> None:
         """Stop, leave the drives in pre-operational, release the channel; never raises.
 
-        A link that only looks leaves the drives of another master alone.
+        Twice is once. A link that only looks leaves the drives of another master alone.
         """
-        if self.state is LinkState.NEW:
+        if self.state is LinkState.NEW or self._closed:
             return
+        self._closed = True
         looked = self.listening or self.state is LinkState.CONFIGURED
         try:
             self.stop()
         finally:
             try:
-                if not (self._read_only and (looked or self.cycle.stranger is not None)):
+                if not (self._read_only and (looked or self.cycle.led_by_another())):
                     self.bring_up.pre_operational()
             except BusError as error:
                 self.cycle.bus_error = error

@@ -75,7 +75,7 @@ def open_bus(config: BusConfig, adapter: Adapter) -> can.BusABC:
     given = {key: value for key, value in given.items() if value is not None}
     try:
         return _slcan(given) if adapter.interface == SLCAN else can.Bus(**given)  # pyright: ignore[reportArgumentType]
-    except (can.CanError, OSError, ImportError, ValueError) as error:
+    except Exception as error:  # Such as a TypeError, where a driver wants more than a channel.
         raise _named(adapter.interface, adapter.channel, error) from error
 
 
@@ -95,8 +95,8 @@ def _slcan(given: dict[str, object]) -> can.BusABC:
 def _named(interface: str, channel: str | None, error: Exception) -> BusError:
     where = f"{interface} {channel or ''}".strip()
     return BusError(
-        f"cannot open {where}: {error}; interfaces are those of python-can, 'legbench' is the "
-        "emulated leg"
+        f"cannot open {where}: {error}; interfaces are those of python-can, which takes what one "
+        "needs besides a channel from its own can.conf; 'legbench' is the emulated leg"
     )
 
 

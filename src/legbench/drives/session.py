@@ -78,7 +78,7 @@ class Session:
     def _lock_of_bus(self) -> ChannelLock:
         """An emulated bus of this process has no other master."""
         name = str(self.bus.channel_info)
-        return ChannelLock(f"{name}-{id(self.bus):x}" if self.virtual else name)
+        return ChannelLock.private(name) if self.virtual else ChannelLock(name)
 
     def hold(self) -> None:
         """Take the channel for this session; raises BusError if it has a master."""

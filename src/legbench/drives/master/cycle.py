@@ -76,7 +76,7 @@ class Cycle:
         self.stopping = False
         self._tpdos = {cob: axis for axis in self.axes for cob in axis.tpdo_ids}
         self._expected = len(self._tpdos)
-        self._masters = self._ours = frozenset(
+        self._ours = frozenset(
             {NMT_ID, SYNC_ID, HEARTBEAT_BASE + config.master_id}
             | {node.rpdo_id(pdo) for node in config.nodes for pdo in node.rpdos}
         )
@@ -89,8 +89,8 @@ class Cycle:
         self._period_ns = config.period_ns
         self._deadline_ns = 1000 * config.tpdo_deadline_us
         self._beat = heartbeat_frame(config.master_id, NmtState.OPERATIONAL)
-        self._beat_cycles = max(1, 1000 * config.master_heartbeat_ms // config.period_us)
-        self._due_ns = 0
+        self._beat_ns = 1_000_000 * config.master_heartbeat_ms
+        self._due_ns = self._beat_due_ns = 0
         self._count = 0
         self._owed: set[int] = set()
         """Process data that has not come, and may still."""
@@ -103,6 +103,7 @@ class Cycle:
         """Lay the grid: the next tick is one period from now, on a whole period."""
         now_ns = self._port.timebase.now_ns()
         self._due_ns = (now_ns // self._period_ns + 1) * self._period_ns
+        self._beat_due_ns = self._due_ns + self._beat_ns
         self.arm()
 
     def arm(self) -> None:
@@ -149,10 +150,9 @@ class Cycle:
         Raises:
             BusError: the bus has failed.
         """
-        self._ours = frozenset[int]()
         heard = self._await_sync(until_ns) is not None
-        if not heard:
-            self._ours = self._masters
+        if heard:
+            self._ours, self.stranger = frozenset[int](), None
         return heard
 
     def follow(self) -> Tick:
@@ -170,7 +170,7 @@ class Cycle:
         if sync_ns is not None:
             skipped = max(0, round((sync_ns - last_ns) / self._period_ns) - 1)
             missing = self._gather(sync_ns + self._deadline_ns)
-        self._due_ns = sync_ns or last_ns
+        self._due_ns = sync_ns or last_ns + self._period_ns
         for axis, watch in zip(self.axes, self.watches, strict=True):
             watch.cycle(complete=axis.fresh)
         return Tick(sync_ns or timebase.now_ns(), 0, skipped, skipped, missing == 0)
@@ -201,6 +201,11 @@ class Cycle:
         self._drain()
         self._owed.clear()
 
+    def led_by_another(self) -> bool:
+        """Whether another master has been heard, the frames that have come by now included."""
+        self._drain()
+        return self.stranger is not None
+
     def send(self, controlwords: Sequence[int | None]) -> bool:
         """Send the RPDOs of all drives; they act at the next SYNC. False: the bus failed.
 
@@ -224,8 +229,10 @@ class Cycle:
     def send_rest(self) -> bool:
         """What has to go out now and then: heartbeat, polls. False: the bus failed."""
         try:
-            if self._count % self._beat_cycles == 0:
+            # By the grid, not by the cycle: silent ticks must not stretch what drives wait for.
+            if self._due_ns >= self._beat_due_ns:
                 self._port.send_frame(self._beat)
+                self._beat_due_ns = self._due_ns + self._beat_ns
             for place, poll in enumerate(self.polls):
                 frame = poll.due(self._count + place)
                 if frame is not None:
@@ -298,6 +305,8 @@ class Cycle:
                     self.other(message)
         except BusError as error:
             self._failed(error)
+            # What is still unread may be an answer to an earlier SYNC.
+            self._owed.update(self._tpdos)
 
     def _failed(self, error: BusError) -> None:
         self.bus_error = error

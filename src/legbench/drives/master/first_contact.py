@@ -20,10 +20,12 @@ def first_contact(port: Port, config: BusConfig) -> Iterator[None]:
         yield
     except (BusError, NoAnswerError) as error:
         if port.error_frames or port.off_bus:
+            who = f"{error}; " if isinstance(error, NoAnswerError) else ""
+            where = f"{who}{port.bus.channel_info}"
             off = ", the controller has gone bus-off" if port.off_bus else ""
             raise BusError(
-                f"{port.bus.channel_info}: {port.error_frames} error frames and no answer{off}; "
-                f"another bitrate than the drives', or a fault of the wiring: {config.bitrate_text}"
+                f"{where}: {port.error_frames} error frames and no answer{off}; another bitrate "
+                f"than the drives', or a fault of the wiring: {config.bitrate_text}"
             ) from error
         if isinstance(error, NoAnswerError):
             raise NoAnswerError(f"{error}; {config.bitrate_text}") from error

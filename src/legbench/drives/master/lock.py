@@ -32,6 +32,7 @@ class ChannelLock:
         safe = re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("-") or "bus"
         self._name = name
         self._path = (folder or _folder()) / f"legbench-{safe}.lock"
+        self._private = False
         self._fd: int | None = None
         self._depth = 0
 
@@ -41,12 +42,21 @@ class ChannelLock:
     ) -> "ChannelLock":
         """The lock of a channel before its interface is opened: opening may already disturb it.
 
-        A path is followed to the device behind it, so that no second name gets past the lock.
+        A path is followed to the device behind it, and the speed of a line left out (`PATH@BAUD`),
+        so that no second name gets past the lock. An address, such as a URL, is no path.
         """
         where = channel or "default"
-        if "/" in where or (interface in BY_FILE and os.path.exists(where)):
-            where = os.path.realpath(where)
+        path = where if os.path.exists(where) else where.partition("@")[0]
+        if ("/" in path or interface in BY_FILE) and os.path.exists(path):
+            where = os.path.realpath(path)
         return cls(f"{interface or 'default'} {where}", folder)
+
+    @classmethod
+    def private(cls, name: str) -> "ChannelLock":
+        """A lock for a channel that no other process can reach; leaves no file."""
+        lock = cls(name)
+        lock._private = True
+        return lock
 
     def acquire(self) -> None:
         """Take the lock, once more if it is held here already.
@@ -59,6 +69,8 @@ class ChannelLock:
         self._depth += 1
 
     def _take(self) -> int:
+        if self._private:
+            return os.memfd_create("legbench")
         try:
             fd = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
         except OSError as error:

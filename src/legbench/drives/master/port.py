@@ -14,7 +14,7 @@ from legbench.drives.timebase import Timebase
 from legbench.errors import LegbenchError
 
 Listener = Callable[[can.Message], None]
-"""Sees every frame that is sent or received, in order."""
+"""Sees every frame that is sent or received, in order; one that is sent is used again."""
 OLDEST_S = 10.0
 """A frame that was waiting for longer was stamped by another clock."""
 HINT = "look at `ip -details link show`, at the txqueuelen and at the wiring"
