@@ -14,7 +14,7 @@ from legbench.mjcf import BuildOptions, build_spec, to_xml
 from legbench.recording.layout import COLUMNS, TIME
 from legbench.recording.manifest import new_manifest, write_manifest
 from legbench.recording.reader import Recording
-from legbench.recording.stream import encode_batch, encode_schema, schema_for
+from legbench.recording.stream import BatchEncoder, encode_schema, schema_for
 from legbench.signals import SIGNALS, Floats, Phase
 
 PROTOTYPE = LegDesign(
@@ -171,4 +171,7 @@ def stream_of(recording: Recording, batch: int = 50) -> list[bytes]:
     table[contact] = np.where(table[contact] < 0.0, np.nan, table[contact])
     firsts = range(0, len(recording.time), batch)
     parts = [np.ascontiguousarray(table[:, first : first + batch]) for first in firsts]
-    return [bytes(encode_schema(schema)), *(bytes(encode_batch(part, schema)) for part in parts)]
+    return [
+        bytes(encode_schema(schema)),
+        *(bytes(BatchEncoder(part, schema).encode(part)) for part in parts),
+    ]

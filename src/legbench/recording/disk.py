@@ -12,7 +12,7 @@ import pyarrow as pa
 from legbench.recording.files import Appender
 from legbench.recording.layout import TIME
 from legbench.recording.rows import BATCH_ROWS, PLACES, Block
-from legbench.recording.stream import END_MARK, encode_batch, encode_schema
+from legbench.recording.stream import END_MARK, BatchEncoder, encode_schema
 
 POOL: Final = 20
 """Blocks made beforehand: a disk that stalls for a second costs the loop no allocation."""
@@ -48,7 +48,9 @@ class Disk:
         self._handed = self._returned = 0
         self._ended = False
         self._synced = time.monotonic()
-        encode_batch(np.zeros((len(PLACES), 1)), schema)  # the first call is slow: not in the loop
+        # The first call is slow: not in the loop.
+        self._encoder = BatchEncoder(np.zeros((len(PLACES), BATCH_ROWS)), schema)
+        self._encoder.encode(np.zeros((len(PLACES), BATCH_ROWS)))
         samples.append(encode_schema(schema))
         self._thread = threading.Thread(target=self._work, name="recording", daemon=True)
         self._thread.start()
@@ -101,7 +103,10 @@ class Disk:
         self._ended = True
 
     def _write(self, block: Block) -> None:
-        self._samples.append(encode_batch(block.columns(), self._schema))
+        columns = block.columns()
+        if not self._encoder.fits(columns):
+            self._encoder = BatchEncoder(columns, self._schema)
+        self._samples.append(self._encoder.encode(columns))
         times = block.values[: block.count, PLACES[TIME]]
         if self.rows == 0:
             self.first = float(times[0])

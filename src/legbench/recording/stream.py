@@ -17,6 +17,10 @@ from legbench.recording.layout import COLUMNS, INT8_COLUMNS, RUN, TIME
 from legbench.recording.manifest import Manifest, parse_manifest, to_json
 from legbench.signals import Floats
 
+INT8S: Final = [1 + COLUMNS.index(name) for name in INT8_COLUMNS]
+FLOAT_COLUMNS: Final = [name for name in COLUMNS if name not in INT8_COLUMNS]
+FLOATS: Final = [1 + COLUMNS.index(name) for name in FLOAT_COLUMNS]
+"""Places of the columns in a batch, after time."""
 END_MARK: Final = b"\xff\xff\xff\xff\x00\x00\x00\x00"
 MANIFEST_KEY: Final = b"legbench"
 """Key of the schema's metadata under which the samples carry their manifest."""
@@ -49,25 +53,42 @@ def encode_schema(schema: pa.Schema) -> memoryview:
     return memoryview(schema.serialize())
 
 
-def encode_batch(columns: Floats, schema: pa.Schema) -> memoryview:
-    """Return the message of one batch.
+@final
+class BatchEncoder:
+    """Makes messages of batches that are alike: as many rows, nulls in the same places.
 
-    Built from buffers, since `pa.array` looks for pandas first.
-
-    Args:
-        columns: (1 + len(COLUMNS), rows), contiguous, time first in seconds; NaN is null in
-            an int8 column.
-        schema: as `schema_for` returns it.
+    A batch of Arrow's is built once, over memory that is filled anew for each message. Built from
+    buffers, since `pa.array` looks for pandas first.
     """
-    arrays = [_array(pa.int64(), np.rint(columns[0] * 1e9).astype(np.int64))]
-    for name, values in zip(COLUMNS, columns[1:], strict=True):
-        if name in INT8_COLUMNS:
-            known = ~np.isnan(values)
-            small = np.where(known, values, -1.0).astype(np.int8)
-            arrays.append(_array(pa.int8(), small, None if known.all() else known))
-        else:
-            arrays.append(_array(pa.float64(), values))
-    return memoryview(pa.RecordBatch.from_arrays(arrays, schema=schema).serialize())
+
+    def __init__(self, like: Floats, schema: pa.Schema) -> None:
+        """Prepare for columns like these, with a schema as `schema_for` returns it.
+
+        Columns are (1 + len(COLUMNS), rows), time first in seconds; NaN is null in an int8 column.
+        """
+        self._time = np.empty(like.shape[1], dtype=np.int64)
+        self._floats, self._known = np.empty_like(like[FLOATS]), ~np.isnan(like[INT8S])
+        self._small = np.empty(self._known.shape, dtype=np.int8)
+        arrays = {TIME: _array(pa.int64(), self._time)}
+        for name, place in zip(FLOAT_COLUMNS, self._floats, strict=True):
+            arrays[name] = _array(pa.float64(), place)
+        for name, place, known in zip(INT8_COLUMNS, self._small, self._known, strict=True):
+            arrays[name] = _array(pa.int8(), place, None if known.all() else known)
+        ordered = [arrays[name] for name in schema.names]
+        self._batch = pa.RecordBatch.from_arrays(ordered, schema=schema)
+
+    def fits(self, columns: Floats) -> bool:
+        """Whether columns are like those that it was prepared for."""
+        return columns.shape[1] == len(self._time) and np.array_equal(
+            ~np.isnan(columns[INT8S]), self._known
+        )
+
+    def encode(self, columns: Floats) -> memoryview:
+        """Return the message of a batch that fits."""
+        np.rint(columns[0] * 1e9, out=self._time, casting="unsafe")
+        self._floats[:] = columns[FLOATS]
+        np.copyto(self._small, np.where(self._known, columns[INT8S], -1.0), casting="unsafe")
+        return memoryview(self._batch.serialize())
 
 
 def _array(kind: pa.DataType, values: np.ndarray, known: np.ndarray | None = None) -> pa.Array:
