@@ -190,3 +190,26 @@ def test_what_could_not_be_read_before_sync_never_counts(
         it.link.exchange()
         assert it.link.cycle.late_frames == 1
         assert it.link.cycle.axes[1].motor_counts != old
+
+
+def test_a_flood_holds_up_no_stop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Frames of somebody else that never end, each read in 0.1 ms."""
+    with rig(tmp_path) as it:
+        it.link.start()
+        it.run(5)
+        time, asked = it.bus.timebase, 0
+
+        def recv(timeout: float | None = None) -> can.Message | None:
+            nonlocal asked
+            asked += 1
+            assert asked < 1000
+            time.wait_until(time.now_ns() + MS // 10)
+            return can.Message(arbitration_id=0x7A0, is_extended_id=False)
+
+        with monkeypatch.context() as flooded:
+            flooded.setattr(it.bus, "recv", recv)
+            with pytest.raises(PlantFault) as caught:
+                it.run(20)
+        assert caught.value.cause in ("bus error", "process data lost", "cycle overruns")
+        it.link.close()
+        assert DriveState.OPERATION_ENABLED not in it.states

@@ -295,9 +295,20 @@ class Cycle:
         return missing
 
     def _drain(self) -> None:
-        """Before SYNC: what has come by now is late or a copy, and must not pass for new."""
+        """Before SYNC: what has come by now is late or a copy, and must not pass for new.
+
+        Frames that come as fast as they are read hold up no stop: after a period the tick goes on
+        with a bus that has failed.
+        """
+        timebase = self._port.timebase
+        until_ns = timebase.now_ns() + self._period_ns
         try:
             while (message := self._port.take()) is not None:
+                if timebase.now_ns() > until_ns:
+                    raise BusError(
+                        f"frames come faster than they are read, for {1e-6 * self._period_ns:g} ms "
+                        "now: look for a node or a program that babbles"
+                    )
                 if message.arbitration_id in self._tpdos and not message.is_error_frame:
                     self.late_frames += 1
                     self._owed.discard(message.arbitration_id)
