@@ -33,6 +33,12 @@ def test_an_interface_that_is_down_is_named_with_the_way_out(tmp_path: Path) -> 
         check_interface(config(), "can0", interface(tmp_path, DOWN), lambda _: described(None))
 
 
+def test_a_virtual_one_is_brought_up_without_a_bitrate(tmp_path: Path) -> None:
+    text = json.dumps([{"ifname": "can0", "linkinfo": {"info_kind": "vcan"}}])
+    with pytest.raises(BusError, match=r"can0 is down; bring it up: `ip link set can0 up`$"):
+        check_interface(config(), "can0", interface(tmp_path, DOWN), lambda _: text)
+
+
 def test_an_interface_at_another_bitrate_is_named_with_both(tmp_path: Path) -> None:
     system = interface(tmp_path, UP)
     check_interface(config(), "can0", system, lambda _: described(1_000_000))

@@ -34,6 +34,14 @@ def bitrate_of(details: str) -> int | None:
         return None
 
 
+def has_wire(details: str) -> bool:
+    """Whether an interface has a bitrate to be set; so it has as long as `ip` tells nothing."""
+    try:
+        return json.loads(details)[0]["linkinfo"]["info_kind"] == "can"
+    except (ValueError, LookupError, TypeError):
+        return True
+
+
 def check_interface(
     config: BusConfig, channel: str, system: Path = SYSTEM, details: Details = ask_ip
 ) -> None:
@@ -46,10 +54,12 @@ def check_interface(
         flags = int((system / channel / "flags").read_text(encoding="ascii"), 16)
     except (OSError, ValueError):
         return
-    up = f"`ip link set {channel} up type can bitrate {config.bitrate} restart-ms 100`"
+    told = details(channel)
+    wire = f" type can bitrate {config.bitrate} restart-ms 100" if has_wire(told) else ""
+    up = f"`ip link set {channel} up{wire}`"
     if not flags & IFF_UP:
         raise BusError(f"{channel} is down; bring it up: {up}")
-    there = bitrate_of(details(channel))
+    there = bitrate_of(told)
     if there not in (None, config.bitrate):
         raise BusError(
             f"{channel} runs at {there} bit/s, but {config.bitrate_text}; correct the bus file if "
