@@ -4,11 +4,11 @@ import errno
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from types import TracebackType
-from typing import Self, final
+from typing import final
 
 import can
 
+from legbench.closing import Closing
 from legbench.drives.codec.frame import Frame
 from legbench.drives.emulated.network import Network
 from legbench.drives.errors import BusError
@@ -16,7 +16,7 @@ from legbench.drives.pacer import Pacer
 
 
 @final
-class BusServer:
+class BusServer(Closing):
     """Stands between an emulated network, with the times of its wire, and a bus."""
 
     def __init__(
@@ -86,14 +86,3 @@ class BusServer:
     def close(self) -> None:
         """Unplug; may be called twice."""
         self._bus.shutdown()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()

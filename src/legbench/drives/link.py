@@ -14,11 +14,11 @@ Whatever goes wrong, all drives are told to stop in the same cycle and the first
 import math
 from collections.abc import Sequence
 from enum import Enum, auto
-from types import TracebackType
-from typing import Self, final
+from typing import final
 
 import can
 
+from legbench.closing import Closing
 from legbench.drives.cia402 import Goal
 from legbench.drives.codec.nmt import NmtState
 from legbench.drives.config import BusConfig, check_start_speed
@@ -58,7 +58,7 @@ class LinkState(Enum):
 
 
 @final
-class Link:
+class Link(Closing):
     """One master, its bus and its drives.
 
     Attributes:
@@ -411,14 +411,3 @@ class Link:
             finally:
                 self._let_go()
                 self.state = LinkState.STOPPED
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()

@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import Self, final
+from typing import final
 
 import can
 
+from legbench.closing import Closing
 from legbench.drives.bus import LockstepBus
 from legbench.drives.config import BusConfig
 from legbench.drives.limits import SafetyLimits
@@ -21,7 +21,7 @@ from legbench.drives.timebase import SystemTime, Timebase
 
 
 @final
-class Session:
+class Session(Closing):
     """Owns a bus; links, ports and logs on it end with it.
 
     Attributes:
@@ -127,14 +127,3 @@ class Session:
             return
         finally:
             self._lock.release()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()

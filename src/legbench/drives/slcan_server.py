@@ -7,9 +7,9 @@ import tty
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from types import TracebackType
-from typing import Self, final
+from typing import final
 
+from legbench.closing import Closing
 from legbench.drives.codec.slcan import OK, REFUSED
 from legbench.drives.emulated.network import Network
 from legbench.drives.emulated.slcan import SlcanAdapter
@@ -25,7 +25,7 @@ def _say_nothing(_text: str) -> None:
 
 
 @final
-class SlcanServer:
+class SlcanServer(Closing):
     """One emulated bus behind one adapter; python-can's `slcan` opens `path`.
 
     Attributes:
@@ -126,14 +126,3 @@ class SlcanServer:
         if self._link is not None and self._link.is_symlink():
             self._link.unlink()
             self._link = None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()

@@ -7,9 +7,9 @@ import stat
 import time
 from collections.abc import Callable
 from pathlib import Path
-from types import TracebackType
-from typing import Self, final
+from typing import final
 
+from legbench.closing import Closing
 from legbench.drives.emulated.network import Network, Station
 from legbench.drives.errors import BusError
 from legbench.drives.pacer import Pacer
@@ -17,7 +17,7 @@ from legbench.drives.unix_bus import PACKET, opened_at, pack_frame, unpack_frame
 
 
 @final
-class UnixServer:
+class UnixServer(Closing):
     """One emulated bus behind a socket file, any number of masters and listeners on it."""
 
     def __init__(
@@ -113,14 +113,3 @@ class UnixServer:
             self._listener.close()
             if self.path.exists():
                 os.unlink(self.path)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()

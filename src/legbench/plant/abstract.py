@@ -9,14 +9,13 @@
 first seen in `observation_{k+1}`. Time comes from the plant, waiting from the loop.
 """
 
-from abc import ABC, abstractmethod
-from types import TracebackType
-from typing import Self
+from abc import abstractmethod
 
+from legbench.closing import Closing
 from legbench.signals import Command, Observation
 
 
-class AbstractPlant(ABC):
+class AbstractPlant(Closing):
     """One leg, or a batch of legs in step, at a fixed control period."""
 
     period: float
@@ -37,14 +36,3 @@ class AbstractPlant(ABC):
     @abstractmethod
     def close(self) -> None:
         """Leave everything safe; may be called twice, never raises."""
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()

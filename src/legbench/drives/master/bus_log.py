@@ -1,11 +1,11 @@
 """Raw frames in candump's log format, written beside the telemetry."""
 
 from pathlib import Path
-from types import TracebackType
-from typing import Self, final
+from typing import final
 
 import can
 
+from legbench.closing import Closing
 from legbench.drives.errors import BusError
 
 FLUSH_FRAMES = 500
@@ -13,7 +13,7 @@ FLUSH_FRAMES = 500
 
 
 @final
-class BusLog:
+class BusLog(Closing):
     """A listener for `Port` that appends lines such as `(0.001055) can0 080#`.
 
     `canplayer`, `cansniffer` and python-can's `CanutilsLogReader` read it. A disk that fails ends
@@ -64,14 +64,3 @@ class BusLog:
             self._file.close()
         except OSError as error:
             self.error = self.error or error.strerror
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
