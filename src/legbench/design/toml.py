@@ -157,7 +157,10 @@ def load_design(path: Path) -> LegDesign:
         DesignError: the file is missing, is not TOML, or describes no leg; the message starts
             with the path.
     """
-    hint = "no such design file; the paper's are models/optimal.toml and models/prototype.toml"
+    hint = (
+        "no such design file; the paper's are models/optimal.toml, models/table2.toml and "
+        "models/prototype.toml"
+    )
     return load_tables(path, design_from_mapping, hint)
 
 

@@ -27,7 +27,7 @@ HANGING_BEND = 0.6
 class AnalyticPlant(AbstractPlant):
     """The leg of a design under eqs. (1) and (12), commands sampled and held at 1 kHz.
 
-    Joint stops are elastic (`legbench.analytic.stops`), the foot neither slides nor bounces, and
+    Joint stops are those of `legbench.analytic.stops`, the foot neither slides nor bounces, and
     the bars have no mass unless `bars` says so. The contact force is that of the instant; contact
     is told also for a touch that began and ended within the cycle.
 
