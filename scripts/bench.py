@@ -31,7 +31,7 @@ from legbench.plant.start import Start
 from legbench.recording.reader import load
 from legbench.recording.writer import RunWriter
 from legbench.signals import Floats
-from legbench.viz.rrd import write_rrd
+from legbench.viz.live.rrd import write_rrd
 
 MODELS = Path(__file__).parent.parent / "models"
 PAIRS = 5

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from legbench.commissioning.fault_trial import TRIALS, Result, try_fault
 from legbench.design import load_design
-from legbench.viz.live import LiveView, start_live
+from legbench.viz.live.launch import LiveView, start_live
 
 ROOT = Path(__file__).parents[1]
 EXIT = {"complete": 0, "interrupted": 0, "fault": 1}

@@ -11,7 +11,7 @@ from legbench.commissioning.fault_trial import TRIALS, Trial, try_fault
 from legbench.design import load_design
 from legbench.plants import BUS_LOG
 from legbench.recording.reader import load
-from legbench.viz.live import LiveView, start_live
+from legbench.viz.live.launch import LiveView, start_live
 
 WITHIN = 85
 """Cycles from any fault to the reaction; a lost heartbeat takes three times 20 ms and a little."""

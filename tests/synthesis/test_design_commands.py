@@ -7,7 +7,7 @@ import pytest
 from legbench.cli import main
 from legbench.design import load_design
 from legbench.design.scaling import quadruped
-from legbench.synthesis.drawing import PAGE
+from legbench.viz.print.designs import PAGE
 
 MODELS = Path(__file__).parents[2] / "models"
 PROTOTYPE = str(MODELS / "prototype.toml")

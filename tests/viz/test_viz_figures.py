@@ -12,7 +12,7 @@ from legbench.metrics.periods import find_periods
 from legbench.metrics.phases import find_gait
 from legbench.recording.reader import Recording
 from legbench.viz import style
-from legbench.viz.figures import phase_figure, save_figure
+from legbench.viz.print.figures import phase_figure, save_figure
 
 
 def collection(figure: Figure, panel: int) -> LineCollection:

@@ -14,9 +14,9 @@ from legbench.errors import MissingExtraError
 from legbench.recording.layout import STREAM
 from legbench.recording.reader import Recording
 from legbench.recording.stream import END_MARK
-from legbench.viz import viewer
-from legbench.viz.live import LiveView, start_live
-from legbench.viz.watch import LOG
+from legbench.viz.live import viewer
+from legbench.viz.live.launch import LiveView, start_live
+from legbench.viz.live.watch import LOG
 
 DEADLINE = 30.0
 """After which a process that does not get anywhere fails its test [s]."""
@@ -112,7 +112,7 @@ def test_a_view_outlives_no_run(run: tuple[Path, list[bytes]]) -> None:
     folder, messages = run
     append(folder, messages[:4])
     program = (
-        "import sys, pathlib; from legbench.viz.live import start_live;"
+        "import sys, pathlib; from legbench.viz.live.launch import start_live;"
         "folder = pathlib.Path(sys.argv[1]);"
         "print(start_live(folder, save=folder / 'live.rrd').pid, flush=True);"
         "import os; os._exit(1)"
@@ -179,10 +179,10 @@ def test_what_the_control_process_imports_is_light(module: str) -> None:
 @pytest.mark.parametrize(
     ("missing", "module", "extra"),
     [
-        ("rerun", "rrd", "viz"),
-        ("matplotlib", "figures", "viz"),
-        ("imageio", "render", "render"),
-        ("OpenGL", "offscreen", "render"),
+        ("rerun", "live.rrd", "viz"),
+        ("matplotlib", "print.figures", "viz"),
+        ("imageio", "film.render", "render"),
+        ("OpenGL", "film.offscreen", "render"),
     ],
 )
 def test_a_missing_package_names_the_extra(missing: str, module: str, extra: str) -> None:
@@ -202,7 +202,7 @@ def test_a_missing_package_names_the_extra(missing: str, module: str, extra: str
 
 def test_a_viewer_that_takes_no_data_is_given_up(tmp_path: Path) -> None:
     program = (
-        "import sys, threading, legbench.viz.watch as watch\n"
+        "import sys, threading, legbench.viz.live.watch as watch\n"
         "watch.PATIENCE = 0.2\n"
         "watch.follow = lambda *arguments: threading.Event().wait()\n"
         "watch.main([sys.argv[1], '--save', sys.argv[1] + '/live.rrd'])\n"

@@ -14,10 +14,10 @@ from legbench.kinematics import joint_to_polar, leg_points
 from legbench.metrics.compare import differences
 from legbench.metrics.phases import find_gait
 from legbench.recording.reader import Recording
-from legbench.viz.axes import HEIGHT, WIDTH
-from legbench.viz.figures import phase_figure, save_figure
-from legbench.viz.overlay import DECADES, LEAST, look_of
-from legbench.viz.rrd import write_rrd
+from legbench.viz.live.axes import HEIGHT, WIDTH
+from legbench.viz.live.rrd import write_rrd
+from legbench.viz.print.figures import phase_figure, save_figure
+from legbench.viz.print.overlay import DECADES, LEAST, look_of
 
 Entities = dict[str, dict[str, Any]]
 

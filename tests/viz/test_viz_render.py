@@ -13,15 +13,15 @@ from legbench.errors import ConfigError, MissingExtraError, RecordingError
 from legbench.kinematics import leg_points
 from legbench.mjcf import BuildOptions, build_spec, to_xml
 from legbench.recording.reader import Recording
-from legbench.viz.offscreen import OffScreen, backend
+from legbench.viz.film.offscreen import OffScreen, backend
+from legbench.viz.film.render import FRAME, STILL, STILLS, VIDEO, render
 from legbench.viz.pose import Puppet
-from legbench.viz.render import FRAME, STILL, STILLS, VIDEO, render
 
 
 def gl_works() -> bool:
     """Whether this machine can draw without a display; tried in a process that may crash."""
     program = (
-        "import mujoco, legbench.viz.offscreen as o;"
+        "import mujoco, legbench.viz.film.offscreen as o;"
         "m = mujoco.MjModel.from_xml_string('<mujoco/>');"
         "o.OffScreen(m, 8, 8).__exit__(None, None, None)"
     )
@@ -148,7 +148,7 @@ def test_the_backend_is_what_the_machine_has(monkeypatch: pytest.MonkeyPatch) ->
     for found, expected in (({"EGL", "OSMesa"}, "egl"), ({"OSMesa"}, "osmesa")):
         libraries = frozenset(found)
         monkeypatch.setattr(
-            "legbench.viz.offscreen.find_library",
+            "legbench.viz.film.offscreen.find_library",
             lambda name, known=libraries: name if name in known else None,
         )
         assert backend() == expected

@@ -16,10 +16,10 @@ from legbench.metrics.ratings import rate_run
 from legbench.metrics.source import terms_of
 from legbench.recording.reader import Recording
 from legbench.signals import Phase
-from legbench.viz.axes import HEIGHT, WIDTH
 from legbench.viz.facts import facts_of
-from legbench.viz.publish import APPLICATION, Publisher
-from legbench.viz.rrd import write_rrd
+from legbench.viz.live.axes import HEIGHT, WIDTH
+from legbench.viz.live.publish import APPLICATION, Publisher
+from legbench.viz.live.rrd import write_rrd
 
 Entities = dict[str, dict[str, Any]]
 

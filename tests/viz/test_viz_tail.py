@@ -11,9 +11,9 @@ from legbench.recording.archive import write_archive
 from legbench.recording.layout import STREAM
 from legbench.recording.reader import Recording
 from legbench.recording.stream import END_MARK, WholeBatches
-from legbench.viz.follow import CLOSING_LOOKS, Pace, follow
-from legbench.viz.publish import APPLICATION
-from legbench.viz.tail import Tail, rows_of
+from legbench.viz.live.follow import CLOSING_LOOKS, Pace, follow
+from legbench.viz.live.publish import APPLICATION
+from legbench.viz.live.tail import Tail, rows_of
 
 
 @pytest.mark.parametrize("chunk", [1 << 20, 40_000, 777])

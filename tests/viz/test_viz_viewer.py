@@ -9,8 +9,8 @@ import pytest
 from rerun.experimental import ViewerClient
 
 from legbench.recording.reader import Recording
-from legbench.viz import viewer
-from legbench.viz.rrd import write_rrd
+from legbench.viz.live import viewer
+from legbench.viz.live.rrd import write_rrd
 
 ICDS = [*Path("/usr/share/vulkan/icd.d").glob("*.json"), *Path("/etc/vulkan/icd.d").glob("*.json")]
 DEADLINE = 30.0

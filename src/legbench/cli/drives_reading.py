@@ -137,7 +137,7 @@ class Jitter:
             timing = measure(session, bench.leg().stiffness, self.cycles)
         table = timing.table()
         if self.plot is not None:
-            from legbench.viz.timing import draw_timing
+            from legbench.viz.print.timing import draw_timing
 
             draw_timing(timing.late_us, timing.exchange_us, self.plot)
             note(f"wrote {self.plot}")

@@ -251,7 +251,7 @@ def _point(point: FixedPoint) -> dict[str, Any]:
 
 
 def _plot_return(out: Path, design: LegDesign, apexes: list[Apex], point: FixedPoint) -> None:
-    from legbench.cli.mode_plots import plot_return
+    from legbench.viz.print.modes import plot_return
 
     heights = np.array([apex.height for apex in apexes])
     pairs = np.stack([heights[:-1], heights[1:]], axis=-1)
@@ -261,7 +261,7 @@ def _plot_return(out: Path, design: LegDesign, apexes: list[Apex], point: FixedP
 
 
 def _basin(flags: HopArguments, design: LegDesign, point: FixedPoint, out: Path) -> Ints:
-    from legbench.cli.mode_plots import plot_basin
+    from legbench.viz.print.modes import plot_basin
 
     def axis(name: str, span: float) -> Axis:
         middle = getattr(point.apex, name, 0.0)

@@ -44,7 +44,7 @@ def main(arguments: list[str]) -> int:
         _write(chosen.out, xml)
         note(f"wrote {chosen.out}")
     if chosen.view:
-        from legbench.viz.mujoco_viewer import view_model
+        from legbench.viz.live.mujoco_viewer import view_model
 
         view_model(xml)
     if chosen.json:

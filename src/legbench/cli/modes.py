@@ -147,7 +147,7 @@ def _line(found: BrakeOrbit) -> None:
 
 
 def _write(out: Path, content: dict[str, Any], scene: Scene, families: list[Family]) -> None:
-    from legbench.cli.mode_plots import plot_modes
+    from legbench.viz.print.modes import plot_modes
 
     try:
         out.mkdir(parents=True, exist_ok=True)

@@ -29,7 +29,7 @@ def main(arguments: list[str]) -> int:
     """Render."""
     chosen = parse(RenderArguments, "render", arguments)
     recording = load(chosen.run)
-    from legbench.viz.render import render
+    from legbench.viz.film.render import render
 
     written = render(recording, chosen.out, time=chosen.time, progress=progress)
     if chosen.json:

@@ -44,7 +44,7 @@ def main(arguments: list[str]) -> int:
     summary = summarise(recording)
     comparisons = [_compared(recording, other) for other in others]
     if chosen.figure is not None:
-        from legbench.viz.figures import phase_figure, save_figure
+        from legbench.viz.print.figures import phase_figure, save_figure
 
         note(f"wrote {save_figure(phase_figure(recording, others), chosen.figure)}")
     if chosen.json:
@@ -78,8 +78,8 @@ def _compared(recording: Recording, other: Recording) -> Comparison:
 
 def show(recording: Recording, others: list[Recording], chosen: ReplayArguments) -> None:
     """Write the rerun file, and open it where that was asked for."""
-    from legbench.viz.rrd import write_rrd
-    from legbench.viz.viewer import open_viewer
+    from legbench.viz.live.rrd import write_rrd
+    from legbench.viz.live.viewer import open_viewer
 
     rrd = write_rrd(recording, chosen.rrd or recording.path / "view.rrd", others)
     note(f"wrote {rrd}")

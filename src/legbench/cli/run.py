@@ -25,7 +25,7 @@ from legbench.recording.reader import load
 from legbench.servo import ServoConfig
 
 if TYPE_CHECKING:
-    from legbench.viz.live import LiveView
+    from legbench.viz.live.launch import LiveView
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -141,7 +141,7 @@ class Watching:
 
     def start(self, run: Path) -> None:
         """Open the view; a machine that has none gets a note, the run goes on."""
-        from legbench.viz.live import start_live
+        from legbench.viz.live.launch import start_live
 
         try:
             self.view = start_live(run, serve=self.serve)

@@ -1,1 +1,1 @@
-"""From a recording to pictures: rerun, print figures, rendered video. Reads recordings only."""
+"""From a recording to pictures; what the viewer, print and film share lies here."""

@@ -11,8 +11,8 @@ from legbench.metrics.source import terms_of
 from legbench.recording.reader import Recording
 from legbench.signals import Floats
 from legbench.viz import style
-from legbench.viz._matplotlib import Axes
 from legbench.viz.colouring import colouring_of
+from legbench.viz.print._matplotlib import Axes
 
 Dashes = tuple[float, tuple[float, ...]]
 

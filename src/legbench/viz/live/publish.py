@@ -9,16 +9,16 @@ from typing import final
 
 from legbench.metrics.source import Recorded
 from legbench.metrics.summary import Summary
-from legbench.viz._rerun import rr
-from legbench.viz.blueprint import blueprint
 from legbench.viz.facts import Facts, as_markdown
-from legbench.viz.ghost import Ghost, Other
-from legbench.viz.leg2d import Leg2D, hip_of, leg_room
-from legbench.viz.plots import Plots
-from legbench.viz.rating import Rating
-from legbench.viz.scene import Scene
-from legbench.viz.series import Series
-from legbench.viz.states import States
+from legbench.viz.live._rerun import rr
+from legbench.viz.live.blueprint import blueprint
+from legbench.viz.live.ghost import Ghost, Other
+from legbench.viz.live.leg2d import Leg2D, hip_of, leg_room
+from legbench.viz.live.plots import Plots
+from legbench.viz.live.rating import Rating
+from legbench.viz.live.scene import Scene
+from legbench.viz.live.series import Series
+from legbench.viz.live.states import States
 from legbench.viz.trace import Tracer
 
 APPLICATION = "legbench"

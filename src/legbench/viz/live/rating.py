@@ -12,8 +12,8 @@ from legbench.metrics.rows import runs_of
 from legbench.metrics.stance import STANCE
 from legbench.signals import Floats
 from legbench.viz import style
-from legbench.viz._rerun import rr
 from legbench.viz.facts import Facts
+from legbench.viz.live._rerun import rr
 from legbench.viz.trace import Trace
 
 SHORTEST = 15

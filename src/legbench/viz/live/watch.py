@@ -1,4 +1,4 @@
-"""The program behind a live view: `python -m legbench.viz.watch RUN`.
+"""The program behind a live view: `python -m legbench.viz.live.watch RUN`.
 
 It follows the samples of one run and publishes them, at low priority. Should the viewer stop
 taking data, which blocks whoever sends them, a watchdog ends the program.
@@ -18,10 +18,10 @@ from pathlib import Path
 from typing import IO, final
 
 from legbench.errors import LegbenchError, MissingExtraError
-from legbench.viz import viewer
-from legbench.viz._rerun import rr
-from legbench.viz.follow import Pace, follow
-from legbench.viz.publish import APPLICATION
+from legbench.viz.live import viewer
+from legbench.viz.live._rerun import rr
+from legbench.viz.live.follow import Pace, follow
+from legbench.viz.live.publish import APPLICATION
 
 LOOK_PERIOD = 0.05
 """Between two looks at the run [s]: the writer hands over 50 rows at a time."""
@@ -143,7 +143,7 @@ def _step_back() -> None:
 
 
 def _parse(arguments: Sequence[str] | None) -> Options:
-    parser = argparse.ArgumentParser(prog="python -m legbench.viz.watch", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m legbench.viz.live.watch", description=__doc__)
     parser.add_argument("run", type=Path)
     parser.add_argument("--port", type=int, default=viewer.PORT)
     parser.add_argument("--serve", action="store_true")

@@ -1,6 +1,6 @@
 """Watching a run while it goes on, in a process that the control loop never waits for.
 
-The process runs `legbench.viz.watch`, which reads the run folder and never the loop: frozen or
+The process runs `legbench.viz.live.watch`, which reads the run folder and never the loop: frozen or
 killed, it costs the run nothing. Importing this module does not import rerun.
 """
 
@@ -11,7 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import final
 
-from legbench.viz import viewer
+from legbench.viz.live import viewer
 
 
 @final
@@ -68,7 +68,14 @@ def start_live(
     if save is None:
         way_out = "the run goes on unseen; look at it afterwards, or serve it to a browser"
         viewer.require_viewer(serve=serve, way_out=way_out)
-    command = [sys.executable, "-m", "legbench.viz.watch", str(run_folder), "--port", str(port)]
+    command = [
+        sys.executable,
+        "-m",
+        "legbench.viz.live.watch",
+        str(run_folder),
+        "--port",
+        str(port),
+    ]
     command += ["--parent", str(os.getpid())]
     command += ["--serve"] if serve else []
     command += [] if save is None else ["--save", str(save)]

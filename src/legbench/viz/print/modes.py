@@ -11,7 +11,7 @@ from legbench.modes.brake import Family
 from legbench.modes.flow import orbit
 from legbench.modes.scene import Scene
 from legbench.signals import Floats, Ints
-from legbench.viz._matplotlib import (
+from legbench.viz.print._matplotlib import (
     BoundaryNorm,
     Figure,
     FigureCanvasAgg,

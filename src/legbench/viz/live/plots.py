@@ -6,11 +6,11 @@ import numpy as np
 
 from legbench.signals import Floats
 from legbench.viz import style
-from legbench.viz._rerun import rr
-from legbench.viz.axes import PlotSpec
 from legbench.viz.facts import Facts
+from legbench.viz.live._rerun import rr
+from legbench.viz.live.axes import PlotSpec
+from legbench.viz.live.xyplot import XYPlot
 from legbench.viz.trace import Thinner, Trace
-from legbench.viz.xyplot import XYPlot
 
 FREQ = 200.0
 """Of the trajectories: a period has a hundred points [Hz]."""

@@ -9,19 +9,19 @@ from legbench.errors import ConfigError
 from legbench.recording.reader import Recording
 from legbench.signals import Floats
 from legbench.viz import style
-from legbench.viz._matplotlib import (
+from legbench.viz.colouring import Colouring, colouring_of
+from legbench.viz.drafts import draft_of, require_rows
+from legbench.viz.facts import Facts, facts_of
+from legbench.viz.names import names_of
+from legbench.viz.print._matplotlib import (
     Axes,
     Figure,
     FigureCanvasAgg,
     LineCollection,
     styled,
 )
-from legbench.viz.colouring import Colouring, colouring_of
-from legbench.viz.drafts import draft_of, require_rows
-from legbench.viz.facts import Facts, facts_of
-from legbench.viz.legend import FAINT_COLOUR, explain
-from legbench.viz.names import names_of
-from legbench.viz.overlay import (
+from legbench.viz.print.legend import FAINT_COLOUR, explain
+from legbench.viz.print.overlay import (
     draw_differences,
     draw_other,
     planes_of,

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from legbench.signals import Phase
 from legbench.viz import style
-from legbench.viz._rerun import rr, rrb
 from legbench.viz.facts import Facts
+from legbench.viz.live._rerun import rr, rrb
 from legbench.viz.trace import Trace
 
 FOOT, CONTROLLER = "/states/foot", "/states/controller"

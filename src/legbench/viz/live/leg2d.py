@@ -4,13 +4,12 @@ from typing import final
 
 import numpy as np
 
-from legbench.design.setup import SetupKind
 from legbench.kinematics import direction, leg_points
-from legbench.metrics.source import Recorded
 from legbench.signals import Floats
 from legbench.viz import style
-from legbench.viz._rerun import rr, rrb
 from legbench.viz.facts import Facts
+from legbench.viz.hip import GROUNDED, hip_of
+from legbench.viz.live._rerun import rr, rrb
 from legbench.viz.trace import Thinner, Trace
 
 FREQ = 100.0
@@ -25,17 +24,6 @@ FORCE_MAX = 80.0
 """The arrow grows no more from here on: impacts peak at hundreds of newtons [N]."""
 SEGMENT, BAR, JOINT, TIP = 0.0045, 0.0018, 0.0055, 0.0065
 """Radii [m]."""
-GROUNDED = (SetupKind.JUMP, SetupKind.FFS)
-
-
-def hip_of(rows: Recorded, facts: Facts) -> Floats:
-    """Hip in the plane of motion (n, 2) [m]: as recorded, else as the setup holds it."""
-    hip = rows["trunk_pos"]
-    if np.isfinite(hip).all():
-        return hip
-    if facts.terms.setup in GROUNDED:
-        return -leg_points(rows["joint_pos"], facts.design.lengths)[:, 3]
-    return np.zeros_like(hip)
 
 
 def bar_points(joint: Floats, lengths: tuple[float, float, float], arm: float) -> list[Floats]:

@@ -11,11 +11,11 @@ from legbench.metrics.periods import find_periods
 from legbench.metrics.phases import find_gait
 from legbench.recording.reader import Recording
 from legbench.signals import Ints
-from legbench.viz._imageio import Image as Picture
-from legbench.viz._imageio import PyAVPlugin, iio
 from legbench.viz.drafts import draft_of
-from legbench.viz.film import Film, Size
-from legbench.viz.offscreen import Image
+from legbench.viz.film._imageio import Image as Picture
+from legbench.viz.film._imageio import PyAVPlugin, iio
+from legbench.viz.film.frames import Film, Size
+from legbench.viz.film.offscreen import Image
 
 SUFFIXES = (".mp4", ".gif", ".png")
 VIDEO, ANIMATION = Size(width=800, height=600), Size(width=480, height=360)

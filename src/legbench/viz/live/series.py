@@ -7,7 +7,7 @@ import numpy as np
 
 from legbench.signals import Floats
 from legbench.viz import style
-from legbench.viz._rerun import rr
+from legbench.viz.live._rerun import rr
 from legbench.viz.trace import Trace
 
 COMPONENTS = (style.FIRST, style.SECOND)

@@ -5,9 +5,10 @@ from typing import final
 import mujoco
 import numpy as np
 
-from legbench.viz._rerun import rr, rrb
 from legbench.viz.facts import Facts
-from legbench.viz.leg2d import FREQ, hip_of
+from legbench.viz.hip import hip_of
+from legbench.viz.live._rerun import rr, rrb
+from legbench.viz.live.leg2d import FREQ
 from legbench.viz.pose import Puppet
 from legbench.viz.style import Colours
 from legbench.viz.trace import Thinner, Trace

@@ -7,8 +7,8 @@ import numpy as np
 
 from legbench.signals import Floats
 from legbench.viz import style
-from legbench.viz._rerun import rr, rrb
-from legbench.viz.axes import FAINT, HAIR, HEIGHT, WIDTH, PlotSpec, Span, draw_axes
+from legbench.viz.live._rerun import rr, rrb
+from legbench.viz.live.axes import FAINT, HAIR, HEIGHT, WIDTH, PlotSpec, Span, draw_axes
 
 GROWTH = 0.25
 """Room added when data leave the axes, so that live axes are not redrawn at every slice."""

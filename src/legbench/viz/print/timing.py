@@ -6,7 +6,7 @@ import numpy as np
 
 from legbench.errors import RecordingError
 from legbench.signals import Floats
-from legbench.viz._matplotlib import Figure, FigureCanvasAgg, styled
+from legbench.viz.print._matplotlib import Figure, FigureCanvasAgg, styled
 
 
 def draw_timing(late_us: Floats, exchange_us: Floats, path: Path) -> None:

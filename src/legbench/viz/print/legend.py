@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from legbench.viz import style
-from legbench.viz._matplotlib import (
+from legbench.viz.colouring import Colouring
+from legbench.viz.print._matplotlib import (
     Axes,
     BoundaryNorm,
     Figure,
@@ -13,8 +14,7 @@ from legbench.viz._matplotlib import (
     ListedColormap,
     ScalarMappable,
 )
-from legbench.viz.colouring import Colouring
-from legbench.viz.overlay import look_of
+from legbench.viz.print.overlay import look_of
 
 FAINT_COLOUR = (0.80, 0.80, 0.82)
 HANDLE, ROW = 8, 150

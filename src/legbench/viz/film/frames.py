@@ -13,8 +13,8 @@ from legbench.recording.reader import Recording
 from legbench.signals import Floats, Ints
 from legbench.viz.drafts import require_rows
 from legbench.viz.facts import MODEL, facts_of
-from legbench.viz.leg2d import hip_of
-from legbench.viz.offscreen import Image, OffScreen
+from legbench.viz.film.offscreen import Image, OffScreen
+from legbench.viz.hip import hip_of
 from legbench.viz.pose import Puppet
 
 CAMERA = "side"

@@ -12,10 +12,10 @@ from legbench.metrics.summary import summarise
 from legbench.recording.layout import ARCHIVE, STREAM
 from legbench.recording.manifest import read_manifest
 from legbench.recording.reader import load
-from legbench.viz._rerun import rr
 from legbench.viz.facts import facts_of
-from legbench.viz.publish import Publisher
-from legbench.viz.tail import Tail, rows_of
+from legbench.viz.live._rerun import rr
+from legbench.viz.live.publish import Publisher
+from legbench.viz.live.tail import Tail, rows_of
 
 CLOSING_LOOKS = 40
 """How often to look whether the writer has made its archive, after the last row."""

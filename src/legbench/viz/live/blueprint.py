@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 
-from legbench.viz._rerun import rr, rrb
 from legbench.viz.facts import Facts
-from legbench.viz.leg2d import leg_view
-from legbench.viz.plots import plot_specs
-from legbench.viz.scene import scene_view
-from legbench.viz.states import states_view
-from legbench.viz.xyplot import plot_view
+from legbench.viz.live._rerun import rr, rrb
+from legbench.viz.live.leg2d import leg_view
+from legbench.viz.live.plots import plot_specs
+from legbench.viz.live.scene import scene_view
+from legbench.viz.live.states import states_view
+from legbench.viz.live.xyplot import plot_view
 
 WINDOW = 4.0
 """Time that series show while a run is going on [s]."""

@@ -5,11 +5,11 @@ from pathlib import Path
 
 from legbench.metrics.summary import summarise
 from legbench.recording.reader import Recording
-from legbench.viz._rerun import rr
 from legbench.viz.drafts import draft_of, require_rows
 from legbench.viz.facts import facts_of
-from legbench.viz.ghost import other_of
-from legbench.viz.publish import APPLICATION, Publisher
+from legbench.viz.live._rerun import rr
+from legbench.viz.live.ghost import other_of
+from legbench.viz.live.publish import APPLICATION, Publisher
 
 
 def write_rrd(recording: Recording, path: Path, against: Sequence[Recording] = ()) -> Path:

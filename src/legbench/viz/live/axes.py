@@ -10,7 +10,7 @@ import numpy as np
 
 from legbench.signals import Floats
 from legbench.viz import style
-from legbench.viz._rerun import rr
+from legbench.viz.live._rerun import rr
 from legbench.viz.ticks import tick_labels, ticks
 
 WIDTH = HEIGHT = 4.0

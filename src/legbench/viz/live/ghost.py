@@ -13,10 +13,10 @@ from legbench.metrics.compare import name_of
 from legbench.recording.reader import Recording
 from legbench.signals import Floats
 from legbench.viz import style
-from legbench.viz._rerun import rr
 from legbench.viz.facts import Facts, facts_of
-from legbench.viz.leg2d import FREQ as LEG_FREQ
-from legbench.viz.leg2d import PATH, hip_of
+from legbench.viz.live._rerun import rr
+from legbench.viz.live.leg2d import FREQ as LEG_FREQ
+from legbench.viz.live.leg2d import PATH, hip_of
 from legbench.viz.trace import Thinner, Tracer
 
 COLOURS: tuple[style.Rgb, ...] = ((200, 150, 198), (196, 176, 130), (130, 180, 150))

@@ -1,0 +1,1 @@
+"""Print figures: planes, overlays, modes, hops, designs and timing, drawn with matplotlib."""
