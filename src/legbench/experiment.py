@@ -10,15 +10,10 @@ from typing import Any
 
 from legbench.clock import AbstractClock
 from legbench.control import (
-    AbstractController,
-    BangBang,
-    BangBangConfig,
-    Jump,
-    JumpConfig,
+    ControllerSettings,
     LegTargets,
-    PositionJump,
-    PositionJumpConfig,
     SetpointMeaning,
+    make_controller,
 )
 from legbench.design import LegDesign
 from legbench.design.setup import Setup, SetupKind
@@ -32,13 +27,6 @@ from legbench.plants import Leg, PlantChoice, SimChoice, open_plant
 from legbench.recording.writer import RunWriter
 from legbench.servo import ServoConfig
 
-ControllerConfig = JumpConfig | BangBangConfig | PositionJumpConfig
-USUAL_SETUP = {
-    JumpConfig: SetupKind.JUMP,
-    BangBangConfig: SetupKind.FFS,
-    PositionJumpConfig: SetupKind.FFS,
-}
-"""Where each controller is at home."""
 RECORDED_PACKAGES = ("mujoco-core", "numpy", "scipy", "pyarrow")
 
 
@@ -51,7 +39,7 @@ class Experiment:
     """
 
     design: LegDesign
-    controller: ControllerConfig
+    controller: ControllerSettings
     setup: Setup = field(default_factory=Setup)
     linkage: Linkage = field(default_factory=Linkage)
     ground: Ground = field(default_factory=Ground)
@@ -84,21 +72,6 @@ class Finished:
 
     path: Path
     outcome: Outcome
-
-
-def make_controller(config: ControllerConfig, targets: LegTargets) -> AbstractController:
-    """The controller of a configuration, for the legs of `targets`.
-
-    Raises:
-        ConfigError: settings that the leg refuses.
-    """
-    match config:
-        case JumpConfig():
-            return Jump(config, targets)
-        case BangBangConfig():
-            return BangBang(config, targets)
-        case PositionJumpConfig():
-            return PositionJump(config, targets)
 
 
 def targets_of(experiment: Experiment) -> LegTargets:

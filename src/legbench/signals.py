@@ -89,7 +89,10 @@ class Command:
     motor_pos: Floats
     """Desired motor positions (..., 2) [rad]."""
     phase: Ints
-    """`Phase` of the controller (...)."""
+    """Code of the controller's phase (...)."""
+    signals: Floats | None = None
+    """Values of the controller's own signals, components in the order of its description
+    (..., n); none if it declares none."""
 
     @classmethod
     def holding(cls, motor_pos: Floats) -> "Command":

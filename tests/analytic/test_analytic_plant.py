@@ -9,7 +9,7 @@ from legbench.control import BangBangConfig, JumpConfig, PositionJumpConfig
 from legbench.design import LegDesign, load_design
 from legbench.design.setup import Setup, SetupKind
 from legbench.errors import ConfigError, PlantFault
-from legbench.experiment import ControllerConfig, Experiment, make_controller, targets_of
+from legbench.experiment import ControllerSettings, Experiment, make_controller, targets_of
 from legbench.loop import Outcome, run
 from legbench.mjcf import BuildOptions, Linkage, LinkageKind
 from legbench.plant.abstract import AbstractPlant
@@ -136,7 +136,7 @@ def test_the_servo_is_the_one_of_the_simulation() -> None:
         (JumpConfig(), SetupKind.JUMP),
     ],
 )
-def test_every_controller_runs_on_it(controller: ControllerConfig, kind: SetupKind) -> None:
+def test_every_controller_runs_on_it(controller: ControllerSettings, kind: SetupKind) -> None:
     experiment = Experiment(design=PROTOTYPE, controller=controller, setup=Setup(kind=kind))
     plant = AnalyticPlant(PROTOTYPE, experiment.setup, start_of(experiment))
     seen, outcome = controlled(plant, experiment, 1000)

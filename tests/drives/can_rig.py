@@ -27,7 +27,7 @@ from legbench.drives.session import Session
 from legbench.drives.units import AxisUnits
 from legbench.experiment import (
     USUAL_SETUP,
-    ControllerConfig,
+    ControllerSettings,
     Experiment,
     make_controller,
     targets_of,
@@ -58,7 +58,7 @@ def fine_bus() -> BusConfig:
     return replace(bench, nodes=nodes)
 
 
-def experiment(controller: ControllerConfig, duration: float = 1.0) -> Experiment:
+def experiment(controller: ControllerSettings, duration: float = 1.0) -> Experiment:
     """The optimal leg where its controller is at home."""
     return Experiment(
         design=load_design(ROOT / "models" / "optimal.toml"),

@@ -11,7 +11,7 @@ from can_rig import BUS, experiment, fine_bus, stage, staged
 from legbench.control import BangBangConfig, JumpConfig
 from legbench.drives.bus_file import load_bus
 from legbench.drives.limits import SafetyLimits
-from legbench.experiment import ControllerConfig, Experiment, record
+from legbench.experiment import ControllerSettings, Experiment, record
 from legbench.loop import run
 from legbench.metrics import summarise
 from legbench.plant.abstract import AbstractPlant
@@ -108,7 +108,7 @@ def both(chosen: Experiment, folder: Path) -> tuple[Recording, Recording]:
     ids=["bang-bang", "jump"],
 )
 def test_drives_are_a_simulation_with_one_cycle_of_delay(
-    config: ControllerConfig, duration: float, tmp_path: Path
+    config: ControllerSettings, duration: float, tmp_path: Path
 ) -> None:
     can, sim = both(experiment(config, duration), tmp_path)
     assert len(can.time) == round(duration / 1e-3)

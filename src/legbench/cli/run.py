@@ -14,7 +14,7 @@ from legbench.control import BangBangConfig, JumpConfig, PositionJumpConfig, Set
 from legbench.design import load_design
 from legbench.design.setup import Setup, SetupKind
 from legbench.errors import ConfigError, MissingExtraError
-from legbench.experiment import USUAL_SETUP, Experiment, record
+from legbench.experiment import Experiment, record
 from legbench.kinematics import ModalConvention
 from legbench.loop import stop_on_interrupt
 from legbench.metrics import summarise
@@ -86,7 +86,7 @@ def experiment_of(chosen: RunArguments) -> Experiment:
     Raises:
         LegbenchError: the design file or a setting makes no sense.
     """
-    kind = chosen.setup or USUAL_SETUP[type(chosen.controller)]
+    kind = chosen.setup or chosen.controller.usual_setup
     return Experiment(
         design=load_design(chosen.design),
         controller=chosen.controller,

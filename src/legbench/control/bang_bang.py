@@ -1,14 +1,58 @@
 """Bang-bang on a torque threshold (section IV-B): feeds the mode what damping takes."""
 
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import ClassVar, final
 
 import numpy as np
 
 from legbench.control.abstract import AbstractController
 from legbench.control.setpoint import LegTargets, check_delay
+from legbench.design.setup import SetupKind
 from legbench.errors import ConfigError
-from legbench.signals import Command, Floats, Ints, Observation, Phase
+from legbench.phases import ControllerDescription, Counting, PhaseInfo, Role
+from legbench.signals import Command, Floats, Ints, Observation
+
+RATED_PERIODS = 20
+"""The paper rates the first 20 periods of a sustained oscillation (Fig. 5)."""
+
+
+class BangBangPhase(IntEnum):
+    """Where bang-bang holds the equilibrium, as recorded."""
+
+    REST = 0
+    """At z2, before the first switch."""
+    MIDDLE = 2
+    """At z2, between the thresholds of three levels."""
+    FOLDED = 3
+    """At z2 + dz2 (shorter leg)."""
+    STRETCHED = 4
+    """At z2 - dz2 (longer leg)."""
+
+
+PHASES = (
+    PhaseInfo(
+        code=BangBangPhase.REST, name="rest", role=Role.REST, doc="before the first switch"
+    ),
+    PhaseInfo(
+        code=BangBangPhase.MIDDLE,
+        name="middle",
+        role=Role.ACTING,
+        doc="three levels: the equilibrium at the rest posture",
+    ),
+    PhaseInfo(
+        code=BangBangPhase.FOLDED,
+        name="folded",
+        role=Role.ACTING,
+        doc="the equilibrium at z2 + dz2 (shorter leg)",
+    ),
+    PhaseInfo(
+        code=BangBangPhase.STRETCHED,
+        name="stretched",
+        role=Role.ACTING,
+        doc="the equilibrium at z2 - dz2 (longer leg)",
+    ),
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -16,6 +60,8 @@ class BangBangConfig:
     """The equilibrium switches between z2 + dz2 and z2 - dz2 as the spring torque tells."""
 
     kind: ClassVar[str] = "bang-bang"
+    usual_setup: ClassVar[SetupKind] = SetupKind.FFS
+    batched: ClassVar[bool] = True
     z2: float = 1.0
     """Set point in the middle, where the leg rests at first [rad]."""
     dz2: float = 0.08
@@ -28,6 +74,14 @@ class BangBangConfig:
     """Time at rest, to read the rest torque, before the first switch [s]."""
     sign: int = 1
     """-1 inverts the law: it then brakes the mode. For demonstrations."""
+
+    def build(self, targets: LegTargets) -> AbstractController:
+        """The controller for these legs; raises ConfigError where they refuse the settings."""
+        return BangBang(self, targets)
+
+    def describe(self) -> ControllerDescription:
+        """Its phases; the first 20 periods count."""
+        return ControllerDescription(phases=PHASES, counting=Counting(most=RATED_PERIODS))
 
 
 @final
@@ -60,7 +114,7 @@ class BangBang(AbstractController):
         self._folded = targets.motor_at(config.z2 + config.dz2, "z2 + dz2")
         self._stretched = targets.motor_at(config.z2 - config.dz2, "z2 - dz2")
         self._rest_torque = np.zeros(self._middle.shape[:-1])
-        self._level = np.full(self._middle.shape[:-1], Phase.STRETCHED, dtype=np.int64)
+        self._level = np.full(self._middle.shape[:-1], BangBangPhase.STRETCHED, dtype=np.int64)
         self._going = np.zeros(self._middle.shape[:-1], dtype=np.bool_)
 
     @property
@@ -71,7 +125,7 @@ class BangBang(AbstractController):
     def reset(self, observation: Observation) -> None:
         """Take the spring torque of the leg at rest as zero."""
         self._rest_torque = self._targets.radial(observation.spring_torque)
-        self._level = np.full(self._rest_torque.shape, Phase.STRETCHED, dtype=np.int64)
+        self._level = np.full(self._rest_torque.shape, BangBangPhase.STRETCHED, dtype=np.int64)
         self._going = np.zeros(self._rest_torque.shape, dtype=np.bool_)
 
     def step(self, observation: Observation) -> Command:
@@ -82,11 +136,11 @@ class BangBang(AbstractController):
         torque = self._config.sign * torque
         self._going = self._going | (np.abs(torque) > self._config.threshold)
         back = self._going & self._config.three_levels
-        between = np.where(back, Phase.MIDDLE, self._level)
+        between = np.where(back, BangBangPhase.MIDDLE, self._level)
         level = np.where(
             torque > self._config.threshold,
-            Phase.FOLDED,
-            np.where(torque < -self._config.threshold, Phase.STRETCHED, between),
+            BangBangPhase.FOLDED,
+            np.where(torque < -self._config.threshold, BangBangPhase.STRETCHED, between),
         )
         self._level = level.astype(np.int64)
         return Command(motor_pos=self._motor(self._level), phase=self._level)
@@ -94,7 +148,7 @@ class BangBang(AbstractController):
     def _motor(self, level: Ints) -> Floats:
         chosen = level[..., np.newaxis]
         return np.where(
-            chosen == Phase.FOLDED,
+            chosen == BangBangPhase.FOLDED,
             self._folded,
-            np.where(chosen == Phase.STRETCHED, self._stretched, self._middle),
+            np.where(chosen == BangBangPhase.STRETCHED, self._stretched, self._middle),
         )

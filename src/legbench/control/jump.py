@@ -1,19 +1,7 @@
 """Hopping in place: push along the mode in the second half of stance (section IV-A, VI-C).
 
-The phases come from the springs alone, so nothing needs to know about the ground. They form a
-ring, each with one way out:
-
-    REST      after a while                               -> PUSH
-    PUSH      unloaded, or at an upper apex on the ground -> RELEASE
-    RELEASE   after a while                               -> FLIGHT
-    FLIGHT    loaded for a while: touchdown               -> COMPRESS
-    COMPRESS  at the lower apex                           -> PUSH
-
-The springs' torque is the load, `-tau_z`; motor position less torque over stiffness is how far
-the leg is folded, whose maximum is the lower apex and whose minimum is the upper one.
-
-A leg in the air vibrates, and each swing may load the springs more than standing does. But it
-changes sign twice a period: only the ground loads them for longer than half of one.
+`legbench.control.jump_rules` holds the phases and what ends them. One leg is stepped in plain
+floats, a batch in arrays; both obey the same table, and their commands are equal to the bit.
 """
 
 import math
@@ -23,10 +11,14 @@ from typing import ClassVar, final
 import numpy as np
 
 from legbench.control.abstract import AbstractController
+from legbench.control.jump_rules import JumpPhase, phase_exits, phase_infos
 from legbench.control.setpoint import LegTargets, check_delay
+from legbench.design import LegDesign
+from legbench.design.setup import SetupKind
 from legbench.design.statics import Support
 from legbench.errors import ConfigError
-from legbench.signals import Command, Floats, Ints, Observation, Phase
+from legbench.phases import ControllerDescription
+from legbench.signals import Command, Floats, Ints, Observation
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,6 +26,8 @@ class JumpConfig:
     """The equilibrium is at z2 + dz2 in flight and compression, at z2 - dz2 in the push."""
 
     kind: ClassVar[str] = "jump"
+    usual_setup: ClassVar[SetupKind] = SetupKind.JUMP
+    batched: ClassVar[bool] = True
     z2: float = 0.45
     """Middle of the two set points [rad]."""
     dz2: float = 0.15
@@ -52,21 +46,16 @@ class JumpConfig:
     """How long that load must last; more than half a period of the leg's vibration in the air
     [s]."""
 
+    def build(self, targets: LegTargets) -> AbstractController:
+        """The controller for these legs; raises ConfigError where they refuse the settings."""
+        return Jump(self, targets)
+
+    def describe(self) -> ControllerDescription:
+        """Its phases; every period counts."""
+        return ControllerDescription(phases=phase_infos(self))
+
 
 STANDING_ONLY = "the leg does not load its springs at rest; jumping needs setup 'jump' or 'ffs'"
-
-NEXT = np.zeros(len(Phase), dtype=np.int64)
-NEXT[Phase.REST] = NEXT[Phase.COMPRESS] = Phase.PUSH
-NEXT[Phase.PUSH], NEXT[Phase.RELEASE] = Phase.RELEASE, Phase.FLIGHT
-NEXT[Phase.FLIGHT] = Phase.COMPRESS
-"""Phase -> the phase after it."""
-
-
-def _by_phase(otherwise: float, entries: dict[Phase, float]) -> Floats:
-    table = np.full(len(Phase), otherwise)
-    for phase, value in entries.items():
-        table[phase] = value
-    return table
 
 
 @final
@@ -79,48 +68,14 @@ class Jump(AbstractController):
     """
 
     def __init__(self, config: JumpConfig, targets: LegTargets) -> None:
-        if not config.dz2 > 0.0:
-            raise ConfigError(f"dz2 is {config.dz2:g} rad; a push needs a positive amplitude")
-        if not 0.0 < config.release_load < config.touchdown_load < 1.0:
-            raise ConfigError(
-                f"release_load {config.release_load:g} and touchdown_load "
-                f"{config.touchdown_load:g} must satisfy 0 < release < touchdown < 1 (shares of "
-                "the load of standing)"
-            )
-        if not 0.0 < config.apex_turn < math.inf:
-            raise ConfigError(f"apex_turn is {config.apex_turn:g} rad; it must be positive")
-        for name in ("release_time", "touchdown_time"):
-            if not 0.0 <= getattr(config, name) < math.inf:
-                raise ConfigError(f"{name} is {getattr(config, name):g} s; it must be 0 or more")
-        check_delay(config.delay)
+        _check(config)
         if targets.support is not Support.FOOT:
             raise ConfigError(STANDING_ONLY)
-        self._targets, self._apex_turn = targets, config.apex_turn
-        self._folded = targets.motor_at(config.z2 + config.dz2, "z2 + dz2")
-        self._stretched = targets.motor_at(config.z2 - config.dz2, "z2 - dz2")
-        self._stiffness = targets.modal_stiffness()
-        self._apex_of = _by_phase(0.0, {Phase.COMPRESS: 1.0, Phase.PUSH: -1.0})
-        self._sense_of = _by_phase(1.0, {Phase.COMPRESS: 0.0, Phase.PUSH: -1.0})
-        self._load_of = _by_phase(
-            -np.inf,
-            {
-                Phase.FLIGHT: config.touchdown_load,
-                Phase.COMPRESS: 0.0,
-                Phase.PUSH: config.release_load,
-            },
-        )
-        self._dwell_of = _by_phase(
-            0.0,
-            {
-                Phase.REST: config.delay,
-                Phase.RELEASE: config.release_time,
-                Phase.FLIGHT: config.touchdown_time,
-            },
-        )
-        self._standing: Floats = np.ones(self._folded.shape[:-1])
-        self._since: Floats = np.zeros(self._folded.shape[:-1])
-        self._furthest: Floats = np.zeros(self._folded.shape[:-1])
-        self._enter(np.full(self._folded.shape[:-1], Phase.REST, dtype=np.int64))
+        folded = targets.motor_at(config.z2 + config.dz2, "z2 + dz2")
+        stretched = targets.motor_at(config.z2 - config.dz2, "z2 - dz2")
+        one = isinstance(targets.designs, LegDesign)
+        self._law = (_OneLeg if one else _Batch)(config, targets, folded, stretched)
+        self._folded = folded
 
     @property
     def start_motor_pos(self) -> Floats:
@@ -129,38 +84,144 @@ class Jump(AbstractController):
 
     def reset(self, observation: Observation) -> None:
         """Take the load of the standing leg as the unit of load."""
-        self._standing = -self._targets.radial(observation.spring_torque)
-        if not np.all(self._standing > 0.0):
-            raise ConfigError(STANDING_ONLY)
-        self._since = np.zeros(self._standing.shape)
-        self._furthest = np.zeros(self._standing.shape)
-        self._enter(np.full(self._standing.shape, Phase.REST, dtype=np.int64))
+        self._law.reset(observation)
 
     def step(self, observation: Observation) -> Command:
         """Leave the phase whose end has come, command the equilibrium that belongs to the next."""
+        return self._law.step(observation)
+
+
+def _check(config: JumpConfig) -> None:
+    if not config.dz2 > 0.0:
+        raise ConfigError(f"dz2 is {config.dz2:g} rad; a push needs a positive amplitude")
+    if not 0.0 < config.release_load < config.touchdown_load < 1.0:
+        raise ConfigError(
+            f"release_load {config.release_load:g} and touchdown_load "
+            f"{config.touchdown_load:g} must satisfy 0 < release < touchdown < 1 (shares of "
+            "the load of standing)"
+        )
+    if not 0.0 < config.apex_turn < math.inf:
+        raise ConfigError(f"apex_turn is {config.apex_turn:g} rad; it must be positive")
+    for name in ("release_time", "touchdown_time"):
+        if not 0.0 <= getattr(config, name) < math.inf:
+            raise ConfigError(f"{name} is {getattr(config, name):g} s; it must be 0 or more")
+    check_delay(config.delay)
+
+
+@final
+class _OneLeg:
+    """The law of one leg in plain floats."""
+
+    def __init__(
+        self, config: JumpConfig, targets: LegTargets, folded: Floats, stretched: Floats
+    ) -> None:
+        self._targets, self._scale = targets, targets.convention.scale
+        self._stiffness = float(targets.modal_stiffness())
+        self._turn = config.apex_turn
+        self._exits = phase_exits(config)
+        self._commands = {
+            phase: Command(
+                motor_pos=stretched if phase is JumpPhase.PUSH else folded,
+                phase=np.asarray(phase, dtype=np.int64),
+            )
+            for phase in JumpPhase
+        }
+        self._standing, self._since, self._furthest = 1.0, 0.0, 0.0
+        self._enter(JumpPhase.REST)
+
+    def reset(self, observation: Observation) -> None:
+        self._standing = -float(self._targets.radial(observation.spring_torque))
+        if not self._standing > 0.0:
+            raise ConfigError(STANDING_ONLY)
+        self._since, self._furthest = 0.0, 0.0
+        self._enter(JumpPhase.REST)
+
+    def step(self, observation: Observation) -> Command:
+        torque_1, torque_2 = observation.spring_torque.tolist()
+        motor_1, motor_2 = observation.motor_pos.tolist()
+        torque = self._scale * (torque_2 - torque_1)
+        fold = self._scale * (motor_2 - motor_1) - torque / self._stiffness
+        towards = self._apex * fold
+        if towards > self._furthest:
+            self._furthest = towards
+        holds = self._sense * (-torque / self._standing - self._load) > 0.0
+        if not holds:
+            self._since = observation.time
+        if self._furthest - towards > self._turn or (
+            holds and observation.time - self._since >= self._dwell
+        ):
+            self._since = observation.time
+            self._enter(self._next)
+            self._furthest = self._apex * fold
+        return self._command
+
+    def _enter(self, phase: JumpPhase) -> None:
+        leave = self._exits[phase]
+        self._next, self._apex, self._sense = leave.to, leave.apex, leave.sense
+        self._load, self._dwell = leave.load, leave.dwell
+        self._command = self._commands[phase]
+
+
+@final
+class _Batch:
+    """The law of many legs in arrays, one row a leg."""
+
+    def __init__(
+        self, config: JumpConfig, targets: LegTargets, folded: Floats, stretched: Floats
+    ) -> None:
+        self._targets, self._turn = targets, config.apex_turn
+        self._folded, self._stretched = folded, stretched
+        self._stiffness = targets.modal_stiffness()
+        exits = phase_exits(config)
+        self._next_of = np.zeros(max(exits) + 1, dtype=np.int64)
+        for phase, leave in exits.items():
+            self._next_of[phase] = leave.to
+        self._apex_of = _by_phase({phase: leave.apex for phase, leave in exits.items()})
+        self._sense_of = _by_phase({phase: leave.sense for phase, leave in exits.items()})
+        self._load_of = _by_phase({phase: leave.load for phase, leave in exits.items()})
+        self._dwell_of = _by_phase({phase: leave.dwell for phase, leave in exits.items()})
+        self._standing: Floats = np.ones(folded.shape[:-1])
+        self._begin()
+
+    def reset(self, observation: Observation) -> None:
+        self._standing = -self._targets.radial(observation.spring_torque)
+        if not np.all(self._standing > 0.0):
+            raise ConfigError(STANDING_ONLY)
+        self._begin()
+
+    def _begin(self) -> None:
+        self._since: Floats = np.zeros(self._standing.shape)
+        self._furthest: Floats = np.zeros(self._standing.shape)
+        self._enter(np.full(self._standing.shape, JumpPhase.REST, dtype=np.int64))
+
+    def step(self, observation: Observation) -> Command:
         torque = self._targets.radial(observation.spring_torque)
         fold = self._targets.radial(observation.motor_pos) - torque / self._stiffness
         towards = self._apex * fold
         self._furthest = np.maximum(self._furthest, towards)
-        at_apex = self._furthest - towards > self._apex_turn
+        at_apex = self._furthest - towards > self._turn
         holds = self._sense * (-torque / self._standing - self._load) > 0.0
         self._since = np.where(holds, self._since, observation.time)
         leaving = at_apex | (holds & (observation.time - self._since >= self._dwell))
         if np.count_nonzero(leaving):
             self._since = np.where(leaving, observation.time, self._since)
-            self._enter(np.where(leaving, NEXT[self._phase], self._phase))
+            self._enter(np.where(leaving, self._next_of[self._phase], self._phase))
             self._furthest = np.where(leaving, self._apex * fold, self._furthest)
         return self._command
 
     def _enter(self, phase: Ints) -> None:
-        """Look up what ends each leg's phase, and make the command that goes with it.
-
-        An apex, or a load on one side of a level for a while; any load passes -inf, none passes a
-        sense of 0.
-        """
+        """Look up what ends each leg's phase, and make the command that goes with it."""
         self._phase = phase
         self._apex, self._dwell = self._apex_of[phase], self._dwell_of[phase]
         self._sense, self._load = self._sense_of[phase], self._load_of[phase]
-        pushing = (phase == Phase.PUSH)[..., np.newaxis]
+        pushing = (phase == JumpPhase.PUSH)[..., np.newaxis]
         motor_pos = np.where(pushing, self._stretched, self._folded)
         self._command = Command(motor_pos=motor_pos, phase=phase)
+
+
+def _by_phase(entries: dict[JumpPhase, float]) -> Floats:
+    """Phase -> value, as an array to be indexed with phases."""
+    table = np.zeros(max(entries) + 1)
+    for phase, value in entries.items():
+        table[phase] = value
+    return table

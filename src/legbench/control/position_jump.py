@@ -1,13 +1,28 @@
 """One step of the equilibrium in modal space (section IV-B): shows the passive motion."""
 
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import ClassVar, final
 
 import numpy as np
 
 from legbench.control.abstract import AbstractController
 from legbench.control.setpoint import LegTargets, check_delay
-from legbench.signals import Command, Floats, Observation, Phase
+from legbench.design.setup import SetupKind
+from legbench.phases import ControllerDescription, Counting, PhaseInfo, Role
+from legbench.signals import Command, Floats, Observation
+
+RATED_SHARE = 0.1
+"""Periods count while their amplitude exceeds this share of the deflection (Fig. 5)."""
+
+
+class PositionJumpPhase(IntEnum):
+    """Whether the equilibrium has been moved, as recorded."""
+
+    REST = 0
+    """At z2 + dz2."""
+    STEPPED = 1
+    """At z2."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -15,12 +30,35 @@ class PositionJumpConfig:
     """From z2 + dz2 to z2."""
 
     kind: ClassVar[str] = "position-jump"
+    usual_setup: ClassVar[SetupKind] = SetupKind.FFS
+    batched: ClassVar[bool] = True
     z2: float = 1.0
     """Set point after the jump [rad]."""
     dz2: float = 0.3
     """Deflection before it; positive: shorter leg [rad]."""
     delay: float = 0.1
     """Time at rest before the jump [s]."""
+
+    def build(self, targets: LegTargets) -> AbstractController:
+        """The controller for these legs; raises ConfigError where they refuse the settings."""
+        return PositionJump(self, targets)
+
+    def describe(self) -> ControllerDescription:
+        """Its phases; the periods count that exceed a tenth of the deflection."""
+        return ControllerDescription(
+            phases=(
+                PhaseInfo(
+                    code=PositionJumpPhase.REST, name="rest", role=Role.REST, doc="at z2 + dz2"
+                ),
+                PhaseInfo(
+                    code=PositionJumpPhase.STEPPED,
+                    name="stepped",
+                    role=Role.ACTING,
+                    doc="the equilibrium has been moved to z2",
+                ),
+            ),
+            counting=Counting(smallest=RATED_SHARE * abs(self.dz2)),
+        )
 
 
 @final
@@ -38,7 +76,7 @@ class PositionJump(AbstractController):
         self._delay = config.delay
         shape = self._before.shape[:-1]
         self._rest = Command.holding(self._before)
-        stepped = np.full(shape, Phase.STEPPED, dtype=np.int64)
+        stepped = np.full(shape, PositionJumpPhase.STEPPED, dtype=np.int64)
         self._stepped = Command(motor_pos=self._after, phase=stepped)
 
     @property

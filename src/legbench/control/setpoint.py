@@ -1,8 +1,8 @@
 """From a radial set point z2 to motor positions, within what the leg can do."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import final
 
@@ -46,6 +46,12 @@ class LegTargets:
     support: Support
     meaning: SetpointMeaning = SetpointMeaning.LINK
     convention: ModalConvention = ModalConvention.ORTHONORMAL
+
+    def each(self) -> Iterator["LegTargets"]:
+        """The targets of the single legs."""
+        designs = [self.designs] if isinstance(self.designs, LegDesign) else self.designs
+        for design in designs:
+            yield replace(self, designs=design)
 
     def motor_at(self, z2: float, name: str) -> Floats:
         """Motor positions (..., 2) [rad] for the set point `z2` [rad], called `name` in errors.

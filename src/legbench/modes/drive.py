@@ -9,10 +9,10 @@ import numpy as np
 from legbench.analytic.equations import Pair
 from legbench.analytic.taylor import SILENT, Levels, Watched
 from legbench.control import JumpConfig, LegTargets
+from legbench.control.jump_rules import JumpPhase, phase_exits
 from legbench.design import LegDesign
 from legbench.design.statics import Support
 from legbench.kinematics import ModalConvention
-from legbench.signals import Phase
 
 SCALE = math.sqrt(0.5)
 
@@ -93,7 +93,7 @@ class JumpLaw(AbstractDrive):
         targets = LegTargets(
             designs=design, support=Support.FOOT, convention=ModalConvention.ORTHONORMAL
         )
-        self._config = config
+        self._exits, self._turn = phase_exits(config), config.apex_turn
         k1, k2 = design.stiffness
         self._k = min(k1, k2)
         self._stiffness = (k1, k2)
@@ -105,46 +105,43 @@ class JumpLaw(AbstractDrive):
         rest = targets.link_at_rest(folded)
         torque = np.asarray(design.stiffness) * (folded - rest)
         self._standing = -float(targets.radial(torque))
-        self.phase, self.alarm, self.motor = Phase.FLIGHT, math.inf, self._folded
         self._extreme, self._loaded = 0.0, False
+        self._enter(JumpPhase.FLIGHT)
 
     def restart(self) -> None:
         """In flight, unloaded, settled."""
-        self._enter(Phase.FLIGHT, self._folded)
+        self._enter(JumpPhase.FLIGHT)
 
     def levels(self) -> Levels:
         """The transitions out of the phase."""
-        turn = self._config.apex_turn
         match self.phase:
-            case Phase.FLIGHT if self._loaded:
-                return Levels(lower=self._at_load(self._config.touchdown_load))
-            case Phase.FLIGHT:
-                return Levels(upper=self._at_load(self._config.touchdown_load))
-            case Phase.COMPRESS:
-                return Levels(lower=self._extreme - turn, turns=True)
-            case Phase.PUSH:
-                lower = self._at_load(self._config.release_load)
-                return Levels(lower=lower, upper=self._extreme + turn, turns=True)
+            case JumpPhase.FLIGHT if self._loaded:
+                return Levels(lower=self._at_load())
+            case JumpPhase.FLIGHT:
+                return Levels(upper=self._at_load())
+            case JumpPhase.COMPRESS:
+                return Levels(lower=self._extreme - self._turn, turns=True)
+            case JumpPhase.PUSH:
+                return Levels(lower=self._at_load(), upper=self._extreme + self._turn, turns=True)
             case _:
                 return SILENT
 
     def happen(self, what: Watched, value: float, time: float) -> None:
         """Advance the phases."""
         match (self.phase, what):
-            case (Phase.FLIGHT, Watched.RISE):
+            case (JumpPhase.FLIGHT, Watched.RISE):
                 self._load(time)
-            case (Phase.FLIGHT, Watched.FALL):
-                self._enter(Phase.FLIGHT, self._folded)
-            case (Phase.COMPRESS, Watched.TURN):
+            case (JumpPhase.FLIGHT, Watched.FALL):
+                self._enter(JumpPhase.FLIGHT)
+            case (JumpPhase.COMPRESS, Watched.TURN):
                 self._extreme = max(self._extreme, value)
-            case (Phase.COMPRESS, Watched.FALL):
-                self._enter(Phase.PUSH, self._stretched)
-                self._extreme = value
-                if value < self._at_load(self._config.release_load):
+            case (JumpPhase.COMPRESS, Watched.FALL):
+                self._leave(value)
+                if value < self._at_load():
                     self._release(time)
-            case (Phase.PUSH, Watched.TURN):
+            case (JumpPhase.PUSH, Watched.TURN):
                 self._extreme = min(self._extreme, value)
-            case (Phase.PUSH, Watched.FALL | Watched.RISE):
+            case (JumpPhase.PUSH, Watched.FALL | Watched.RISE):
                 self._release(time)
             case _:
                 pass
@@ -152,33 +149,36 @@ class JumpLaw(AbstractDrive):
     def ring(self, value: float, time: float) -> None:
         """The release is over, or a load has lasted."""
         if self._loaded:
-            self._compress(value)
+            self._leave(value)
             return
-        self._enter(Phase.FLIGHT, self._folded)
-        if value > self._at_load(self._config.touchdown_load):
+        self._enter(JumpPhase.FLIGHT)
+        if value > self._at_load():
             self._load(time)
 
     @property
     def settled(self) -> bool:
         """In flight, or on the way there."""
-        return self.phase in (Phase.FLIGHT, Phase.RELEASE)
+        return self.phase in (JumpPhase.FLIGHT, JumpPhase.RELEASE)
 
     def _load(self, time: float) -> None:
-        self._loaded, self.alarm = True, time + self._config.touchdown_time
-
-    def _compress(self, value: float) -> None:
-        self._enter(Phase.COMPRESS, self._folded)
-        self._extreme = value
+        self._loaded, self.alarm = True, time + self._exit.dwell
 
     def _release(self, time: float) -> None:
-        self._enter(Phase.RELEASE, self._folded)
-        self.alarm = time + self._config.release_time
+        self._enter(self._exit.to)
+        self.alarm = time + self._exit.dwell
 
-    def _enter(self, phase: Phase, motor: Pair) -> None:
-        self.phase, self.motor, self.alarm, self._loaded = phase, motor, math.inf, False
+    def _leave(self, value: float) -> None:
+        """Go on to the next phase, whose extreme is searched from `value` on."""
+        self._enter(self._exit.to)
+        self._extreme = value
 
-    def _at_load(self, load: float) -> float:
-        """The y of a load, at the present motor position."""
+    def _enter(self, phase: JumpPhase) -> None:
+        self.phase, self._exit = phase, self._exits[phase]
+        self.motor = self._stretched if phase is JumpPhase.PUSH else self._folded
+        self.alarm, self._loaded = math.inf, False
+
+    def _at_load(self) -> float:
+        """The y of the load that ends the phase, at the present motor position."""
         k1, k2 = self._stiffness
         offset = SCALE * (k2 * self.motor[1] - k1 * self.motor[0])
-        return (load * self._standing + offset) / self._k
+        return (self._exit.load * self._standing + offset) / self._k

@@ -1,0 +1,68 @@
+"""A batch of legs under laws that know one leg each."""
+
+from collections.abc import Iterator, Sequence
+from typing import final
+
+import numpy as np
+
+from legbench.control.abstract import AbstractController
+from legbench.signals import Command, Floats, Observation, Truth
+
+
+@final
+class EachLeg(AbstractController):
+    """Controller of a batch made of one law a leg; the laws may be plain floats and ifs."""
+
+    def __init__(self, laws: Sequence[AbstractController]) -> None:
+        """Take the laws in the order of the legs; at least one."""
+        self._laws = tuple(laws)
+        self._start = np.array([law.start_motor_pos for law in self._laws])
+
+    @property
+    def start_motor_pos(self) -> Floats:
+        """One row a leg (n, 2) [rad]."""
+        return self._start
+
+    def reset(self, observation: Observation) -> None:
+        """Show each law its leg at rest."""
+        for law, seen in zip(self._laws, each_row(observation), strict=True):
+            law.reset(seen)
+
+    def step(self, observation: Observation) -> Command:
+        """Ask each law for its leg."""
+        rows = zip(self._laws, each_row(observation), strict=True)
+        commands = [law.step(seen) for law, seen in rows]
+        signals = [command.signals for command in commands if command.signals is not None]
+        return Command(
+            motor_pos=np.array([command.motor_pos for command in commands]),
+            phase=np.array([command.phase for command in commands], dtype=np.int64),
+            signals=np.array(signals) if signals else None,
+        )
+
+
+def each_row(observation: Observation) -> Iterator[Observation]:
+    """Observations of the single legs of a batch, as views of its rows."""
+    truths = _truth_rows(observation.truth, len(observation.motor_pos))
+    for row, truth in enumerate(truths):
+        yield Observation(
+            time=observation.time,
+            motor_pos=observation.motor_pos[row],
+            joint_pos=observation.joint_pos[row],
+            joint_vel=observation.joint_vel[row],
+            spring_torque=observation.spring_torque[row],
+            applied_pos=observation.applied_pos[row],
+            truth=truth,
+        )
+
+
+def _truth_rows(truth: Truth | None, count: int) -> Iterator[Truth | None]:
+    for row in range(count):
+        yield truth and Truth(
+            trunk_pos=truth.trunk_pos[row],
+            trunk_vel=truth.trunk_vel[row],
+            foot_pos=truth.foot_pos[row],
+            contact_force=truth.contact_force[row],
+            contact=truth.contact[row],
+            energy=truth.energy[row],
+            loop_gap=truth.loop_gap[row],
+        )

@@ -1,0 +1,21 @@
+"""Controllers by name: built in, installed beside legbench, or in a file."""
+
+from typing import Final
+
+from legbench.guests import Registry
+
+CONTROLLERS: Final = Registry(
+    what="controller",
+    builtin={
+        "jump": "legbench.control.jump:JumpConfig",
+        "bang-bang": "legbench.control.bang_bang:BangBangConfig",
+        "position-jump": "legbench.control.position_jump:PositionJumpConfig",
+    },
+    group="legbench.controllers",
+    members={
+        "usual_setup": "usual_setup: ClassVar[SetupKind]",
+        "build": "build(targets) -> AbstractController",
+        "describe": "describe() -> ControllerDescription",
+    },
+)
+"""Every controller that can be asked for."""
