@@ -19,7 +19,8 @@ from legbench.design import load_design
 from legbench.drives.bus_file import load_bus, load_limits
 from legbench.drives.session import Session
 from legbench.errors import PlantFault
-from legbench.plants import CanChoice, open_session
+from legbench.plant.can_choice import CanChoice
+from legbench.plant.can_open import open_session
 
 ROOT = Path(__file__).parents[2]
 FULL = f"replace dev {CHANNEL} root netem limit 1 delay 3ms"

@@ -73,7 +73,8 @@ class Registry:
         try:
             guest = found.load()
         except Exception as error:  # whatever a package of somebody else does when it is imported
-            raise GuestError(_import_failed(f"{self.what} '{name}' ({found.value})", error)) from error
+            what = f"{self.what} '{name}' ({found.value})"
+            raise GuestError(_import_failed(what, error)) from error
         return self._checked(guest, name)
 
     def names(self) -> tuple[str, ...]:

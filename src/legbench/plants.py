@@ -1,300 +1,38 @@
-"""Which plant a run is made on, and what has to be opened and told for it: the one place."""
+"""Plants by name: built in, installed beside legbench, or in a file."""
 
-from dataclasses import asdict, dataclass, replace
-from pathlib import Path
-from typing import Any, ClassVar, final
+from typing import Final
 
-from legbench.analytic.smooth import Accuracy
-from legbench.clock import AbstractClock, VirtualClock
-from legbench.design import LegDesign
-from legbench.drives.bus import LockstepBus
-from legbench.drives.bus_file import load_bus, load_limits
-from legbench.drives.config import BusConfig
-from legbench.drives.emulated.behaviour import Behaviour
-from legbench.drives.emulated.build import emulate
-from legbench.drives.emulated.faults import Fault
-from legbench.drives.emulated.network import Network
-from legbench.drives.limits import UNLIMITED, Range, SafetyLimits
-from legbench.drives.link import Link
-from legbench.drives.master.lock import ChannelLock
-from legbench.drives.open_bus import adapter_of, open_bus
-from legbench.drives.session import Session
-from legbench.drives.stopping import check_stopping
-from legbench.drives.wire import check_load
-from legbench.errors import ConfigError, LegbenchError
-from legbench.mjcf import BuildOptions
-from legbench.plant.abstract import AbstractPlant
-from legbench.plant.analytic import AnalyticPlant
-from legbench.plant.can import CanPlant
-from legbench.plant.emulated_leg import EmulatedLeg
-from legbench.plant.limited import LimitedPlant
-from legbench.plant.sim import SimPlant
-from legbench.plant.start import PERIOD, Start
-from legbench.servo import ServoConfig
+from legbench.guests import Registry
+from legbench.plant.analytic_choice import AnalyticChoice
+from legbench.plant.can_choice import BUS_LOG, EMULATED, LIMITS_NAME, CanChoice
+from legbench.plant.design_limits import joint_ranges, limits_for
+from legbench.plant.opening import Leg, OpenPlant, PlantSettings, open_plant
+from legbench.plant.sim_choice import SimChoice
 
-EMULATED = "legbench"
-"""Interface of the emulated leg in this process, in virtual time."""
-LIMITS_NAME = "limits.toml"
-"""Beside the bus file, unless another file is chosen."""
-BUS_LOG = "bus.log"
-"""Raw frames in the run folder, candump format."""
+PLANTS: Final = Registry(
+    what="plant",
+    builtin={
+        "sim": "legbench.plant.sim_choice:SimChoice",
+        "analytic": "legbench.plant.analytic_choice:AnalyticChoice",
+        "can": "legbench.plant.can_choice:CanChoice",
+    },
+    group="legbench.plants",
+    members={"open": "open(leg) -> AbstractPlant"},
+)
+"""Every plant that can be asked for."""
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SimChoice:
-    """MuJoCo."""
-
-    kind: ClassVar[str] = "sim"
-    limits: Path | None = None
-    """Safety limits; none act without a file."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AnalyticChoice:
-    """The paper's equations."""
-
-    kind: ClassVar[str] = "analytic"
-    limits: Path | None = None
-    """Safety limits; none act without a file."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CanChoice:
-    """Servo drives on a CAN bus, real or emulated."""
-
-    kind: ClassVar[str] = "can"
-    bus: Path = Path("hardware/leg.toml")
-    interface: str | None = None
-    channel: str | None = None
-    bitrate: int | None = None
-    read_only: bool = False
-    limits: Path | None = None
-    """By default `limits.toml` beside the bus file."""
-    faults: tuple[Fault, ...] = ()
-    """To inject into the emulated leg in this process, on its virtual time."""
-
-    def is_virtual(self, config: BusConfig) -> bool:
-        """Whether it is the emulated leg in this process, in virtual time."""
-        return (self.interface or config.interface) == EMULATED
-
-
-PlantChoice = SimChoice | AnalyticChoice | CanChoice
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Leg:
-    """The leg that the plant is to be."""
-
-    design: LegDesign
-    options: BuildOptions
-    start: Start
-    servo: ServoConfig
-
-
-@final
-class CanClock(AbstractClock):
-    """Never waits, because the link does; tells how late its last SYNC was."""
-
-    def __init__(self, plant: CanPlant) -> None:
-        self._plant = plant
-
-    def start(self) -> None:
-        """The link's grid is laid already."""
-
-    def wait(self, cycle: int) -> float:
-        """Lateness of the cycle that has been seen [s]."""
-        return self._plant.late
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OpenPlant:
-    """A plant that is ready to be reset, and what belongs to a run on it."""
-
-    plant: AbstractPlant
-    clock: AbstractClock
-    """What paces it if nobody asks for another pace."""
-    manifest: dict[str, Any]
-    """What a run has to say of it."""
-    session: Session | None = None
-    link: Link | None = None
-
-    def start_log(self, run: Path) -> None:
-        """Record raw frames into a run folder from now on, if there are any."""
-        if self.session is not None:
-            self.session.log_to(run / BUS_LOG)
-
-    @property
-    def began(self) -> float | None:
-        """Time of row 0 on the bus's own time base, as in the bus log [s]."""
-        return self.plant.began if isinstance(self.plant, CanPlant) else None
-
-    def events(self) -> dict[str, dict[str, Any]]:
-        """What a run on it has to tell in the end, by name."""
-        if self.link is None:
-            return {}
-        cycle = self.link.cycle
-        return {
-            "bus": {
-                "skipped_cycles": self.link.skipped_total,
-                "silent_cycles": cycle.silent_total,
-                "late_frames": cycle.late_frames,
-                "error_frames": cycle.error_frames,
-                "lost_cycles": [watch.lost_total for watch in cycle.watches],
-                "emergencies": [str(text) for watch in cycle.watches for text in watch.history],
-                "state": self.link.state.name.lower(),
-                "began": self.began,
-            }
-        }
-
-
-def open_plant(choice: PlantChoice, leg: Leg) -> OpenPlant:
-    """Open the plant of a choice; nothing moves before its `reset`.
-
-    Raises:
-        ConfigError: a file or a setting makes no sense, or limits are looser than the design's.
-        BusError: the interface is not there, is down, or has a master.
-        DriveError: a drive is missing, is another one, or refuses its configuration.
-    """
-    match choice:
-        case SimChoice():
-            plant = SimPlant(leg.design, leg.options, leg.start, leg.servo)
-            return _alone(choice, leg, plant, {})
-        case AnalyticChoice():
-            plant = AnalyticPlant(leg.design, leg.options.setup, leg.start, leg.servo)
-            return _alone(choice, leg, plant, {"accuracy": asdict(Accuracy())})
-        case CanChoice():
-            return _open_can(choice, leg)
-
-
-def limits_for(path: Path, design: LegDesign) -> SafetyLimits:
-    """Limits of a file; a range that it leaves out is the design's.
-
-    Raises:
-        ConfigError: the file makes no sense, or is looser than the design.
-    """
-    limits, joint = load_limits(path), joint_ranges(design)
-    open_range = (UNLIMITED, UNLIMITED)
-    limits = replace(
-        limits,
-        motor_range=joint if limits.motor_range == open_range else limits.motor_range,
-        joint_range=joint if limits.joint_range == open_range else limits.joint_range,
-    )
-    try:
-        limits.check_within(motor=joint, joint=joint)
-    except ConfigError as error:
-        raise ConfigError(f"{path}: {error}") from None
-    return limits
-
-
-def joint_ranges(design: LegDesign) -> tuple[Range, Range]:
-    """What the stops of a design leave to q1 and q2, and so to the motors [rad]."""
-    hip, knee = design.limits.hip, design.limits.knee
-    return hip, (hip[0] + knee[0], hip[1] + knee[1])
-
-
-def _alone(
-    choice: SimChoice | AnalyticChoice, leg: Leg, plant: AbstractPlant, told: dict[str, Any]
-) -> OpenPlant:
-    """A plant that is nothing but computed, in virtual time."""
-    manifest = {"plant": choice.kind, **told}
-    if choice.limits is not None:
-        limits = limits_for(choice.limits, leg.design)
-        plant = LimitedPlant(plant, limits, delay_cycles=leg.servo.delay_cycles)
-        manifest["limits"] = asdict(limits)
-    return OpenPlant(plant=plant, clock=VirtualClock(), manifest=manifest)
-
-
-def _open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
-    if leg.servo != ServoConfig():
-        raise ConfigError(
-            "servo settings describe a simulated servo; on the can plant the drives decide: leave "
-            "slew_rate, bandwidth, delay_cycles and encoder_counts out"
-        )
-    config = load_bus(choice.bus)
-    if len(config.nodes) != 2:
-        raise ConfigError(f"{choice.bus}: {len(config.nodes)} nodes; a leg has 2")
-    if config.period != PERIOD:
-        raise ConfigError(f"{choice.bus}: period_us is {config.period_us}; runs need 1000")
-    check_load(config.at(choice.bitrate))
-    limits = limits_for(choice.limits or choice.bus.parent / LIMITS_NAME, leg.design)
-    check_stopping(config, limits)
-    if not choice.is_virtual(config):
-        limits.require_complete()
-    session = open_session(config, choice, leg, leads=not choice.read_only)
-    granted = session.be_punctual()
-    try:
-        link = session.link(limits, leg.design.stiffness, read_only=choice.read_only)
-        link.open()
-    except LegbenchError:
-        session.close()
-        raise
-    plant = CanPlant(session, link, leg.start, read_only=choice.read_only)
-    manifest = {
-        "plant": "can",
-        "bus": {
-            "file": str(choice.bus),
-            "interface": choice.interface or config.interface,
-            "channel": choice.channel or config.channel,
-            "bitrate": choice.bitrate or config.bitrate,
-            "read_only": choice.read_only,
-            "nodes": {
-                node.name: {"id": node.node_id, "identity": asdict(node.identity)}
-                for node in config.nodes
-            },
-        },
-        "limits": asdict(limits),
-        "realtime": None if granted is None else asdict(granted),
-    }
-    return OpenPlant(
-        plant=plant, clock=CanClock(plant), manifest=manifest, session=session, link=link
-    )
-
-
-def open_session(
-    config: BusConfig, choice: CanChoice, leg: Leg | None = None, *, leads: bool = True
-) -> Session:
-    """Open the bus of a choice; with interface `legbench` the emulated leg in this process.
-
-    The channel is locked before its adapter is touched: opening a serial one resets it under a
-    program that uses it. Whoever only reads locks no channel that others may share.
-
-    Args:
-        config: the bus file.
-        choice: which bus.
-        leg: on the shafts of emulated drives; nothing by default.
-        leads: or only reads.
-
-    Raises:
-        BusError: the interface is not there, is down, or has a master.
-    """
-    if not choice.is_virtual(config):
-        adapter = adapter_of(config, interface=choice.interface, channel=choice.channel)
-        lock = ChannelLock.of_channel(adapter.interface, adapter.channel)
-        if leads or not adapter.shared:
-            lock.acquire()
-        try:
-            bus = open_bus(config.at(choice.bitrate), adapter)
-        except BaseException:
-            lock.release()
-            raise
-        return Session(bus, config.at(choice.bitrate), lock=lock)
-    network = _emulated(config, choice, leg)
-    bus = LockstepBus("leg", network=network, bitrate=choice.bitrate)
-    return Session(bus, config.at(choice.bitrate))
-
-
-def _emulated(config: BusConfig, choice: CanChoice, leg: Leg | None) -> Network:
-    """The emulated leg; its drives run at the bitrate of the bus file, whatever is asked for.
-
-    For those who only look its drives have kept their configuration: nobody may write it.
-    """
-    if leg is None:
-        return emulate(config, configured=choice.read_only)
-    motors = [float(value) for value in leg.start.motor_pos]
-    return emulate(
-        config,
-        [Behaviour(start_pos=motor) for motor in motors],
-        body=EmulatedLeg(leg.design, leg.options, leg.start),
-        faults=choice.faults,
-        configured=choice.read_only,
-    )
+__all__ = [
+    "BUS_LOG",
+    "EMULATED",
+    "LIMITS_NAME",
+    "PLANTS",
+    "AnalyticChoice",
+    "CanChoice",
+    "Leg",
+    "OpenPlant",
+    "PlantSettings",
+    "SimChoice",
+    "joint_ranges",
+    "limits_for",
+    "open_plant",
+]

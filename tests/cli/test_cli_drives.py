@@ -10,13 +10,13 @@ from typing import Any
 import pytest
 from commands import Done, called
 
-from legbench import plants
 from legbench.drives.bus_file import load_bus
 from legbench.drives.config import BusConfig
 from legbench.drives.emulated.network import Network
 from legbench.drives.master.lock import ChannelLock
 from legbench.drives.realtime import Granted
 from legbench.drives.session import Session
+from legbench.plant import can_open
 
 HARDWARE = Path(__file__).parents[2] / "hardware"
 MODELS = Path(__file__).parents[2] / "models"
@@ -232,13 +232,13 @@ def test_a_bus_file_that_does_not_fit_is_named(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    truth, real = load_bus(BUS), plants.emulate
+    truth, real = load_bus(BUS), can_open.emulate
 
     def the_bench(_config: BusConfig, *rest: Any, **more: Any) -> Network:
         """The drives are those of the bench, whatever the file says."""
         return real(truth, *rest, **more)
 
-    monkeypatch.setattr(plants, "emulate", the_bench)
+    monkeypatch.setattr(can_open, "emulate", the_bench)
     where = ("--bus", changed(tmp_path, *wanted), "--interface", "legbench")
     called(capfd, *JUMP, *where, "--out", tmp_path / "runs").refused(*words)
     assert not (tmp_path / "runs").exists()

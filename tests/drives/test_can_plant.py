@@ -134,7 +134,8 @@ def test_limits_slew_a_simulation_as_they_slew_the_drives(tmp_path: Path) -> Non
     slow = tmp_path / "limits.toml"
     slow.write_text("command_speed = 5.0\n")
     seen = []
-    for plant in (SimChoice(limits=slow), replace(EMULATED, limits=slow)):
+    chosen_limits = load_limits(slow)
+    for plant in (SimChoice(limits=chosen_limits), replace(EMULATED, limits=chosen_limits)):
         chosen = replace(experiment(BangBangConfig(), 0.4), plant=plant)
         found = load(record(chosen, tmp_path / plant.kind).path)
         assert found.manifest["limits"]["command_speed"] == 5.0
@@ -157,7 +158,8 @@ def test_a_limit_ends_the_run_with_its_name_on_every_plant(
 ) -> None:
     limits = tmp_path / "limits.toml"
     limits.write_text(text)
-    for plant in (SimChoice(limits=limits), replace(EMULATED, limits=limits)):
+    chosen_limits = load_limits(limits)
+    for plant in (SimChoice(limits=chosen_limits), replace(EMULATED, limits=chosen_limits)):
         finished = record(
             replace(experiment(JumpConfig(), 1.0), plant=plant), tmp_path / plant.kind
         )

@@ -13,7 +13,8 @@ from legbench.drives.bus_file import load_bus
 from legbench.drives.config import BusConfig
 from legbench.drives.session import Session
 from legbench.errors import ConfigError
-from legbench.plants import CanChoice, open_session
+from legbench.plant.can_choice import CanChoice
+from legbench.plant.can_open import open_session
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -48,8 +48,8 @@ class Emulate:
         from legbench.drives.unix_server import UnixServer
         from legbench.experiment import Experiment, start_of
         from legbench.loop import stop_on_interrupt
+        from legbench.plant.can_open import open_session
         from legbench.plant.emulated_leg import EmulatedLeg
-        from legbench.plants import open_session
 
         _check_time("seconds", self.seconds)
         self._check_way(bench)

@@ -14,10 +14,14 @@ STYLE = (
 )
 
 
-def parse(kind: type[Arguments], command: str, arguments: list[str]) -> Arguments:
+def parse(
+    kind: type[Arguments], command: str, arguments: list[str], description: str | None = None
+) -> Arguments:
     """Read a command's flags into its dataclass; `--help` comes from the docstrings.
 
     Raises:
         SystemExit: help was asked for (0), or the flags make no sense (2).
     """
-    return tyro.cli(kind, prog=f"legbench {command}", args=arguments, config=STYLE)
+    return tyro.cli(
+        kind, prog=f"legbench {command}", description=description, args=arguments, config=STYLE
+    )

@@ -1,135 +1,24 @@
 """`legbench run`: a controller drives a leg, the run is recorded and rated."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING
 
-from tyro.conf import subcommand
-
-from legbench.cli.output import note, print_json, progress
-from legbench.cli.parse import parse
-from legbench.cli.table import print_summary
-from legbench.clock import WallClock
-from legbench.control import BangBangConfig, JumpConfig, PositionJumpConfig, SetpointMeaning
-from legbench.design import load_design
-from legbench.design.setup import Setup, SetupKind
-from legbench.errors import ConfigError, MissingExtraError
-from legbench.experiment import Experiment, record
-from legbench.kinematics import ModalConvention
-from legbench.loop import stop_on_interrupt
-from legbench.metrics import summarise
-from legbench.mjcf import Ground, Linkage, LinkageKind
-from legbench.plant.start import PERIOD
-from legbench.plants import EMULATED, AnalyticChoice, CanChoice, PlantChoice, SimChoice
-from legbench.recording.reader import load
-from legbench.servo import ServoConfig
+from legbench.cli.output import note, print_json, progress, report_error
+from legbench.cli.run_chosen import UsageError, chosen_by
+from legbench.errors import MissingExtraError
+from legbench.experiment.data import Experiment
 
 if TYPE_CHECKING:
     from legbench.viz.live.launch import LiveView
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RunArguments:
-    """Run a controller on a leg, record it, rate it."""
-
-    controller: (
-        Annotated[JumpConfig, subcommand("jump", description="hop in place")]
-        | Annotated[BangBangConfig, subcommand("bang-bang", description="sustain the mode")]
-        | Annotated[PositionJumpConfig, subcommand("position-jump", description="step response")]
-    )
-    design: Path = Path("models/optimal.toml")
-    """Design file of the leg."""
-    setup: SetupKind | None = None
-    """How the leg is held; by default jump for jump, ffs for the others."""
-    boom_radius: float | None = None
-    """Length of the boom that guides the trunk in ffs [m]; by default a plane."""
-    linkage: LinkageKind = LinkageKind.BARS
-    """Physical parallel bars, or the constraint they make."""
-    tip_radius: float = Ground().tip_radius
-    """Radius of the rolling foot tip [m]."""
-    plant: Literal["sim", "analytic", "can"] = "sim"
-    """What is controlled: MuJoCo, the paper's equations, or the drives on a bus."""
-    limits: Path | None = None
-    """Safety limits; on can by default limits.toml beside the bus file, elsewhere none."""
-    bus: Path = Path("hardware/leg.toml")
-    """can: bus file."""
-    interface: str | None = None
-    """can: python-can's name of the interface, legbench is an emulated leg; else the bus file's."""
-    channel: str | None = None
-    """can: such as can0; else the bus file's."""
-    bitrate: int | None = None
-    """can: of interfaces that set their own; else the bus file's [bit/s]."""
-    read_only: bool = False
-    """can: observe, change nothing in a drive; commands are recorded and go nowhere."""
-    setpoint: SetpointMeaning = SetpointMeaning.LINK
-    """Whether z2 is the link's equilibrium or the motor's position."""
-    convention: ModalConvention = ModalConvention.ORTHONORMAL
-    """How eq. (15) is read."""
-    servo: ServoConfig = field(default_factory=ServoConfig)
-    duration: float = 8.0
-    """[s]"""
-    out: Path = Path("runs")
-    """Folder of the runs."""
-    real_time: bool = False
-    """Pace the simulation by the wall clock; watching does so, too."""
-    view: bool = False
-    """Watch live in rerun, from a process of its own."""
-    serve: bool = False
-    """Watch live in a browser on this machine."""
-    json: bool = False
-    """Print one JSON object on stdout."""
-
-
-def experiment_of(chosen: RunArguments) -> Experiment:
-    """The experiment that the flags describe.
-
-    Raises:
-        LegbenchError: the design file or a setting makes no sense.
-    """
-    kind = chosen.setup or chosen.controller.usual_setup
-    return Experiment(
-        design=load_design(chosen.design),
-        controller=chosen.controller,
-        setup=Setup(kind=kind, boom_radius=chosen.boom_radius),
-        linkage=Linkage(kind=chosen.linkage),
-        ground=Ground(tip_radius=chosen.tip_radius),
-        servo=chosen.servo,
-        meaning=chosen.setpoint,
-        convention=chosen.convention,
-        duration=chosen.duration,
-        plant=plant_of(chosen),
-    )
-
-
-def plant_of(chosen: RunArguments) -> PlantChoice:
-    """The plant that the flags describe.
-
-    Raises:
-        ConfigError: a flag of the bus for a plant that has none.
-    """
-    given = (chosen.interface, chosen.channel, chosen.bitrate, chosen.read_only or None)
-    if chosen.plant != "can" and any(value is not None for value in given):
-        raise ConfigError(
-            "interface, channel, bitrate and read-only are of a bus, and plant "
-            f"{chosen.plant} has none; add --plant can"
-        )
-    if chosen.plant == "sim":
-        return SimChoice(limits=chosen.limits)
-    if chosen.plant == "analytic":
-        return AnalyticChoice(limits=chosen.limits)
-    return CanChoice(
-        bus=chosen.bus,
-        interface=chosen.interface,
-        channel=chosen.channel,
-        bitrate=chosen.bitrate,
-        read_only=chosen.read_only,
-        limits=chosen.limits,
-    )
-
-
-def plays_alone(chosen: RunArguments) -> bool:
+def plays_alone(experiment: Experiment) -> bool:
     """Whether time is the computer's own to choose; drives on a wire keep their own."""
-    return chosen.plant != "can" or chosen.interface == EMULATED
+    from legbench.plants import EMULATED, CanChoice
+
+    plant = experiment.plant
+    return not isinstance(plant, CanChoice) or plant.interface == EMULATED
 
 
 @dataclass(slots=True)
@@ -159,12 +48,24 @@ class Watching:
 
 def main(arguments: list[str]) -> int:
     """Run; 0 when it came to its end or was stopped by ^C, 1 when a fault ended it."""
-    chosen = parse(RunArguments, "run", arguments)
-    experiment = experiment_of(chosen)
+    try:
+        asked = chosen_by(arguments)
+    except UsageError as error:
+        report_error(str(error))
+        return 2
+    from legbench.cli.table import print_summary
+    from legbench.clock import WallClock
+    from legbench.experiment.record import record
+    from legbench.loop import stop_on_interrupt
+    from legbench.metrics import summarise
+    from legbench.plant.start import PERIOD
+    from legbench.recording.reader import load
+
+    chosen, experiment = asked.arguments, asked.experiment
     watched = chosen.view or chosen.serve
     watching = Watching(serve=chosen.serve)
     paced = watched or chosen.real_time
-    clock = WallClock(PERIOD) if paced and plays_alone(chosen) else None
+    clock = WallClock(PERIOD) if paced and plays_alone(experiment) else None
     with stop_on_interrupt() as stop:
         finished = record(
             experiment,

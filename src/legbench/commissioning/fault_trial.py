@@ -29,6 +29,7 @@ from legbench.drives.limits import SafetyLimits
 from legbench.errors import ConfigError
 from legbench.experiment import Experiment, make_controller, start_of, targets_of
 from legbench.loop import Outcome, StopFlag, run
+from legbench.plant.can import CanPlant
 from legbench.plants import BUS_LOG, EMULATED, LIMITS_NAME, CanChoice, Leg, OpenPlant, open_plant
 from legbench.recording.reader import load
 from legbench.recording.writer import RunWriter
@@ -214,7 +215,10 @@ def try_fault(
     leg = Leg(design=design, options=chosen.options, start=start, servo=chosen.servo)
     opened = open_plant(choice, leg)
     network = _network(opened)
-    with opened.plant, RunWriter.create(out, opened.manifest, name="trial") as writer:
+    with (
+        opened.plant,
+        RunWriter.create(out, {"plant": "can"} | opened.facts, name="trial") as writer,
+    ):
         opened.start_log(writer.path)
         view = start_view(writer.path) if trial.viewer and start_view is not None else None
         try:
@@ -226,7 +230,7 @@ def try_fault(
                     os.kill(view.pid, signal.SIGCONT)
         strike_ns = network.now_ns if trial.gone or trial.interrupted else STRIKE_NS
         ticks = outcome.cycles + opened.events()["bus"]["skipped_cycles"]
-        reaction_ns = round(1e9 * (opened.began or 0.0)) + ticks * MS
+        reaction_ns = round(1e9 * _can(opened).began) + ticks * MS
         if trial.gone:
             reaction_ns = _wait_for_drives(network)
         opened.plant.close()
@@ -248,8 +252,14 @@ def try_fault(
     )
 
 
+def _can(opened: OpenPlant) -> CanPlant:
+    if not isinstance(opened.plant, CanPlant):
+        raise DriveError("faults strike drives; this plant has none")
+    return opened.plant
+
+
 def _network(opened: OpenPlant) -> Network:
-    bus = None if opened.session is None else opened.session.bus
+    bus = _can(opened).session.bus
     if not isinstance(bus, LockstepBus):
         raise DriveError("faults strike on the emulated leg in this process only")
     return bus.network

@@ -31,9 +31,7 @@ class BangBangPhase(IntEnum):
 
 
 PHASES = (
-    PhaseInfo(
-        code=BangBangPhase.REST, name="rest", role=Role.REST, doc="before the first switch"
-    ),
+    PhaseInfo(code=BangBangPhase.REST, name="rest", role=Role.REST, doc="before the first switch"),
     PhaseInfo(
         code=BangBangPhase.MIDDLE,
         name="middle",

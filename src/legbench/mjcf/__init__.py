@@ -1,11 +1,17 @@
-"""From a design to a MuJoCo model; the only writer of MJCF."""
+"""From a design to a MuJoCo model; the only writer of MJCF.
 
-from legbench.mjcf.build import BuildOptions, build_spec
-from legbench.mjcf.ground import Ground
-from legbench.mjcf.linkage import Linkage, LinkageKind
-from legbench.mjcf.numerics import Numerics
-from legbench.mjcf.pose import rest_qpos
-from legbench.mjcf.xml import to_xml, xml_hash
+What imports MuJoCo is loaded when it is asked for: choosing a model costs nothing.
+"""
+
+from typing import TYPE_CHECKING
+
+from legbench.lazily import lazy_names
+from legbench.mjcf.options import BuildOptions, Ground, Linkage, LinkageKind, Numerics
+
+if TYPE_CHECKING:
+    from legbench.mjcf.build import build_spec
+    from legbench.mjcf.pose import rest_qpos
+    from legbench.mjcf.xml import to_xml, xml_hash
 
 __all__ = [
     "BuildOptions",
@@ -18,3 +24,12 @@ __all__ = [
     "to_xml",
     "xml_hash",
 ]
+__getattr__ = lazy_names(
+    __name__,
+    {
+        "build_spec": "legbench.mjcf.build",
+        "rest_qpos": "legbench.mjcf.pose",
+        "to_xml": "legbench.mjcf.xml",
+        "xml_hash": "legbench.mjcf.xml",
+    },
+)

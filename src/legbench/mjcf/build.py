@@ -1,36 +1,23 @@
 """Design + setup + linkage -> `mujoco.MjSpec`."""
 
-from dataclasses import dataclass, field
-
 import mujoco
 import numpy as np
 
 from legbench.design import LegDesign, Segment
-from legbench.design.setup import Setup, SetupKind
+from legbench.design.setup import SetupKind
 from legbench.design.statics import GRAVITY
 from legbench.errors import ConfigError
 from legbench.mjcf import look, sensors
-from legbench.mjcf.ground import Ground, add_world
+from legbench.mjcf.ground import add_world
 from legbench.mjcf.linkage import (
     HINGE_AXIS,
-    Linkage,
-    LinkageKind,
     add_bars,
     add_reduced,
     linear_damping,
 )
-from legbench.mjcf.numerics import Numerics
+from legbench.mjcf.numerics import apply_numerics
+from legbench.mjcf.options import BuildOptions, Linkage, LinkageKind, Numerics
 from legbench.mjcf.pose import BENT, hip_height, rest_qpos
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BuildOptions:
-    """What a model is made of besides the design."""
-
-    setup: Setup = field(default_factory=Setup)
-    linkage: Linkage = field(default_factory=Linkage)
-    ground: Ground = field(default_factory=Ground)
-    numerics: Numerics = field(default_factory=Numerics)
 
 
 def build_spec(design: LegDesign, options: BuildOptions) -> mujoco.MjSpec:
@@ -47,7 +34,7 @@ def build_spec(design: LegDesign, options: BuildOptions) -> mujoco.MjSpec:
     spec = mujoco.MjSpec()
     spec.modelname = f"{design.name}_{setup.kind}_{options.linkage.kind}"
     spec.compiler.degree = False
-    numerics.apply(spec)
+    apply_numerics(spec, numerics)
     spec.option.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
     flat = setup.kind is SetupKind.HFTS
     spec.option.gravity = GRAVITY * np.array([0.0, 1.0, 0.0] if flat else [0.0, 0.0, -1.0])

@@ -1,44 +1,15 @@
 """What a leg stands on, hangs over or lies on."""
 
-import math
-from dataclasses import dataclass
-
 import mujoco
 import numpy as np
 
 from legbench.design.setup import Setup, SetupKind
-from legbench.errors import ConfigError
 from legbench.mjcf.linkage import connect_sites
 from legbench.mjcf.look import add_table, add_tip
-from legbench.mjcf.numerics import Numerics
+from legbench.mjcf.options import Ground, Numerics
 
 HANGING_CLEARANCE = 0.1
 """Between the ground and the foot of a leg that hangs from a fixed trunk [m]."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Ground:
-    """The contact of foot and ground.
-
-    The model of the paper stands on a point. A round tip rolls, and rolling couples the polar
-    angle to the radial motion: 3 mm of radius make 0.02 rad of it in a leg that has none.
-
-    Raises:
-        ConfigError: a negative friction, or a tip without radius.
-    """
-
-    friction: float = 1.0
-    """Sliding friction [-]."""
-    tip_radius: float = 1e-4
-    """Of the foot tip that touches the ground [m]; by default a point, near enough."""
-
-    def __post_init__(self) -> None:
-        if not 0.0 <= self.friction < math.inf:
-            raise ConfigError(f"friction is {self.friction:g}; it must be finite, zero or more")
-        if not 0.0 < self.tip_radius < math.inf:
-            raise ConfigError(
-                f"tip_radius is {self.tip_radius:g} m; it must be positive and finite"
-            )
 
 
 def add_world(spec: mujoco.MjSpec, setup: Setup, ground: Ground, numerics: Numerics) -> None:

@@ -6,68 +6,17 @@ the shank hold the foot parallel to the thigh (black in Fig. 1). Cranks lie alon
 so the angle of both parallelograms is the knee angle q2 - q1.
 """
 
-import math
-from dataclasses import dataclass
-from enum import StrEnum
-
 import mujoco
 import numpy as np
 
 from legbench.design import LegDesign
-from legbench.errors import ConfigError
 from legbench.mjcf.look import BLACK, GREEN, GREY, add_capsule
-from legbench.mjcf.numerics import Numerics
+from legbench.mjcf.options import Linkage, Numerics
 
 HINGE_AXIS = (0.0, -1.0, 0.0)
 """A positive angle swings a hanging segment forward (+x)."""
 BAR_SIDE = 0.014
 """How far the bars run beside the segments; seen only, hinges stay in the plane [m]."""
-MIN_BAR_DENSITY = 5e-4
-"""Lighter bars make the loop's equations too stiff for the time step [kg/m]."""
-
-
-class LinkageKind(StrEnum):
-    """How the knee's motion reaches hip motor and foot."""
-
-    BARS = "bars"
-    """Physical parallel bars, closed by equality constraints."""
-    REDUCED = "reduced"
-    """Ankle = -knee as a joint equality, spring 2 on a fixed tendon hip + knee."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Linkage:
-    """The linkage and its dimensions.
-
-    The trunk is lightened by the bars' mass, so that the system weighs what the design says.
-
-    Raises:
-        ConfigError: a bar too light to simulate, or a crank without length.
-    """
-
-    kind: LinkageKind = LinkageKind.BARS
-    bar_density: float = 0.006
-    """Mass per length of crank and bars [kg/m]: a square PA6 rod of 2.3 mm."""
-    crank_length: float = 0.02
-    """Of hip crank and thigh extension [m]."""
-
-    def __post_init__(self) -> None:
-        if not MIN_BAR_DENSITY <= self.bar_density < math.inf:
-            raise ConfigError(
-                f"bar_density is {self.bar_density:g} kg/m; from {MIN_BAR_DENSITY:g} kg/m on the "
-                "loops can be integrated, for massless bars use linkage 'reduced'"
-            )
-        if not 0.0 < self.crank_length < math.inf:
-            raise ConfigError(
-                f"crank_length is {self.crank_length:g} m; it must be positive and finite"
-            )
-
-    def mass(self, design: LegDesign) -> float:
-        """Of everything that the linkage adds to a leg [kg]."""
-        if self.kind is LinkageKind.REDUCED:
-            return 0.0
-        length = self.crank_length + design.thigh.length + design.shank.length
-        return self.bar_density * length
 
 
 def linear_damping(coefficient: float) -> list[float]:

@@ -107,6 +107,11 @@ class CanPlant(AbstractPlant):
         """Quick stop of both drives, pre-operational, bus closed; twice is once, never raises."""
         self._session.close()
 
+    @property
+    def session(self) -> Session:
+        """The bus, closed with the plant."""
+        return self._session
+
     def _exchange(self, motor_pos: Floats) -> Sample:
         if not self._read_only:
             self.link.command(motor_pos.tolist())

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import ClassVar
 
 from legbench.drives.codec.frame import Frame
 
@@ -24,6 +25,7 @@ class FrameFaultKind(Enum):
 class FrameFault:
     """Happens to frames with an identifier, or to all."""
 
+    family: ClassVar[str] = "frame"
     kind: FrameFaultKind
     cob_id: int | None = None
     start_ns: int = 0
@@ -54,6 +56,7 @@ class NodeFaultKind(Enum):
 class NodeFault:
     """Happens to a drive, by node id."""
 
+    family: ClassVar[str] = "node"
     kind: NodeFaultKind
     node_id: int
     start_ns: int
@@ -65,6 +68,7 @@ class NodeFault:
 class Babble:
     """A node that shouts: a frame every so often, whatever the others have to say."""
 
+    family: ClassVar[str] = "babble"
     cob_id: int
     start_ns: int
     end_ns: int

@@ -1,0 +1,247 @@
+"""What `legbench run` was asked for: file, then `--set`, then flags, as one experiment."""
+
+from collections.abc import Sequence
+from dataclasses import MISSING, dataclass, field, fields
+from pathlib import Path
+from typing import Any, get_type_hints
+
+from legbench.cli.parse import parse
+from legbench.cli.run_arguments import (
+    KEYS,
+    CommonArguments,
+    GuestFlag,
+    arguments_with,
+    guest_flags,
+    said,
+)
+from legbench.control import CONTROLLERS
+from legbench.errors import ConfigError
+from legbench.experiment.data import Experiment
+from legbench.experiment.overrides import overlaid, parse_setting
+from legbench.experiment.reading import placed
+from legbench.experiment.tables import read_tables, read_toml, tables_of_run
+from legbench.experiment.writing import Writer
+from legbench.guests import Registry
+from legbench.plants import PLANTS
+from legbench.servo import ServoConfig
+
+SCANNED = {"--setup": "setup.kind", "--linkage": "linkage.kind", "--plant": "plant.kind"}
+"""Flags that choose a kind: they decide which other flags there are."""
+
+
+class UsageError(ConfigError):
+    """Words of the command line that mean nothing."""
+
+
+@dataclass(slots=True, kw_only=True)
+class Scan:
+    """What the words of the command line say before any flag is understood."""
+
+    subject: str | None = None
+    """Controller or experiment file."""
+    settings: list[str] = field(default_factory=list)
+    """Texts behind `--set`."""
+    values: dict[str, str] = field(default_factory=dict)
+    """Flag -> its value, of those that must be known first."""
+    rest: list[str] = field(default_factory=list)
+    """The words without the subject."""
+
+
+def scan(words: Sequence[str]) -> Scan:
+    """Pick out of the command line what decides which flags there are."""
+    found = Scan(rest=list(words))
+    if words and not words[0].startswith("-"):
+        found.subject, found.rest = words[0], list(words[1:])
+    for index, word in enumerate(found.rest):
+        flag, equals, value = word.partition("=")
+        if flag in ("--set", "--again", "--design", *SCANNED):
+            value = value if equals else "".join(found.rest[index + 1 : index + 2])
+            if flag == "--set":
+                found.settings.append(value)
+            else:
+                found.values[flag] = value
+    return found
+
+
+@dataclass(slots=True, kw_only=True)
+class Tables:
+    """Tables of an experiment on their way from file to flags."""
+
+    content: dict[str, Any]
+    folder: Path
+    """What paths are relative to."""
+    json: bool = False
+
+    def put(self, key: str, value: Any) -> None:
+        """Replace one entry; raises ConfigError."""
+        self.content = overlaid(self.content, key, value, self.folder)
+
+    def here(self, path: Path) -> str:
+        """A path of the command line, which is relative to where the user is."""
+        return str(path) if self.folder == Path() else str(path.absolute())
+
+    def here_guest(self, name: str) -> str:
+        """The name of a kind of the command line; that of a file is relative to the user."""
+        place, colon, guest = name.rpartition(":")
+        return f"{self.here(Path(place))}:{guest}" if colon and place.endswith(".py") else name
+
+    def at(self, key: str) -> Any:
+        """The entry at a dotted key, None if there is none."""
+        entry: Any = self.content
+        for name in key.split("."):
+            entry = entry.get(name) if isinstance(entry, dict) else None
+        return entry
+
+
+def first_tables(words: Scan) -> Tables:
+    """The tables of the file, the run or the controller that was named, with `--set` in them.
+
+    Raises:
+        LegbenchError: there is no such file or run, or a setting is none.
+        UsageError: nothing was named.
+    """
+    if "--again" in words.values:
+        if words.subject is not None:
+            raise UsageError(f"--again runs its own experiment; leave '{words.subject}' out")
+        content, folder = tables_of_run(Path(words.values["--again"]))
+        tables = Tables(content=content, folder=folder, json=True)
+    elif words.subject is None:
+        raise UsageError(
+            f"run what? {', '.join(CONTROLLERS.names())}, path/to/mine.py:Class, an experiment "
+            "FILE.toml, or --again RUN"
+        )
+    elif words.subject.endswith(".toml"):
+        path = Path(words.subject)
+        tables = Tables(content=read_toml(path), folder=path.parent)
+    else:
+        content = {"design": "models/optimal.toml", "controller": {"kind": words.subject}}
+        tables = Tables(content=content, folder=Path())
+    if design := words.values.get("--design"):
+        tables.put("design", tables.here(Path(design)))
+    for text in words.settings:
+        tables.put(*parse_setting(text))
+    for flag, key in SCANNED.items():
+        if flag in words.values:
+            tables.put(key, tables.here_guest(words.values[flag]))
+    return tables
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Chosen:
+    """What the command line asks for."""
+
+    experiment: Experiment
+    arguments: CommonArguments
+
+
+def chosen_by(words: Sequence[str]) -> Chosen:
+    """Understand a command line; `--help` needs neither design nor settings that make sense.
+
+    Raises:
+        LegbenchError: a file is not there, or an experiment makes no sense; all of it is told.
+        UsageError: it names no controller, file or plant that exists.
+        SystemExit: help was asked for (0), or the flags make no sense (2).
+    """
+    scanned = scan(words)
+    asks_help = bool({"-h", "--help"} & set(words))
+    if asks_help and scanned.subject is None and "--again" not in scanned.values:
+        parse(arguments_with([], {}), "run", scanned.rest, CONTROLLER_HELP)
+    tables = first_tables(scanned)
+    flags = _flags(tables)
+    _check_bench(words, str(tables.at("plant.kind") or "sim"), {flag.name for flag in flags})
+    arguments = parse(arguments_with(flags, _said(tables)), _command(scanned), scanned.rest)
+    _put_flags(tables, arguments, flags)
+    experiment = read_tables(Experiment, tables.content, tables.folder, json=tables.json)
+    return Chosen(experiment=experiment, arguments=arguments)
+
+
+CONTROLLER_HELP = (
+    "Run CONTROLLER, an experiment FILE.toml, or --again RUN. Controllers: "
+    f"{', '.join(CONTROLLERS.builtin)}, installed ones, or path/to/mine.py:Class; "
+    "`legbench run CONTROLLER --help` tells the flags of one."
+)
+
+
+def _command(scanned: Scan) -> str:
+    return "run" if scanned.subject is None else f"run {scanned.subject}"
+
+
+def _flags(tables: Tables) -> list[GuestFlag]:
+    """The flags of the chosen controller and plant."""
+    taken = {entry.name for entry in fields(CommonArguments)}
+    taken |= {entry.name for entry in fields(ServoConfig)}
+    found: list[GuestFlag] = []
+    for room, registry in (("controller", CONTROLLERS), ("plant", PLANTS)):
+        kind = _kind(registry, tables, room)
+        settings = tables.at(f"{room}.settings")
+        settings = settings if isinstance(settings, dict) else {}
+        found += guest_flags(room, kind, taken, settings, tables.folder)
+        taken |= {flag.name for flag in found}
+    return found
+
+
+def _kind(registry: Registry, tables: Tables, room: str) -> type[Any]:
+    name = tables.at(f"{room}.kind")
+    if name is None and room == "plant":
+        name = "sim"
+    if not isinstance(name, str):
+        raise ConfigError(f"{room}.kind is missing; there are {', '.join(registry.names())}")
+    place = placed(name, tables.folder)
+    if ":" not in name and not name.endswith(".py") and name not in registry.names():
+        raise UsageError(
+            f"no {room} '{name}'; there are {', '.join(registry.names())}, or a class of your own "
+            "as path/to/mine.py:Class"
+        )
+    return registry.find(place)
+
+
+def _check_bench(words: Sequence[str], plant: str, known: set[str]) -> None:
+    """Name the plant to which a flag belongs that the chosen one does not have."""
+    given = {word.partition("=")[0].removeprefix("--") for word in words if word.startswith("--")}
+    for kind in PLANTS.builtin:
+        own = {name.replace("_", "-") for name in _field_names(PLANTS.find(kind))}
+        strangers = sorted(given & own - {name.replace("_", "-") for name in known} - {"limits"})
+        if kind != plant and strangers:
+            raise ConfigError(
+                f"{', '.join(strangers)}: settings of plant {kind}; plant {plant} has none such, "
+                f"add --plant {kind}"
+            )
+
+
+def _field_names(kind: type[Any]) -> list[str]:
+    return [entry.name for entry in fields(kind)]
+
+
+def _said(tables: Tables) -> dict[str, Any]:
+    """What the tables say of the common flags."""
+    hints = get_type_hints(CommonArguments)
+    found: dict[str, Any] = {}
+    places = KEYS | {"setup": "setup.kind", "linkage": "linkage.kind", "plant": "plant.kind"}
+    for name, key in places.items():
+        raw = tables.at(key)
+        if raw is not None and name != "limits":
+            found[name] = said(hints[name], raw, tables.folder, MISSING)
+    if not isinstance(tables.at("design"), str):
+        found["design"] = None
+    return {name: value for name, value in found.items() if value is not MISSING}
+
+
+def _put_flags(tables: Tables, arguments: Any, flags: list[GuestFlag]) -> None:
+    """Put the flags that say something new into the tables."""
+    said_before = {entry.name: entry.default for entry in fields(arguments)}
+    writer = Writer(tables_of={})
+    hints = get_type_hints(CommonArguments)
+    for name, key in KEYS.items():
+        value = getattr(arguments, name)
+        if name == "limits" and value is not None:
+            tables.put(key, tables.here(value))
+        elif name == "servo":
+            for part, content in writer.write(value).items():
+                tables.put(f"{key}.{part}", content)
+        elif value != said_before[name]:
+            tables.put(key, writer.plain(hints[name], value))
+    for flag in flags:
+        value = getattr(arguments, flag.attribute)
+        if flag.default is MISSING or value != flag.default:
+            told = tables.here(value) if isinstance(value, Path) else writer.plain(flag.hint, value)
+            tables.put(flag.key, told)

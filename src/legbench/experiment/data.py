@@ -1,0 +1,96 @@
+"""Everything that decides a run, as one value."""
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final, Literal
+
+from legbench.control import CONTROLLERS, ControllerSettings, SetpointMeaning
+from legbench.design import LegDesign
+from legbench.design.setup import Setup
+from legbench.errors import ConfigError
+from legbench.experiment.reading import REGISTRY
+from legbench.experiment.tables import read_run
+from legbench.kinematics import ModalConvention
+from legbench.mjcf.options import BuildOptions, Ground, Linkage, Numerics
+from legbench.plant.opening import PlantSettings
+from legbench.plant.start import PERIOD
+from legbench.plants import PLANTS, SimChoice
+from legbench.servo import ServoConfig
+
+LARGEST_SEED: Final = (1 << 63) - 1
+"""TOML and most generators hold no larger whole number."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Conventions:
+    """How the paper's formulas are read."""
+
+    modal: ModalConvention = ModalConvention.ORTHONORMAL
+    """Scale of the modal coordinates, eq. (15)."""
+    setpoint: SetpointMeaning = SetpointMeaning.LINK
+    """Whether z2 is the link's equilibrium or the motor's position."""
+    rating_reference: Literal["motor", "equilibrium"] = "motor"
+    """What a deflection is measured from, q_d of eq. (14)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Experiment:
+    """Everything that decides a run.
+
+    Raises:
+        ConfigError: a duration that is shorter than a cycle, or endless; a seed that is negative;
+            a controller or plant that lacks something, or takes a built-in's name.
+    """
+
+    design: LegDesign
+    """Leg, as in a design file."""
+    controller: ControllerSettings = field(metadata={REGISTRY: CONTROLLERS})
+    """Kind and settings of what drives the leg."""
+    setup: Setup = field(default_factory=Setup)
+    """How the leg is held."""
+    linkage: Linkage = field(default_factory=Linkage)
+    """What couples the segments."""
+    ground: Ground = field(default_factory=Ground)
+    """What the leg stands on."""
+    numerics: Numerics = field(default_factory=Numerics)
+    """How the simulation is integrated."""
+    servo: ServoConfig = field(default_factory=ServoConfig)
+    """What a simulated drive makes of a command."""
+    conventions: Conventions = field(default_factory=Conventions)
+    """How the paper's formulas are read."""
+    plant: PlantSettings = field(default_factory=SimChoice, metadata={REGISTRY: PLANTS})
+    """Kind and settings of what is driven."""
+    duration: float = 8.0
+    """Length of the run [s]."""
+    seed: int = 0
+    """Source of all randomness of a run. Nothing in a run is random yet: it is recorded, and
+    changes the experiment's name, but no row."""
+
+    def __post_init__(self) -> None:
+        if not PERIOD <= self.duration < math.inf:
+            raise ConfigError(
+                f"duration is {self.duration:g} s; it must be at least one cycle of {PERIOD:g} s, "
+                "and finite"
+            )
+        if not 0 <= self.seed <= LARGEST_SEED:
+            raise ConfigError(f"seed is {self.seed}; it must be 0 to {LARGEST_SEED}")
+        CONTROLLERS.check(type(self.controller))
+        PLANTS.check(type(self.plant))
+
+    @property
+    def options(self) -> BuildOptions:
+        """What the model is made of besides the design."""
+        return BuildOptions(
+            setup=self.setup, linkage=self.linkage, ground=self.ground, numerics=self.numerics
+        )
+
+    @classmethod
+    def from_run(cls, run: Path) -> "Experiment":
+        """The experiment that a run folder, or its `run.json`, was recorded from.
+
+        Raises:
+            RecordingError: there is no such run, or its manifest is damaged.
+            ConfigError: it was written before experiments were recorded whole, or a guest is gone.
+        """
+        return read_run(cls, Path(run))

@@ -1,0 +1,46 @@
+"""What the docstrings under the fields of a dataclass say."""
+
+import ast
+import inspect
+import re
+import textwrap
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from itertools import pairwise
+from typing import Any
+
+_UNIT = re.compile(r"\[([^\[\]]+)\]\.?\s*$")
+
+
+def field_docs(kind: type[Any]) -> dict[str, str]:
+    """Field -> its docstring on one line; empty where the source cannot be had."""
+    try:
+        tree = ast.parse(textwrap.dedent(inspect.getsource(kind)))
+    except (OSError, TypeError, SyntaxError):
+        return {}
+    (body,) = [node.body for node in tree.body if isinstance(node, ast.ClassDef)]
+    found: dict[str, str] = {}
+    for entry, after in pairwise(body):
+        if isinstance(entry, ast.AnnAssign) and isinstance(entry.target, ast.Name):
+            text = after.value if isinstance(after, ast.Expr) else None
+            if isinstance(text, ast.Constant) and isinstance(text.value, str):
+                found[entry.target.id] = " ".join(text.value.split())
+    return found
+
+
+def unit_comments(value: Any, tables: Mapping[str, Any], at: str = "") -> dict[str, str]:
+    """Dotted key -> unit in brackets, for the tables that were made of a dataclass."""
+    found: dict[str, str] = {}
+    docs = field_docs(type(value))
+    for entry in fields(value):
+        if entry.name not in tables:
+            continue
+        inner, below = getattr(value, entry.name), tables[entry.name]
+        if unit := _UNIT.search(docs.get(entry.name, "")):
+            found[f"{at}{entry.name}"] = f"[{unit[1]}]"
+        if is_dataclass(inner) and isinstance(below, Mapping):
+            settings = "settings" in below and "kind" in below
+            content = below["settings"] if settings else below
+            name = f"{at}{entry.name}." + ("settings." if settings else "")
+            found |= unit_comments(inner, content, name)
+    return found

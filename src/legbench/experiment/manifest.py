@@ -1,0 +1,145 @@
+"""What a run says of itself in `run.json`: the experiment, its provenance, what was found."""
+
+import hashlib
+import platform
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any, Final
+
+from legbench.control import CONTROLLERS
+from legbench.experiment.canonical import experiment_hash
+from legbench.experiment.data import Experiment
+from legbench.experiment.tables import write_tables
+from legbench.guests import Registry, source_of
+from legbench.mjcf import xml_hash
+from legbench.phases import ControllerDescription
+from legbench.plant.start import PERIOD, Start
+from legbench.plants import PLANTS
+
+RECORDED_PACKAGES: Final = ("mujoco-core", "numpy", "scipy", "pyarrow")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GuestFile:
+    """The source of a guest, of which a copy is kept in the run folder."""
+
+    what: str
+    """`controller` or `plant`."""
+    name: str
+    """File name in the run folder."""
+    reference: str
+    """What finds the class: its file's copy for a class from a file, else an importable name."""
+    content: bytes
+
+
+def guests_of(experiment: Experiment) -> Iterator[GuestFile]:
+    """Sources of the experiment's controller and plant, unless they are built in."""
+    pairs = ((CONTROLLERS, experiment.controller), (PLANTS, experiment.plant))
+    for registry, settings in pairs:
+        guest = type(settings)
+        path = source_of(guest)
+        if guest.kind in registry.builtin or path is None:
+            continue
+        yield GuestFile(
+            what=registry.what,
+            name=f"{registry.what}_{path.name}",
+            reference=_reference(registry, guest, f"{registry.what}_{path.name}"),
+            content=path.read_bytes(),
+        )
+
+
+def _reference(registry: Registry, guest: type[Any], copy: str) -> str:
+    place, _, name = registry.reference(guest).rpartition(":")
+    return f"{copy if place.endswith('.py') else place}:{name}"
+
+
+def manifest_of(
+    experiment: Experiment, start: Start, xml: str, facts: Mapping[str, Any], folder: Path
+) -> dict[str, Any]:
+    """What a run has to say of itself; everything that a reader needs to judge or repeat it.
+
+    Args:
+        experiment: what is to happen.
+        start: the state that it begins in.
+        xml: the model.
+        facts: what the opened plant has to say.
+        folder: the run folder, or one beside it; paths are told relative to it.
+
+    Raises:
+        ConfigError: a guest that lives in no file, so that nobody could find it again.
+    """
+    tables = write_tables(experiment, folder)
+    guests = list(guests_of(experiment))
+    for guest in guests:
+        tables[guest.what]["kind"] = guest.reference
+    entries = {
+        "experiment": tables,
+        "controller": _described(experiment.controller.kind, experiment.controller.describe()),
+        "plant": {"kind": experiment.plant.kind, **facts},
+        "provenance": {
+            "versions": {"python": platform.python_version(), **_versions()},
+            "mjcf_sha256": xml_hash(xml),
+            "experiment_sha256": experiment_hash(experiment),
+            "guests": {
+                guest.what: {"file": guest.name, "sha256": _sha256(guest.content)}
+                for guest in guests
+            },
+        },
+        "period": PERIOD,
+        "initial_state": {
+            "joint_pos": start.joint_pos.tolist(),
+            "motor_pos": start.motor_pos.tolist(),
+        },
+    }
+    return entries | _as_format_1(experiment, entries)
+
+
+def _as_format_1(experiment: Experiment, entries: Mapping[str, Any]) -> dict[str, Any]:
+    """The same where readers of format 1 look for it."""
+    tables, plant = entries["experiment"], entries["plant"]
+    settings = {"kind": experiment.controller.kind, **tables["controller"].get("settings", {})}
+    return {
+        **{key: tables[key] for key in ("design", "setup", "linkage", "ground", "numerics")},
+        "servo": asdict(experiment.servo),
+        "conventions": tables["conventions"],
+        "seed": tables["seed"],
+        "controller": settings | entries["controller"],
+        "mjcf_sha256": entries["provenance"]["mjcf_sha256"],
+        "versions": entries["provenance"]["versions"],
+        **{key: value for key, value in plant.items() if key != "kind"},
+        "plant": plant["kind"],
+    }
+
+
+def _described(kind: str, description: ControllerDescription) -> dict[str, Any]:
+    return {
+        "kind": kind,
+        "phases": [
+            {
+                "code": int(phase.code),
+                "name": phase.name,
+                "role": phase.role.value,
+                "doc": phase.doc,
+                "late": phase.late,
+            }
+            for phase in description.phases
+        ],
+        "signals": [asdict(signal) for signal in description.signals],
+        "counting": asdict(description.counting),
+    }
+
+
+def _sha256(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+def _versions() -> dict[str, str]:
+    found: dict[str, str] = {}
+    for package in RECORDED_PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "not installed"
+    return found

@@ -1,0 +1,132 @@
+"""The words of an experiment's tables, from a file, a run or flags; knows no class of its own."""
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+from legbench.control import CONTROLLERS
+from legbench.design import LegDesign, load_design
+from legbench.design.toml import UNITS, design_from_mapping, design_to_mapping
+from legbench.drives.bus_file import load_limits
+from legbench.drives.limits import SafetyLimits
+from legbench.errors import ConfigError, RecordingError
+from legbench.experiment.reading import Reader, Special, placed
+from legbench.experiment.writing import Writer
+from legbench.recording.layout import RUN
+from legbench.recording.manifest import read_manifest
+
+Read = TypeVar("Read")
+FORMAT: Final = 1
+"""Rises when an older reader would misunderstand an experiment file."""
+_SEGMENT: Final = {"mass": 0, "length": 0, "com": 0, "inertia": 0}
+_DESIGN: Final = {
+    "name": "",
+    "units": dict.fromkeys(UNITS, ""),
+    "trunk": {"mass": 0},
+    "thigh": _SEGMENT,
+    "shank": _SEGMENT,
+    "foot": _SEGMENT,
+    "springs": {"stiffness": [], "damping": []},
+    "limits": {"hip": [], "knee": []},
+}
+SPECIALS: Final = {
+    LegDesign: Special(
+        load=load_design,
+        decode=design_from_mapping,
+        structure=_DESIGN,
+    ),
+    SafetyLimits: Special(load=load_limits),
+}
+"""Values that may be given as a file, and the design, whose tables have units."""
+
+
+def read_tables(
+    kind: type[Read], tables: Mapping[str, Any], folder: Path, *, json: bool = False
+) -> Read:
+    """An experiment from its tables; without a setup it gets the controller's usual one.
+
+    Args:
+        kind: class of the experiment.
+        tables: what a file holds.
+        folder: what paths in it are relative to.
+        json: whether the tables come from JSON.
+
+    Raises:
+        ConfigError: a newer version wrote them, or something is wrong with them; all of it is told.
+    """
+    version = tables.get("format", FORMAT)
+    if not isinstance(version, int) or isinstance(version, bool) or version < 1:
+        raise ConfigError(f"format is {version!r}; it must be 1 to {FORMAT}")
+    if version > FORMAT:
+        raise ConfigError(
+            f"format {version} was written by a newer legbench; this one reads up to {FORMAT}: "
+            "upgrade"
+        )
+    content = {key: value for key, value in tables.items() if key != "format"}
+    reader = Reader(folder=folder, specials=SPECIALS, json=json)
+    return reader.read(kind, _with_usual_setup(content, folder))
+
+
+def _with_usual_setup(tables: dict[str, Any], folder: Path) -> dict[str, Any]:
+    controller, setup = tables.get("controller"), tables.get("setup", {})
+    if not isinstance(controller, Mapping) or not isinstance(setup, Mapping) or "kind" in setup:
+        return tables
+    try:
+        kind = CONTROLLERS.find(placed(str(controller.get("kind")), folder))
+    except ConfigError:
+        return tables  # the reader tells
+    return tables | {"setup": {"kind": str(kind.usual_setup)} | dict(setup)}
+
+
+def write_tables(experiment: Any, folder: Path | None = None, *, where: bool = True) -> Any:
+    """Tables of an experiment in SI units, the design inline.
+
+    Args:
+        experiment: what to write.
+        folder: what paths are made relative to; none: they are told as they are.
+        where: whether to tell files, interface and channel, which say where, not what.
+
+    Raises:
+        ConfigError: a guest that lives in no file, so that nobody could find it again.
+    """
+    writer = Writer(tables_of={LegDesign: design_to_mapping}, folder=folder, where=where)
+    return writer.write(experiment)
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The tables of a TOML file; raises ConfigError."""
+    try:
+        with path.open("rb") as file:
+            return tomllib.load(file)
+    except FileNotFoundError:
+        raise ConfigError(f"{path}: no such experiment file") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: cannot be read: {error}") from None
+    except ValueError as error:  # TOMLDecodeError, or a whole number of thousands of digits
+        raise ConfigError(f"{path}: not valid TOML: {error}") from None
+
+
+def tables_of_run(path: Path) -> tuple[dict[str, Any], Path]:
+    """The experiment in a run folder, or in its `run.json`, and what its paths are relative to.
+
+    Raises:
+        RecordingError: there is no such run, or its manifest is damaged.
+        ConfigError: it was written before experiments were recorded whole.
+    """
+    run = path.parent if path.name == RUN else path
+    manifest = read_manifest(run)
+    if manifest is None:
+        raise RecordingError(f"{run} is no run folder: it has no {RUN}")
+    tables = manifest.get("experiment")
+    if not isinstance(tables, dict):
+        raise ConfigError(
+            f"{run} was recorded before runs held their whole experiment; run it with its flags"
+        )
+    return tables, run
+
+
+def read_run(kind: type[Read], path: Path) -> Read:
+    """The experiment that a run was recorded from; raises as `tables_of_run` and `read_tables`."""
+    tables, folder = tables_of_run(path)
+    return read_tables(kind, tables, folder, json=True)

@@ -1,0 +1,132 @@
+"""What a model is made of besides the design; imports no simulator."""
+
+import math
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from legbench.design import LegDesign
+from legbench.design.setup import Setup
+from legbench.errors import ConfigError
+
+MIN_BAR_DENSITY = 5e-4
+"""Lighter bars make the loop's equations too stiff for the time step [kg/m]."""
+
+
+class LinkageKind(StrEnum):
+    """How the knee's motion reaches hip motor and foot."""
+
+    BARS = "bars"
+    """Physical parallel bars, closed by equality constraints."""
+    REDUCED = "reduced"
+    """Ankle = -knee as a joint equality, spring 2 on a fixed tendon hip + knee."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Linkage:
+    """The linkage and its dimensions.
+
+    The trunk is lightened by the bars' mass, so that the system weighs what the design says.
+
+    Raises:
+        ConfigError: a bar too light to simulate, or a crank without length.
+    """
+
+    kind: LinkageKind = LinkageKind.BARS
+    """Physical parallel bars, or the constraint they make."""
+    bar_density: float = 0.006
+    """Mass per length of crank and bars [kg/m]: a square PA6 rod of 2.3 mm."""
+    crank_length: float = 0.02
+    """Length of hip crank and thigh extension [m]."""
+
+    def __post_init__(self) -> None:
+        if not MIN_BAR_DENSITY <= self.bar_density < math.inf:
+            raise ConfigError(
+                f"bar_density is {self.bar_density:g} kg/m; from {MIN_BAR_DENSITY:g} kg/m on the "
+                "loops can be integrated, for massless bars use linkage 'reduced'"
+            )
+        if not 0.0 < self.crank_length < math.inf:
+            raise ConfigError(
+                f"crank_length is {self.crank_length:g} m; it must be positive and finite"
+            )
+
+    def mass(self, design: LegDesign) -> float:
+        """Of everything that the linkage adds to a leg [kg]."""
+        if self.kind is LinkageKind.REDUCED:
+            return 0.0
+        length = self.crank_length + design.thigh.length + design.shank.length
+        return self.bar_density * length
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ground:
+    """The contact of foot and ground.
+
+    The model of the paper stands on a point. A round tip rolls, and rolling couples the polar
+    angle to the radial motion: 3 mm of radius make 0.02 rad of it in a leg that has none.
+
+    Raises:
+        ConfigError: a negative friction, or a tip without radius.
+    """
+
+    friction: float = 1.0
+    """Sliding friction [-]."""
+    tip_radius: float = 1e-4
+    """Radius of the foot tip that touches the ground, by default a point, near enough [m]."""
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.friction < math.inf:
+            raise ConfigError(f"friction is {self.friction:g}; it must be finite, zero or more")
+        if not 0.0 < self.tip_radius < math.inf:
+            raise ConfigError(
+                f"tip_radius is {self.tip_radius:g} m; it must be positive and finite"
+            )
+
+
+def _whole(value: float) -> bool:
+    return value > 0.5 and abs(value - round(value)) < 1e-9 * value
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Numerics:
+    """Integrator, solver and constraint settings.
+
+    Raises:
+        ConfigError: a time step that does not divide the 1 ms control period.
+    """
+
+    timestep: float = 0.00025
+    """Time step, a whole part of the control period [s]."""
+    loop_solref: tuple[float, float] = (0.00025, 1.0)
+    """Time constant and damping ratio of loop closures, foot pin and joint equality [s, -]."""
+    loop_solimp: tuple[float, float, float, float, float] = (0.9999, 0.9999, 0.001, 0.5, 2.0)
+    """Impedance of the same: at zero, at the width, the width, midpoint, power
+    [-, -, m, -, -]."""
+    contact_solref: tuple[float, float] = (0.001, 1.0)
+    """Time constant and damping ratio of the foot's contact [s, -]."""
+    contact_solimp: tuple[float, float, float, float, float] = (0.9, 0.95, 0.001, 0.5, 2.0)
+    """Impedance of the foot's contact, as of the loops [-, -, m, -, -]."""
+    stop_solref: tuple[float, float] = (0.01, 1.0)
+    """Time constant and damping ratio of the joint stops: soft rubber, as
+    `legbench.analytic.stops` [s, -]."""
+    stop_solimp: tuple[float, float, float, float, float] = (0.95, 0.95, 0.001, 0.5, 2.0)
+    """Impedance of the joint stops, as of the loops [-, -, rad, -, -]."""
+    iterations: int = 50
+    """Largest number of solver iterations."""
+    tolerance: float = 1e-12
+    """Improvement below which the solver stops [-]."""
+
+    def __post_init__(self) -> None:
+        if not (0.0 < self.timestep < math.inf and _whole(0.001 / self.timestep)):
+            raise ConfigError(
+                f"timestep is {self.timestep:g} s; it must divide the control period of 0.001 s"
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BuildOptions:
+    """What a model is made of besides the design."""
+
+    setup: Setup = field(default_factory=Setup)
+    linkage: Linkage = field(default_factory=Linkage)
+    ground: Ground = field(default_factory=Ground)
+    numerics: Numerics = field(default_factory=Numerics)

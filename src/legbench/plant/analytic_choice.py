@@ -1,0 +1,30 @@
+"""Choosing the paper's equations; imports SciPy only when they are opened."""
+
+from dataclasses import asdict, dataclass, replace
+from typing import ClassVar
+
+from legbench.drives.limits import SafetyLimits
+from legbench.guests import load_text
+from legbench.plant.design_limits import open_limited
+from legbench.plant.opening import Leg, OpenPlant
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AnalyticChoice:
+    """The paper's equations."""
+
+    kind: ClassVar[str] = "analytic"
+    limits: SafetyLimits | None = None
+    """Safety limits, by default none [a limits file]."""
+
+    def open(self, leg: Leg) -> OpenPlant:
+        """The leg on paper.
+
+        Raises:
+            ConfigError: the limits are looser than the design, or the setup has a boom.
+        """
+        make = load_text("legbench.plant.analytic:AnalyticPlant")
+        accuracy = load_text("legbench.analytic.smooth:Accuracy")()
+        plant = make(leg.design, leg.options.setup, leg.start, leg.servo, accuracy)
+        opened = open_limited(plant, self.limits, leg)
+        return replace(opened, facts={"accuracy": asdict(accuracy)} | opened.facts)

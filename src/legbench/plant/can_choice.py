@@ -1,0 +1,55 @@
+"""Choosing servo drives on a CAN bus; imports python-can only when the bus is opened."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import ClassVar, Final
+
+from legbench.drives.config import BusConfig
+from legbench.drives.emulated.faults import Fault
+from legbench.drives.limits import SafetyLimits
+from legbench.guests import WHERE, load_text
+from legbench.plant.opening import Leg, OpenPlant
+
+EMULATED: Final = "legbench"
+"""Interface of the emulated leg in this process, in virtual time."""
+LIMITS_NAME: Final = "limits.toml"
+"""Beside the bus file, unless other limits are chosen."""
+BUS_LOG: Final = "bus.log"
+"""Raw frames in the run folder, candump format."""
+_WHERE: Final[Mapping[str, bool]] = WHERE
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CanChoice:
+    """Servo drives on a CAN bus, real or emulated."""
+
+    kind: ClassVar[str] = "can"
+    bus: Path = field(default=Path("hardware/leg.toml"), metadata=_WHERE)
+    """Bus file."""
+    interface: str | None = field(default=None, metadata=_WHERE)
+    """python-can's name of the interface, legbench is an emulated leg; else the bus file's."""
+    channel: str | None = field(default=None, metadata=_WHERE)
+    """Channel such as can0; else the bus file's."""
+    bitrate: int | None = None
+    """Bitrate of interfaces that set their own; else the bus file's [bit/s]."""
+    read_only: bool = False
+    """Observe, change nothing in a drive; commands are recorded and go nowhere."""
+    limits: SafetyLimits | None = None
+    """Safety limits, by default those of limits.toml beside the bus file [a limits file]."""
+    faults: tuple[Fault, ...] = ()
+    """Faults to inject into the emulated leg in this process, on its virtual time."""
+
+    def is_virtual(self, config: BusConfig) -> bool:
+        """Whether it is the emulated leg in this process, in virtual time."""
+        return (self.interface or config.interface) == EMULATED
+
+    def open(self, leg: Leg) -> OpenPlant:
+        """The leg on its bus.
+
+        Raises:
+            ConfigError: a file or a setting makes no sense, or limits are looser than the design's.
+            BusError: the interface is not there, is down, or has a master.
+            DriveError: a drive is missing, is another one, or refuses its configuration.
+        """
+        return load_text("legbench.plant.can_open:open_can")(self, leg)

@@ -1,0 +1,172 @@
+"""Opening servo drives on a CAN bus as a plant, with what a run on them logs and tells."""
+
+from dataclasses import asdict
+from typing import Any, final
+
+from legbench.clock import AbstractClock
+from legbench.drives.bus import LockstepBus
+from legbench.drives.bus_file import load_bus
+from legbench.drives.config import BusConfig
+from legbench.drives.emulated.behaviour import Behaviour
+from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.network import Network
+from legbench.drives.limits import SafetyLimits
+from legbench.drives.master.lock import ChannelLock
+from legbench.drives.open_bus import adapter_of, open_bus
+from legbench.drives.realtime import Granted
+from legbench.drives.session import Session
+from legbench.drives.stopping import check_stopping
+from legbench.drives.wire import check_load
+from legbench.errors import ConfigError, LegbenchError
+from legbench.plant.can import CanPlant
+from legbench.plant.can_choice import BUS_LOG, LIMITS_NAME, CanChoice
+from legbench.plant.design_limits import limits_for, limits_within
+from legbench.plant.emulated_leg import EmulatedLeg
+from legbench.plant.opening import Leg, OpenPlant
+from legbench.plant.start import PERIOD
+from legbench.servo import ServoConfig
+
+
+@final
+class CanClock(AbstractClock):
+    """Never waits, because the link does; tells how late its last SYNC was."""
+
+    def __init__(self, plant: CanPlant) -> None:
+        self._plant = plant
+
+    def start(self) -> None:
+        """The link's grid is laid already."""
+
+    def wait(self, cycle: int) -> float:
+        """Lateness of the cycle that has been seen [s]."""
+        return self._plant.late
+
+
+def open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
+    """Open the bus of a choice and what hangs on it; no drive is enabled before the reset.
+
+    Raises:
+        ConfigError: a file or a setting makes no sense, or limits are looser than the design's.
+        BusError: the interface is not there, is down, or has a master.
+        DriveError: a drive is missing, is another one, or refuses its configuration.
+    """
+    if leg.servo != ServoConfig():
+        raise ConfigError(
+            "servo settings describe a simulated servo; on the can plant the drives decide: leave "
+            "slew_rate, bandwidth, delay_cycles and encoder_counts out"
+        )
+    config = load_bus(choice.bus)
+    if len(config.nodes) != 2:
+        raise ConfigError(f"{choice.bus}: {len(config.nodes)} nodes; a leg has 2")
+    if config.period != PERIOD:
+        raise ConfigError(f"{choice.bus}: period_us is {config.period_us}; runs need 1000")
+    check_load(config.at(choice.bitrate))
+    if choice.limits is None:
+        limits = limits_for(choice.bus.parent / LIMITS_NAME, leg.design)
+    else:
+        limits = limits_within(choice.limits, leg.design)
+    check_stopping(config, limits)
+    if not choice.is_virtual(config):
+        limits.require_complete()
+    session = open_session(config, choice, leg, leads=not choice.read_only)
+    granted = session.be_punctual()
+    try:
+        link = session.link(limits, leg.design.stiffness, read_only=choice.read_only)
+        link.open()
+    except LegbenchError:
+        session.close()
+        raise
+    plant = CanPlant(session, link, leg.start, read_only=choice.read_only)
+    return OpenPlant(
+        plant=plant,
+        clock=CanClock(plant),
+        facts=_facts(choice, config, limits, granted),
+        start_log=lambda run: session.log_to(run / BUS_LOG),
+        events=lambda: {"bus": _bus_event(plant)},
+    )
+
+
+def _facts(
+    choice: CanChoice, config: BusConfig, limits: SafetyLimits, granted: Granted | None
+) -> dict[str, Any]:
+    """What a run has to say of the bus."""
+    return {
+        "bus": {
+            "file": str(choice.bus),
+            "interface": choice.interface or config.interface,
+            "channel": choice.channel or config.channel,
+            "bitrate": choice.bitrate or config.bitrate,
+            "read_only": choice.read_only,
+            "nodes": {
+                node.name: {"id": node.node_id, "identity": asdict(node.identity)}
+                for node in config.nodes
+            },
+        },
+        "limits": asdict(limits),
+        "realtime": None if granted is None else asdict(granted),
+    }
+
+
+def _bus_event(plant: CanPlant) -> dict[str, Any]:
+    """What happened on the bus during a run."""
+    link, cycle = plant.link, plant.link.cycle
+    return {
+        "skipped_cycles": link.skipped_total,
+        "silent_cycles": cycle.silent_total,
+        "late_frames": cycle.late_frames,
+        "error_frames": cycle.error_frames,
+        "lost_cycles": [watch.lost_total for watch in cycle.watches],
+        "emergencies": [str(text) for watch in cycle.watches for text in watch.history],
+        "state": link.state.name.lower(),
+        "began": plant.began,
+    }
+
+
+def open_session(
+    config: BusConfig, choice: CanChoice, leg: Leg | None = None, *, leads: bool = True
+) -> Session:
+    """Open the bus of a choice; with interface `legbench` the emulated leg in this process.
+
+    The channel is locked before its adapter is touched: opening a serial one resets it under a
+    program that uses it. Whoever only reads locks no channel that others may share.
+
+    Args:
+        config: the bus file.
+        choice: which bus.
+        leg: on the shafts of emulated drives; nothing by default.
+        leads: or only reads.
+
+    Raises:
+        BusError: the interface is not there, is down, or has a master.
+    """
+    if not choice.is_virtual(config):
+        adapter = adapter_of(config, interface=choice.interface, channel=choice.channel)
+        lock = ChannelLock.of_channel(adapter.interface, adapter.channel)
+        if leads or not adapter.shared:
+            lock.acquire()
+        try:
+            bus = open_bus(config.at(choice.bitrate), adapter)
+        except BaseException:
+            lock.release()
+            raise
+        return Session(bus, config.at(choice.bitrate), lock=lock)
+    network = _emulated(config, choice, leg)
+    bus = LockstepBus("leg", network=network, bitrate=choice.bitrate)
+    return Session(bus, config.at(choice.bitrate))
+
+
+def _emulated(config: BusConfig, choice: CanChoice, leg: Leg | None) -> Network:
+    """The emulated leg; its drives run at the bitrate of the bus file, whatever is asked for.
+
+    For those who only look its drives have kept their configuration: nobody may write it.
+    """
+    if leg is None:
+        return emulate(config, configured=choice.read_only)
+    motors = [float(value) for value in leg.start.motor_pos]
+    return emulate(
+        config,
+        [Behaviour(start_pos=motor) for motor in motors],
+        body=EmulatedLeg(leg.design, leg.options, leg.start),
+        faults=choice.faults,
+        configured=choice.read_only,
+    )

@@ -1,0 +1,23 @@
+"""Choosing the simulated leg; imports MuJoCo only when it is opened."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from legbench.drives.limits import SafetyLimits
+from legbench.guests import load_text
+from legbench.plant.design_limits import open_limited
+from legbench.plant.opening import Leg, OpenPlant
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SimChoice:
+    """MuJoCo."""
+
+    kind: ClassVar[str] = "sim"
+    limits: SafetyLimits | None = None
+    """Safety limits, by default none [a limits file]."""
+
+    def open(self, leg: Leg) -> OpenPlant:
+        """The leg in MuJoCo; raises ConfigError if the limits are looser than the design."""
+        plant = load_text("legbench.plant.sim:SimPlant")
+        return open_limited(plant(leg.design, leg.options, leg.start, leg.servo), self.limits, leg)
