@@ -55,7 +55,7 @@ def main(arguments: list[str]) -> int:
         return 2
     from legbench.cli.table import print_summary
     from legbench.clock import WallClock
-    from legbench.experiment.record import record
+    from legbench.experiment.running import record
     from legbench.loop import stop_on_interrupt
     from legbench.metrics import summarise
     from legbench.plant.start import PERIOD

@@ -13,7 +13,7 @@ from legbench.experiment.start import start_of, targets_of
 from legbench.lazily import lazy_names
 
 if TYPE_CHECKING:
-    from legbench.experiment.record import Finished, record
+    from legbench.experiment.running import Finished, record
 
 __all__ = [
     "ControllerSettings",
@@ -30,5 +30,5 @@ __all__ = [
     "start_of",
     "targets_of",
 ]
-_HOME = "legbench.experiment.record"
+_HOME = "legbench.experiment.running"
 __getattr__ = lazy_names(__name__, {"Finished": _HOME, "record": _HOME})
