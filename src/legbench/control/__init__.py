@@ -1,4 +1,4 @@
-"""Controllers: one a file, for one leg or a batch with the same code."""
+"""Controllers: one a file, for one leg or a batch; and the words to write one in."""
 
 from legbench.control.abstract import AbstractController
 from legbench.control.bang_bang import BangBang, BangBangConfig
@@ -7,18 +7,29 @@ from legbench.control.position_jump import PositionJump, PositionJumpConfig
 from legbench.control.registry import CONTROLLERS
 from legbench.control.setpoint import LegTargets, SetpointMeaning
 from legbench.control.settings import ControllerSettings, make_controller
+from legbench.design.setup import SetupKind
+from legbench.phases import ControllerDescription, Counting, PhaseInfo, Role
+from legbench.signals import Command, Observation, Signal
 
 __all__ = [
     "CONTROLLERS",
     "AbstractController",
     "BangBang",
     "BangBangConfig",
+    "Command",
+    "ControllerDescription",
     "ControllerSettings",
+    "Counting",
     "Jump",
     "JumpConfig",
     "LegTargets",
+    "Observation",
+    "PhaseInfo",
     "PositionJump",
     "PositionJumpConfig",
+    "Role",
     "SetpointMeaning",
+    "SetupKind",
+    "Signal",
     "make_controller",
 ]

@@ -5,10 +5,16 @@ from typing import final
 import numpy as np
 
 from legbench.control.abstract import AbstractController
-from legbench.errors import PlantFault
+from legbench.errors import ConfigError, PlantFault
 from legbench.phases import ControllerDescription
 from legbench.signals import Command, Floats, Observation
 
+LAW = {
+    "start_motor_pos": "start_motor_pos [rad]",
+    "reset": "reset(observation)",
+    "step": "step(observation) -> Command",
+}
+"""What a law must have, and how it is written."""
 CAUSE = "controller failed"
 """Cause of a run that a law has ended."""
 JOINTS = 2
@@ -16,20 +22,28 @@ JOINTS = 2
 
 @final
 class Checked(AbstractController):
-    """Law of one leg whose commands are checked and whose observations are read-only.
+    """Law of one leg, of any class: its commands are checked, its observations are read-only.
 
     Lists and other sequences of numbers are converted; anything else ends the run before the row
     is recorded. A law that writes into what it sees gets NumPy's error at its own line.
 
     Raises:
-        PlantFault: the law's first posture is no pair of motor positions.
+        ConfigError: the law lacks something, or its first posture is no pair of motor positions.
     """
 
     def __init__(self, law: AbstractController, description: ControllerDescription) -> None:
+        missing = [text for name, text in LAW.items() if getattr(law, name, None) is None]
+        if missing:
+            raise ConfigError(
+                f"{type(law).__name__} is no control law: it lacks {', '.join(missing)}"
+            )
         self._law = law
         self._codes = {phase.code: phase.name for phase in description.phases}
         self._width = sum(max(1, len(signal.components)) for signal in description.signals)
-        self._start = _floats(law.start_motor_pos, JOINTS, "start_motor_pos")
+        try:
+            self._start = _floats(law.start_motor_pos, JOINTS, "start_motor_pos")
+        except PlantFault as error:
+            raise ConfigError(str(error)) from None
 
     @property
     def start_motor_pos(self) -> Floats:

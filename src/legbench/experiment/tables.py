@@ -19,6 +19,8 @@ from legbench.recording.manifest import read_manifest
 Read = TypeVar("Read")
 FORMAT: Final = 1
 """Rises when an older reader would misunderstand an experiment file."""
+USUAL_PLANT: Final = "sim"
+"""Plant of an experiment that names none."""
 _SEGMENT: Final = {"mass": 0, "length": 0, "com": 0, "inertia": 0}
 _DESIGN: Final = {
     "name": "",
@@ -44,7 +46,8 @@ SPECIALS: Final = {
 def read_tables(
     kind: type[Read], tables: Mapping[str, Any], folder: Path, *, json: bool = False
 ) -> Read:
-    """An experiment from its tables; without a setup it gets the controller's usual one.
+    """An experiment from its tables; without a setup it gets the controller's usual
+    one, without a plant MuJoCo.
 
     Args:
         kind: class of the experiment.
@@ -65,7 +68,14 @@ def read_tables(
         )
     content = {key: value for key, value in tables.items() if key != "format"}
     reader = Reader(folder=folder, specials=SPECIALS, json=json)
-    return reader.read(kind, _with_usual_setup(content, folder))
+    return reader.read(kind, _with_usual_setup(_with_usual_plant(content), folder))
+
+
+def _with_usual_plant(tables: dict[str, Any]) -> dict[str, Any]:
+    plant = tables.get("plant")
+    if not isinstance(plant, Mapping) or "kind" in plant:
+        return tables
+    return tables | {"plant": {"kind": USUAL_PLANT} | dict(plant)}
 
 
 def _with_usual_setup(tables: dict[str, Any], folder: Path) -> dict[str, Any]:
