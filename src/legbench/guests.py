@@ -10,14 +10,16 @@ import importlib
 import importlib.util
 import sys
 import traceback
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, is_dataclass
-from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import MappingProxyType, ModuleType
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from legbench.errors import ConfigError
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 GUEST_PREFIX: Final = "legbench_guest_"
 """Beginning of the module names of files; a hash follows, so that two `mine.py` coexist."""
@@ -38,6 +40,11 @@ def load_text(text: str) -> Any:
     """
     module, _, name = text.partition(":")
     return getattr(importlib.import_module(module), name)
+
+
+def entry_points(group: str) -> "Iterable[EntryPoint]":
+    """What installed packages offer to a group; only this needs `importlib.metadata`."""
+    return load_text("importlib.metadata:entry_points")(group=group)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,8 +111,8 @@ class Registry:
         """Refuse a class that takes a built-in's name; raises ConfigError."""
         self._checked(guest, guest.__qualname__)
 
-    def _entry_points(self) -> dict[str, EntryPoint]:
-        return {entry.name: entry for entry in entry_points(group=self.group)}
+    def _entry_points(self) -> "dict[str, EntryPoint]":
+        return {entry.name: entry for entry in entry_points(self.group)}
 
     def _from_text(self, text: str) -> Any:
         place, _, name = text.rpartition(":") if ":" in text else (text, "", "")

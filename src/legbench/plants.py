@@ -1,13 +1,17 @@
 """Plants by name: built in, installed beside legbench, or in a file."""
 
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from legbench.guests import Registry
+from legbench.lazily import lazy_names
 from legbench.plant.analytic_choice import AnalyticChoice
 from legbench.plant.can_choice import BUS_LOG, EMULATED, LIMITS_NAME, CanChoice
-from legbench.plant.design_limits import joint_ranges, limits_for
+from legbench.plant.design_limits import joint_ranges
 from legbench.plant.opening import Leg, OpenPlant, PlantSettings, open_plant
 from legbench.plant.sim_choice import SimChoice
+
+if TYPE_CHECKING:
+    from legbench.plant.limits_file import limits_for
 
 PLANTS: Final = Registry(
     what="plant",
@@ -36,3 +40,4 @@ __all__ = [
     "limits_for",
     "open_plant",
 ]
+__getattr__ = lazy_names(__name__, {"limits_for": "legbench.plant.limits_file"})

@@ -26,7 +26,6 @@ from legbench.drives.limits import SafetyLimits
 from legbench.drives.session import Session
 from legbench.drives.units import AxisUnits
 from legbench.experiment import (
-    USUAL_SETUP,
     ControllerSettings,
     Experiment,
     make_controller,
@@ -63,7 +62,7 @@ def experiment(controller: ControllerSettings, duration: float = 1.0) -> Experim
     return Experiment(
         design=load_design(ROOT / "models" / "optimal.toml"),
         controller=controller,
-        setup=Setup(kind=USUAL_SETUP[type(controller)]),
+        setup=Setup(kind=controller.usual_setup),
         duration=duration,
     )
 

@@ -16,7 +16,6 @@ from legbench.experiment.reading import BAD, Reader
 from legbench.experiment.tables import SPECIALS
 from legbench.kinematics import ModalConvention
 from legbench.mjcf.options import Ground, LinkageKind
-from legbench.servo import ServoConfig
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,14 +42,13 @@ class CommonArguments:
     """Whether z2 is the link's equilibrium or the motor's position."""
     convention: ModalConvention = ModalConvention.ORTHONORMAL
     """How eq. (15) is read."""
-    servo: ServoConfig = field(default_factory=ServoConfig)
     duration: float = 8.0
     """Length of the run [s]."""
     seed: int = 0
     """Source of all randomness; recorded, nothing in a run is random yet."""
-    set: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
-    """Entry of the experiment in the words of its file, such as
-    design.springs.stiffness="[2.5, 2.3]"; may be repeated, other flags come after."""
+    set: str | None = None
+    """Replace an entry of the experiment, in the words of its file, such as
+    design.springs.stiffness="[2.5, 2.3]"; may be repeated, other flags come after it."""
     again: Path | None = None
     """Run folder whose experiment is run again, instead of a controller or a file."""
     out: Path = Path("runs")
@@ -71,7 +69,6 @@ KEYS = {
     "limits": "plant.settings.limits",
     "setpoint": "conventions.setpoint",
     "convention": "conventions.modal",
-    "servo": "servo",
     "duration": "duration",
     "seed": "seed",
 }
@@ -81,7 +78,7 @@ PLAIN = (float, int, bool, str, Path)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GuestFlag:
-    """A field of a controller's or plant's settings as a flag."""
+    """A field of the settings of a controller, a plant or the servo as a flag."""
 
     attribute: str
     """Name in the arguments."""
@@ -96,18 +93,19 @@ class GuestFlag:
 
 
 def guest_flags(
-    room: str, kind: type[Any], taken: set[str], settings: Mapping[str, Any], folder: Path
+    place: str, kind: type[Any], taken: set[str], settings: Mapping[str, Any], folder: Path
 ) -> Iterator[GuestFlag]:
-    """Flags of a guest's settings; one whose name is taken keeps its prefix.
+    """Flags of some settings; one whose name is taken keeps its prefix.
 
     Args:
-        room: `controller` or `plant`.
+        place: where they stand in a file, such as `controller.settings`.
         kind: class of the settings.
         taken: names of flags that are there already.
         settings: what a file says of them.
         folder: what paths in it are relative to.
     """
     hints, docs = get_type_hints(kind), field_docs(kind)
+    room = place.partition(".")[0]
     for entry in fields(kind):
         hint = hints[entry.name]
         if not entry.init or not _is_plain(hint):
@@ -117,10 +115,10 @@ def guest_flags(
             default = entry.default_factory()
         yield GuestFlag(
             attribute=f"{room}_{entry.name}",
-            key=f"{room}.settings.{entry.name}",
+            key=f"{place}.{entry.name}",
             name=f"{room}.{entry.name}" if entry.name in taken else entry.name,
             hint=hint,
-            default=said(hint, settings.get(entry.name), folder, default),
+            default=_value(said(hint, settings.get(entry.name), folder, default)),
             doc=docs.get(entry.name, ""),
         )
 
@@ -144,18 +142,31 @@ def arguments_with(flags: list[GuestFlag], defaults: Mapping[str, Any]) -> type[
     hints, docs = get_type_hints(CommonArguments, include_extras=True), field_docs(CommonArguments)
     made: list[Any] = []
     for name, entry in common:
-        value = defaults.get(name, entry.default)
-        given = field(default_factory=ServoConfig) if value is MISSING else field(default=value)
-        hint = hints[name]
-        if name != "servo":
-            hint = Annotated[hint, tyro.conf.arg(help=docs[name])]
-        made.append((name, hint, given))
+        value = _value(defaults.get(name, entry.default))
+        hint = Annotated[quick(hints[name]), tyro.conf.arg(help=docs[name])]
+        made.append((name, hint, field(default=value)))
     for flag in flags:
         given = field() if flag.default is MISSING else field(default=flag.default)
         described = tyro.conf.arg(name=flag.name.replace("_", "-"), help=flag.doc)
-        made.append((flag.attribute, Annotated[flag.hint, described], given))
+        made.append((flag.attribute, Annotated[quick(flag.hint), described], given))
     namespace = {"__doc__": CommonArguments.__doc__}
     return make_dataclass("RunArguments", made, kw_only=True, frozen=True, namespace=namespace)
+
+
+def quick(hint: Any) -> Any:
+    """A type that tyro understands without its type checker, which is slow to import.
+
+    An enum becomes the choice of its values, `X | Y` becomes `Union[X, Y]`.
+    """
+    if get_origin(hint) in (Union, UnionType):
+        return Union[tuple(quick(each) for each in get_args(hint))]  # noqa: UP007
+    if isinstance(hint, type) and issubclass(hint, Enum):
+        return Literal[tuple(member.value for member in hint)]  # pyright: ignore
+    return hint
+
+
+def _value(default: Any) -> Any:
+    return default.value if isinstance(default, Enum) else default
 
 
 def _is_plain(hint: Any) -> bool:

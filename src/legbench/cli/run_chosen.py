@@ -19,7 +19,7 @@ from legbench.errors import ConfigError
 from legbench.experiment.data import Experiment
 from legbench.experiment.overrides import overlaid, parse_setting
 from legbench.experiment.reading import placed
-from legbench.experiment.tables import read_tables, read_toml, tables_of_run
+from legbench.experiment.tables import read_tables, read_toml
 from legbench.experiment.writing import Writer
 from legbench.guests import Registry
 from legbench.plants import PLANTS
@@ -49,17 +49,19 @@ class Scan:
 
 def scan(words: Sequence[str]) -> Scan:
     """Pick out of the command line what decides which flags there are."""
-    found = Scan(rest=list(words))
-    if words and not words[0].startswith("-"):
-        found.subject, found.rest = words[0], list(words[1:])
-    for index, word in enumerate(found.rest):
+    found = Scan()
+    waiting = list(words)
+    if waiting and not waiting[0].startswith("-"):
+        found.subject = waiting.pop(0)
+    while waiting:
+        word = waiting.pop(0)
         flag, equals, value = word.partition("=")
-        if flag in ("--set", "--again", "--design", *SCANNED):
-            value = value if equals else "".join(found.rest[index + 1 : index + 2])
-            if flag == "--set":
-                found.settings.append(value)
-            else:
-                found.values[flag] = value
+        if flag == "--set" and (equals or waiting):
+            found.settings.append(value if equals else waiting.pop(0))
+            continue
+        if flag in ("--again", "--design", *SCANNED) and (equals or waiting):
+            found.values[flag] = value if equals else waiting[0]
+        found.rest.append(word)
     return found
 
 
@@ -103,6 +105,8 @@ def first_tables(words: Scan) -> Tables:
     if "--again" in words.values:
         if words.subject is not None:
             raise UsageError(f"--again runs its own experiment; leave '{words.subject}' out")
+        from legbench.experiment.runs import tables_of_run
+
         content, folder = tables_of_run(Path(words.values["--again"]))
         tables = Tables(content=content, folder=folder, json=True)
     elif words.subject is None:
@@ -167,15 +171,17 @@ def _command(scanned: Scan) -> str:
 
 
 def _flags(tables: Tables) -> list[GuestFlag]:
-    """The flags of the chosen controller and plant."""
+    """The flags of the servo and of the chosen controller and plant."""
     taken = {entry.name for entry in fields(CommonArguments)}
-    taken |= {entry.name for entry in fields(ServoConfig)}
     found: list[GuestFlag] = []
-    for room, registry in (("controller", CONTROLLERS), ("plant", PLANTS)):
-        kind = _kind(registry, tables, room)
-        settings = tables.at(f"{room}.settings")
-        settings = settings if isinstance(settings, dict) else {}
-        found += guest_flags(room, kind, taken, settings, tables.folder)
+    for place, kind in (
+        ("servo", ServoConfig),
+        ("controller.settings", _kind(CONTROLLERS, tables, "controller")),
+        ("plant.settings", _kind(PLANTS, tables, "plant")),
+    ):
+        content = tables.at(place)
+        content = content if isinstance(content, dict) else {}
+        found += guest_flags(place, kind, taken, content, tables.folder)
         taken |= {flag.name for flag in found}
     return found
 
@@ -187,7 +193,8 @@ def _kind(registry: Registry, tables: Tables, room: str) -> type[Any]:
     if not isinstance(name, str):
         raise ConfigError(f"{room}.kind is missing; there are {', '.join(registry.names())}")
     place = placed(name, tables.folder)
-    if ":" not in name and not name.endswith(".py") and name not in registry.names():
+    own = ":" in name or name.endswith(".py") or name in registry.builtin
+    if not own and name not in registry.names():
         raise UsageError(
             f"no {room} '{name}'; there are {', '.join(registry.names())}, or a class of your own "
             "as path/to/mine.py:Class"
@@ -235,9 +242,6 @@ def _put_flags(tables: Tables, arguments: Any, flags: list[GuestFlag]) -> None:
         value = getattr(arguments, name)
         if name == "limits" and value is not None:
             tables.put(key, tables.here(value))
-        elif name == "servo":
-            for part, content in writer.write(value).items():
-                tables.put(f"{key}.{part}", content)
         elif value != said_before[name]:
             tables.put(key, writer.plain(hints[name], value))
     for flag in flags:
@@ -245,3 +249,13 @@ def _put_flags(tables: Tables, arguments: Any, flags: list[GuestFlag]) -> None:
         if flag.default is MISSING or value != flag.default:
             told = tables.here(value) if isinstance(value, Path) else writer.plain(flag.hint, value)
             tables.put(flag.key, told)
+    _check_servo(arguments)
+
+
+def _check_servo(arguments: Any) -> None:
+    """Refuse flags that describe no servo, as wrong usage."""
+    names = [entry.name for entry in fields(ServoConfig)]
+    try:
+        ServoConfig(**{name: getattr(arguments, f"servo_{name}") for name in names})
+    except ConfigError as error:
+        raise UsageError(str(error)) from None

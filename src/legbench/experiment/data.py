@@ -10,7 +10,7 @@ from legbench.design import LegDesign
 from legbench.design.setup import Setup
 from legbench.errors import ConfigError
 from legbench.experiment.reading import REGISTRY
-from legbench.experiment.tables import read_run
+from legbench.guests import load_text
 from legbench.kinematics import ModalConvention
 from legbench.mjcf.options import BuildOptions, Ground, Linkage, Numerics
 from legbench.plant.opening import PlantSettings
@@ -93,4 +93,4 @@ class Experiment:
             RecordingError: there is no such run, or its manifest is damaged.
             ConfigError: it was written before experiments were recorded whole, or a guest is gone.
         """
-        return read_run(cls, Path(run))
+        return load_text("legbench.experiment.runs:read_run")(cls, Path(run))

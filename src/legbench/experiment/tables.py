@@ -8,13 +8,11 @@ from typing import Any, Final, TypeVar
 from legbench.control import CONTROLLERS
 from legbench.design import LegDesign, load_design
 from legbench.design.toml import UNITS, design_from_mapping, design_to_mapping
-from legbench.drives.bus_file import load_limits
 from legbench.drives.limits import SafetyLimits
-from legbench.errors import ConfigError, RecordingError
+from legbench.errors import ConfigError
 from legbench.experiment.reading import Reader, Special, placed
 from legbench.experiment.writing import Writer
-from legbench.recording.layout import RUN
-from legbench.recording.manifest import read_manifest
+from legbench.guests import load_text
 
 Read = TypeVar("Read")
 FORMAT: Final = 1
@@ -32,13 +30,19 @@ _DESIGN: Final = {
     "springs": {"stiffness": [], "damping": []},
     "limits": {"hip": [], "knee": []},
 }
+
+
+def _load_limits(path: Path) -> SafetyLimits:
+    return load_text("legbench.drives.bus_file:load_limits")(path)
+
+
 SPECIALS: Final = {
     LegDesign: Special(
         load=load_design,
         decode=design_from_mapping,
         structure=_DESIGN,
     ),
-    SafetyLimits: Special(load=load_limits),
+    SafetyLimits: Special(load=_load_limits),
 }
 """Values that may be given as a file, and the design, whose tables have units."""
 
@@ -115,28 +119,3 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise ConfigError(f"{path}: cannot be read: {error}") from None
     except ValueError as error:  # TOMLDecodeError, or a whole number of thousands of digits
         raise ConfigError(f"{path}: not valid TOML: {error}") from None
-
-
-def tables_of_run(path: Path) -> tuple[dict[str, Any], Path]:
-    """The experiment in a run folder, or in its `run.json`, and what its paths are relative to.
-
-    Raises:
-        RecordingError: there is no such run, or its manifest is damaged.
-        ConfigError: it was written before experiments were recorded whole.
-    """
-    run = path.parent if path.name == RUN else path
-    manifest = read_manifest(run)
-    if manifest is None:
-        raise RecordingError(f"{run} is no run folder: it has no {RUN}")
-    tables = manifest.get("experiment")
-    if not isinstance(tables, dict):
-        raise ConfigError(
-            f"{run} was recorded before runs held their whole experiment; run it with its flags"
-        )
-    return tables, run
-
-
-def read_run(kind: type[Read], path: Path) -> Read:
-    """The experiment that a run was recorded from; raises as `tables_of_run` and `read_tables`."""
-    tables, folder = tables_of_run(path)
-    return read_tables(kind, tables, folder, json=True)

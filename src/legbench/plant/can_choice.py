@@ -3,13 +3,15 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import ClassVar, Final
+from typing import TYPE_CHECKING, ClassVar, Final
 
-from legbench.drives.config import BusConfig
 from legbench.drives.emulated.faults import Fault
 from legbench.drives.limits import SafetyLimits
 from legbench.guests import WHERE, load_text
 from legbench.plant.opening import Leg, OpenPlant
+
+if TYPE_CHECKING:
+    from legbench.drives.config import BusConfig
 
 EMULATED: Final = "legbench"
 """Interface of the emulated leg in this process, in virtual time."""
@@ -40,7 +42,7 @@ class CanChoice:
     faults: tuple[Fault, ...] = ()
     """Faults to inject into the emulated leg in this process, on its virtual time."""
 
-    def is_virtual(self, config: BusConfig) -> bool:
+    def is_virtual(self, config: "BusConfig") -> bool:
         """Whether it is the emulated leg in this process, in virtual time."""
         return (self.interface or config.interface) == EMULATED
 

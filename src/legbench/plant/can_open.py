@@ -20,8 +20,9 @@ from legbench.drives.wire import check_load
 from legbench.errors import ConfigError, LegbenchError
 from legbench.plant.can import CanPlant
 from legbench.plant.can_choice import BUS_LOG, LIMITS_NAME, CanChoice
-from legbench.plant.design_limits import limits_for, limits_within
+from legbench.plant.design_limits import limits_within
 from legbench.plant.emulated_leg import EmulatedLeg
+from legbench.plant.limits_file import limits_for
 from legbench.plant.opening import Leg, OpenPlant
 from legbench.plant.start import PERIOD
 from legbench.servo import ServoConfig

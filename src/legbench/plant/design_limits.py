@@ -1,28 +1,12 @@
 """Safety limits held against a design: what its stops leave to motors and links."""
 
 from dataclasses import asdict, replace
-from pathlib import Path
 
 from legbench.design import LegDesign
-from legbench.drives.bus_file import load_limits
 from legbench.drives.limits import UNLIMITED, Range, SafetyLimits
-from legbench.errors import ConfigError
 from legbench.plant.abstract import AbstractPlant
 from legbench.plant.limited import LimitedPlant
 from legbench.plant.opening import Leg, OpenPlant
-
-
-def limits_for(path: Path, design: LegDesign) -> SafetyLimits:
-    """Limits of a file; a range that it leaves out is the design's.
-
-    Raises:
-        ConfigError: the file makes no sense, or is looser than the design.
-    """
-    try:
-        return limits_within(load_limits(path), design)
-    except ConfigError as error:
-        text = str(error)
-        raise ConfigError(text if text.startswith(f"{path}:") else f"{path}: {text}") from None
 
 
 def limits_within(limits: SafetyLimits, design: LegDesign) -> SafetyLimits:
