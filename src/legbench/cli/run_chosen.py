@@ -244,18 +244,20 @@ def _put_flags(tables: Tables, arguments: Any, flags: list[GuestFlag]) -> None:
             tables.put(key, tables.here(value))
         elif value != said_before[name]:
             tables.put(key, writer.plain(hints[name], value))
+    servo: dict[str, Any] = {}
     for flag in flags:
         value = getattr(arguments, flag.attribute)
         if flag.default is MISSING or value != flag.default:
             told = tables.here(value) if isinstance(value, Path) else writer.plain(flag.hint, value)
             tables.put(flag.key, told)
-    _check_servo(arguments)
+            if flag.attribute.startswith("servo_"):
+                servo[flag.attribute.removeprefix("servo_")] = value
+    _check_servo(servo)
 
 
-def _check_servo(arguments: Any) -> None:
+def _check_servo(given: dict[str, Any]) -> None:
     """Refuse flags that describe no servo, as wrong usage."""
-    names = [entry.name for entry in fields(ServoConfig)]
     try:
-        ServoConfig(**{name: getattr(arguments, f"servo_{name}") for name in names})
+        ServoConfig(**given)
     except ConfigError as error:
         raise UsageError(str(error)) from None
