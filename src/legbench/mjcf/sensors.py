@@ -88,21 +88,42 @@ class SensorLayout:
             gaps=None if gaps is None else slice(gaps, gaps + 6),
         )
 
-    def contact_of(self, values: Floats) -> Bools:
+    def views(self, values: Floats) -> "SensorViews":
+        """The quantities in a sensor array (..., n) that changes in place."""
+        legs = values.shape[:-1]
+        gaps = np.zeros((*legs, 6)) if self.gaps is None else values[..., self.gaps]
+        held = np.full(legs, 1.0 if self.always_contact else 0.0)
+        return SensorViews(
+            trunk_pos=values[..., self.trunk_pos],
+            trunk_vel=values[..., self.trunk_vel],
+            foot_pos=values[..., self.foot_pos],
+            force=np.zeros((*legs, 2)) if self.force.stop == 0 else values[..., self.force],
+            found=held if self.found is None else values[..., self.found],
+            gap_x=gaps[..., 0::3],
+            gap_z=gaps[..., 2::3],
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SensorViews:
+    """Views of a live sensor array, sliced once: slicing in the loop costs as much as copying."""
+
+    trunk_pos: Floats
+    """(..., 2) [m]"""
+    trunk_vel: Floats
+    """(..., 2) [m/s]"""
+    foot_pos: Floats
+    """(..., 2) [m]"""
+    force: Floats
+    """Ground on foot (..., 2) [N]; zeros where no ground is."""
+    found: Floats
+    """Positive where the foot is held by the ground (...)."""
+    gap_x: Floats
+    """Opening of both loops, forward (..., 2) [m]; zeros where there are no bars."""
+    gap_z: Floats
+    """Opening of both loops, upward (..., 2) [m]."""
+
+    @property
+    def contact(self) -> Bools:
         """Whether the foot is held by the ground (...)."""
-        if self.found is None:
-            return np.full(values.shape[:-1], self.always_contact)
-        return values[..., self.found] > 0.0
-
-    def force_of(self, values: Floats) -> Floats:
-        """Ground on foot (..., 2) [N]; zero where no ground is."""
-        if self.force.stop == 0:
-            return np.zeros((*values.shape[:-1], 2))
-        return values[..., self.force]
-
-    def gap_of(self, values: Floats) -> Floats:
-        """Opening of both loops (..., 2) [m]; zero where there are no bars."""
-        if self.gaps is None:
-            return np.zeros((*values.shape[:-1], 2))
-        gap = values[..., self.gaps]
-        return np.hypot(gap[..., 0::3], gap[..., 2::3])
+        return self.found > 0.0

@@ -44,10 +44,9 @@ class JointLayout:
         )
 
 
-def absolute(layout: JointLayout, coordinates: Floats) -> Floats:
-    """q1, q2 or their rates (..., 2) from MuJoCo's relative coordinates (..., nq)."""
-    relative = coordinates[..., layout.hip : layout.knee + 1]
-    return np.add.accumulate(relative, axis=-1)
+def relative(layout: JointLayout, coordinates: Floats) -> Floats:
+    """Hip and knee (..., 2) in MuJoCo's coordinates (..., nq), a view; added up they are q1, q2."""
+    return coordinates[..., layout.hip : layout.knee + 1]
 
 
 def branch_fault(layout: JointLayout, qpos: Floats) -> str | None:
@@ -101,29 +100,30 @@ class Observer:
     ) -> None:
         """Look the layout up once; `stiffness` is (..., 2) [N m/rad]."""
         self.joints = JointLayout.of(model)
-        self._sensors = SensorLayout.of(model)
+        self._sensors = SensorLayout.of(model).views(arrays.sensordata)
+        self._relative = relative(self.joints, arrays.qpos)
+        self._rates = relative(self.joints, arrays.qvel)
         self._arrays, self._stiffness, self._servo = arrays, stiffness, servo
 
     def look(self, time: float, applied_pos: Floats) -> Observation:
         """What the plant shows at `time` [s], after the command `applied_pos` (..., 2) [rad]."""
         arrays, sensors = self._arrays, self._sensors
-        joint_pos = self._servo.encode(absolute(self.joints, arrays.qpos))
+        joint_pos = self._servo.encode(np.add.accumulate(self._relative, axis=-1))
         motor_pos = self._servo.encode(arrays.ctrl.copy())
-        values = arrays.sensordata.copy()
         truth = Truth(
-            trunk_pos=values[..., sensors.trunk_pos],
-            trunk_vel=values[..., sensors.trunk_vel],
-            foot_pos=values[..., sensors.foot_pos],
-            contact_force=sensors.force_of(values),
-            contact=sensors.contact_of(values),
+            trunk_pos=sensors.trunk_pos.copy(),
+            trunk_vel=sensors.trunk_vel.copy(),
+            foot_pos=sensors.foot_pos.copy(),
+            contact_force=sensors.force.copy(),
+            contact=sensors.contact,
             energy=arrays.energy.copy(),
-            loop_gap=sensors.gap_of(values),
+            loop_gap=np.hypot(sensors.gap_x, sensors.gap_z),
         )
         return Observation(
             time=time,
             motor_pos=motor_pos,
             joint_pos=joint_pos,
-            joint_vel=absolute(self.joints, arrays.qvel),
+            joint_vel=np.add.accumulate(self._rates, axis=-1),
             spring_torque=self._stiffness * (motor_pos - joint_pos),
             applied_pos=applied_pos.copy(),
             truth=truth,
