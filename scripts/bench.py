@@ -7,7 +7,9 @@ Baseline and candidate take turns, so that a machine that changes its speed chan
 ratio is the median over the pairs.
 """
 
+import resource
 import statistics
+import subprocess
 import sys
 import tempfile
 import time
@@ -30,7 +32,7 @@ from legbench.plant.sim import SimPlant
 from legbench.plant.start import Start
 from legbench.recording.reader import load
 from legbench.recording.writer import RunWriter
-from legbench.signals import Floats
+from legbench.signals import Floats, Observation
 from legbench.viz.live.rrd import write_rrd
 
 MODELS = Path(__file__).parent.parent / "models"
@@ -109,7 +111,7 @@ def bench_loop() -> Result:
 
         ratio, detail = ratio_of(ours, bare)
     return Result(
-        name="loop with recording / mj_step", value=ratio, bound=1.4, unit="x", detail=detail
+        name="loop with recording / mj_step", value=ratio, bound=1.25, unit="x", detail=detail
     )
 
 
@@ -172,7 +174,76 @@ def bench_rrd() -> Result:
     )
 
 
+def bench_jump() -> Result:
+    """The jump controller on one leg, in floats, against the same on a batch of one, in arrays."""
+    steps = 4000
+    one, _ = hopping(prototype())
+    batch_of_one, _ = hopping([prototype()])
+    torque, motor_pos = np.array([0.3, -0.3]), np.array([-0.3, 0.3])
+
+    def stepped(controller: Jump, torque: Floats, motor_pos: Floats) -> Callable[[], None]:
+        zero = np.zeros(torque.shape)
+        seen = Observation(
+            time=0.01,
+            motor_pos=motor_pos,
+            joint_pos=zero,
+            joint_vel=zero,
+            spring_torque=torque,
+            applied_pos=motor_pos,
+        )
+        controller.reset(seen)
+
+        def run_steps() -> None:
+            for _ in range(steps):
+                controller.step(seen)
+
+        return run_steps
+
+    rows = (torque[np.newaxis], motor_pos[np.newaxis])
+    ratio, detail = ratio_of(
+        stepped(one, torque, motor_pos), stepped(batch_of_one, rows[0], rows[1])
+    )
+    return Result(
+        name="jump, one leg / batch of one", value=ratio, bound=0.1, unit="x", detail=detail
+    )
+
+
+def cpu_time(*words: str) -> float:
+    """Least CPU time of a fresh Python process with these arguments [s]."""
+    times = []
+    for _ in range(PAIRS):
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        subprocess.run([sys.executable, *words], check=True, capture_output=True)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        times.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+    return min(times)
+
+
+def bench_start(name: str, bound: float, *words: str) -> Result:
+    """A fresh process against one that only imports NumPy, in CPU time."""
+    bare, ours = cpu_time("-c", "import numpy"), cpu_time(*words)
+    detail = f"{1e3 * ours:.0f} ms against {1e3 * bare:.0f} ms"
+    return Result(
+        name=f"{name} / import numpy", value=ours / bare, bound=bound, unit="x", detail=detail
+    )
+
+
+def bench_first() -> Result:
+    """A run of one cycle, from the command line to its summary."""
+    with tempfile.TemporaryDirectory() as folder:
+        design = str(MODELS / "prototype.toml")
+        words = ("-m", "legbench", "run", "jump", "--design", design, "--duration", "0.001")
+        return bench_start("run jump of one cycle", 5.0, *words, "--out", folder)
+
+
 BENCHES = {"loop": bench_loop, "batch": bench_batch, "row": bench_row, "rrd": bench_rrd}
+BENCHES |= {
+    "jump": bench_jump,
+    "import": lambda: bench_start("import legbench", 0.2, "-c", "import legbench"),
+    "help": lambda: bench_start("legbench --help", 0.3, "-m", "legbench", "--help"),
+    "run-help": lambda: bench_start("run --help", 3.0, "-m", "legbench", "run", "--help"),
+    "first": bench_first,
+}
 
 
 def main() -> int:

@@ -5,7 +5,6 @@ or `path/to/mine.py:Class`. It is loaded when it is asked for, so that a guest t
 import, or drags in half a day of imports, harms nobody else.
 """
 
-import hashlib
 import importlib
 import importlib.util
 import sys
@@ -183,7 +182,7 @@ def module_of_file(path: Path) -> ModuleType:
         content = path.read_bytes()
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from None
-    digest = hashlib.sha256(str(path.resolve()).encode() + b"\0" + content).hexdigest()
+    digest = load_text("hashlib:sha256")(str(path.resolve()).encode() + b"\0" + content).hexdigest()
     name = f"{GUEST_PREFIX}{path.stem}_{digest[:12]}"
     if name in sys.modules:
         return sys.modules[name]

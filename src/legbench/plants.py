@@ -4,13 +4,13 @@ from typing import TYPE_CHECKING, Final
 
 from legbench.guests import Registry
 from legbench.lazily import lazy_names
-from legbench.plant.analytic_choice import AnalyticChoice
-from legbench.plant.can_choice import BUS_LOG, EMULATED, LIMITS_NAME, CanChoice
 from legbench.plant.design_limits import joint_ranges
 from legbench.plant.opening import Leg, OpenPlant, PlantSettings, open_plant
 from legbench.plant.sim_choice import SimChoice
 
 if TYPE_CHECKING:
+    from legbench.plant.analytic_choice import AnalyticChoice
+    from legbench.plant.can_choice import BUS_LOG, EMULATED, LIMITS_NAME, CanChoice
     from legbench.plant.limits_file import limits_for
 
 PLANTS: Final = Registry(
@@ -40,4 +40,15 @@ __all__ = [
     "limits_for",
     "open_plant",
 ]
-__getattr__ = lazy_names(__name__, {"limits_for": "legbench.plant.limits_file"})
+_CAN = "legbench.plant.can_choice"
+__getattr__ = lazy_names(
+    __name__,
+    {
+        "BUS_LOG": _CAN,
+        "EMULATED": _CAN,
+        "LIMITS_NAME": _CAN,
+        "AnalyticChoice": "legbench.plant.analytic_choice",
+        "CanChoice": _CAN,
+        "limits_for": "legbench.plant.limits_file",
+    },
+)

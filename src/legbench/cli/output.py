@@ -1,6 +1,5 @@
 """What commands print: results on stdout, everything else on stderr."""
 
-import json
 import select
 import sys
 from collections.abc import Mapping
@@ -19,6 +18,8 @@ def note(message: str) -> None:
 
 def print_json(content: Mapping[str, Any]) -> None:
     """One JSON object on stdout; not-a-number is null."""
+    import json
+
     print(json.dumps(content, allow_nan=False))
 
 

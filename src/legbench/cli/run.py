@@ -15,10 +15,11 @@ if TYPE_CHECKING:
 
 def plays_alone(experiment: Experiment) -> bool:
     """Whether time is the computer's own to choose; drives on a wire keep their own."""
+    if experiment.plant.kind != "can":
+        return True
     from legbench.plants import EMULATED, CanChoice
 
-    plant = experiment.plant
-    return not isinstance(plant, CanChoice) or plant.interface == EMULATED
+    return isinstance(experiment.plant, CanChoice) and experiment.plant.interface == EMULATED
 
 
 @dataclass(slots=True)

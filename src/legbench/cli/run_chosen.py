@@ -205,13 +205,16 @@ def _kind(registry: Registry, tables: Tables, room: str) -> type[Any]:
 def _check_bench(words: Sequence[str], plant: str, known: set[str]) -> None:
     """Name the plant to which a flag belongs that the chosen one does not have."""
     given = {word.partition("=")[0].removeprefix("--") for word in words if word.startswith("--")}
+    ours = {entry.name for entry in fields(CommonArguments)} | known
+    strangers = given - {name.replace("_", "-") for name in ours} - {"help"}
+    if not strangers:
+        return
     for kind in PLANTS.builtin:
         own = {name.replace("_", "-") for name in _field_names(PLANTS.find(kind))}
-        strangers = sorted(given & own - {name.replace("_", "-") for name in known} - {"limits"})
-        if kind != plant and strangers:
+        if kind != plant and strangers & own:
+            names = ", ".join(sorted(strangers & own))
             raise ConfigError(
-                f"{', '.join(strangers)}: settings of plant {kind}; plant {plant} has none such, "
-                f"add --plant {kind}"
+                f"{names}: settings of plant {kind}; plant {plant} has none, add --plant {kind}"
             )
 
 

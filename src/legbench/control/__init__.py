@@ -1,15 +1,20 @@
 """Controllers: one a file, for one leg or a batch; and the words to write one in."""
 
+from typing import TYPE_CHECKING
+
 from legbench.control.abstract import AbstractController
-from legbench.control.bang_bang import BangBang, BangBangConfig
-from legbench.control.jump import Jump, JumpConfig
-from legbench.control.position_jump import PositionJump, PositionJumpConfig
 from legbench.control.registry import CONTROLLERS
 from legbench.control.setpoint import LegTargets, SetpointMeaning
 from legbench.control.settings import ControllerSettings, make_controller
 from legbench.design.setup import SetupKind
+from legbench.lazily import lazy_names
 from legbench.phases import ControllerDescription, Counting, PhaseInfo, Role
 from legbench.signals import Command, Observation, Signal
+
+if TYPE_CHECKING:
+    from legbench.control.bang_bang import BangBang, BangBangConfig
+    from legbench.control.jump import Jump, JumpConfig
+    from legbench.control.position_jump import PositionJump, PositionJumpConfig
 
 __all__ = [
     "CONTROLLERS",
@@ -33,3 +38,14 @@ __all__ = [
     "Signal",
     "make_controller",
 ]
+__getattr__ = lazy_names(
+    __name__,
+    {
+        "BangBang": "legbench.control.bang_bang",
+        "BangBangConfig": "legbench.control.bang_bang",
+        "Jump": "legbench.control.jump",
+        "JumpConfig": "legbench.control.jump",
+        "PositionJump": "legbench.control.position_jump",
+        "PositionJumpConfig": "legbench.control.position_jump",
+    },
+)

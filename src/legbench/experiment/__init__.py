@@ -1,19 +1,19 @@
 """What is to happen as one value, its file and its name, and what running it leaves.
 
-What runs it is loaded when it is asked for: describing an experiment costs no simulator.
+Names are loaded when they are asked for: describing an experiment costs no simulator.
 """
 
 from typing import TYPE_CHECKING
 
-from legbench.control import ControllerSettings, make_controller
-from legbench.experiment.canonical import canonical_text, experiment_hash
-from legbench.experiment.data import Conventions, Experiment
-from legbench.experiment.files import experiment_text, load_experiment, save_experiment
-from legbench.experiment.start import start_of, targets_of
 from legbench.lazily import lazy_names
 
 if TYPE_CHECKING:
+    from legbench.control import ControllerSettings, make_controller
+    from legbench.experiment.canonical import canonical_text, experiment_hash
+    from legbench.experiment.data import Conventions, Experiment
+    from legbench.experiment.files import experiment_text, load_experiment, save_experiment
     from legbench.experiment.running import Finished, record
+    from legbench.experiment.start import start_of, targets_of
 
 __all__ = [
     "ControllerSettings",
@@ -30,5 +30,21 @@ __all__ = [
     "start_of",
     "targets_of",
 ]
-_HOME = "legbench.experiment.running"
-__getattr__ = lazy_names(__name__, {"Finished": _HOME, "record": _HOME})
+__getattr__ = lazy_names(
+    __name__,
+    {
+        "ControllerSettings": "legbench.control",
+        "Conventions": "legbench.experiment.data",
+        "Experiment": "legbench.experiment.data",
+        "Finished": "legbench.experiment.running",
+        "canonical_text": "legbench.experiment.canonical",
+        "experiment_hash": "legbench.experiment.canonical",
+        "experiment_text": "legbench.experiment.files",
+        "load_experiment": "legbench.experiment.files",
+        "make_controller": "legbench.control",
+        "record": "legbench.experiment.running",
+        "save_experiment": "legbench.experiment.files",
+        "start_of": "legbench.experiment.start",
+        "targets_of": "legbench.experiment.start",
+    },
+)

@@ -11,7 +11,7 @@ from legbench.experiment.data import Experiment
 from legbench.experiment.manifest import guests_of, manifest_of
 from legbench.experiment.start import start_of, targets_of
 from legbench.loop import Outcome, Progress, StopFlag, run
-from legbench.mjcf import build_spec, to_xml
+from legbench.mjcf import model_text
 from legbench.plant.start import PERIOD
 from legbench.plants import Leg, open_plant
 from legbench.recording.writer import RunWriter
@@ -57,7 +57,7 @@ def record(
     leg = Leg(
         design=experiment.design, options=experiment.options, start=start, servo=experiment.servo
     )
-    xml = to_xml(build_spec(experiment.design, experiment.options))
+    xml = model_text(experiment.design, experiment.options)
     opened = open_plant(experiment.plant, leg)
     with opened.plant:
         manifest = manifest_of(experiment, start, xml, opened.facts, out / "run")

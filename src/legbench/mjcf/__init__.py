@@ -11,6 +11,7 @@ from legbench.mjcf.options import BuildOptions, Ground, Linkage, LinkageKind, Nu
 if TYPE_CHECKING:
     from legbench.mjcf.build import build_spec
     from legbench.mjcf.pose import rest_qpos
+    from legbench.mjcf.text import model_text
     from legbench.mjcf.xml import to_xml, xml_hash
 
 __all__ = [
@@ -20,6 +21,7 @@ __all__ = [
     "LinkageKind",
     "Numerics",
     "build_spec",
+    "model_text",
     "rest_qpos",
     "to_xml",
     "xml_hash",
@@ -28,6 +30,7 @@ __getattr__ = lazy_names(
     __name__,
     {
         "build_spec": "legbench.mjcf.build",
+        "model_text": "legbench.mjcf.text",
         "rest_qpos": "legbench.mjcf.pose",
         "to_xml": "legbench.mjcf.xml",
         "xml_hash": "legbench.mjcf.xml",

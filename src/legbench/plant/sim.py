@@ -8,7 +8,7 @@ import numpy as np
 
 from legbench.design import LegDesign
 from legbench.errors import PlantFault
-from legbench.mjcf import BuildOptions, build_spec, rest_qpos, to_xml
+from legbench.mjcf import BuildOptions, model_text, rest_qpos
 from legbench.plant.abstract import AbstractPlant
 from legbench.plant.observe import LiveArrays, Observer, branch_fault
 from legbench.plant.start import PERIOD, Start
@@ -34,7 +34,7 @@ class SimPlant(AbstractPlant):
         servo: ServoConfig | None = None,
     ) -> None:
         self.period = PERIOD
-        self.xml = to_xml(build_spec(design, options))
+        self.xml = model_text(design, options)
         self.model = mujoco.MjModel.from_xml_string(self.xml)
         self.data = mujoco.MjData(self.model)
         self._substeps = round(PERIOD / self.model.opt.timestep)

@@ -4,7 +4,6 @@ import json
 import math
 import platform
 from collections.abc import Mapping
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ import numpy as np
 
 from legbench import __version__
 from legbench.errors import ConfigError, FormatError, RecordingError
+from legbench.guests import load_text
 from legbench.recording.files import reason, write_whole
 from legbench.recording.layout import FORMAT, RUN, RUNNING, UNITS
 
@@ -49,11 +49,17 @@ def new_manifest(given: Mapping[str, Any], *, id: str, created: str) -> Manifest
     taken = [key for key in OWN_KEYS if key in given]
     if taken:
         raise ConfigError(f"the manifest's {', '.join(taken)} are filled in by the recording")
-    versions = {name: version(name) for name in ("numpy", "pyarrow")}
-    versions = {"python": platform.python_version()} | versions | dict(given.get("versions", {}))
+    told = dict(given.get("versions", {}))
+    versions = {name: _version(name) for name in ("numpy", "pyarrow") if name not in told}
+    versions = {"python": platform.python_version()} | versions | told
     head = {"format": FORMAT, "legbench": __version__, "id": id, "created": created}
     end = {"status": RUNNING, "cause": None}
     return plain({**head, **end, **given, "versions": versions, "units": UNITS})
+
+
+def _version(package: str) -> str:
+    """Version of an installed package; what looks it up is slow to import."""
+    return load_text("importlib.metadata:version")(package)
 
 
 def to_json(manifest: Mapping[str, Any]) -> bytes:
