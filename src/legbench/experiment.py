@@ -2,7 +2,7 @@
 
 import math
 import platform
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -29,6 +29,8 @@ from legbench.loop import Outcome, Progress, StopFlag, run
 from legbench.mjcf import BuildOptions, Ground, Linkage, Numerics, build_spec, to_xml, xml_hash
 from legbench.plant.start import PERIOD, Start
 from legbench.plants import Leg, PlantChoice, SimChoice, open_plant
+from legbench.recording.controller_table import controller_table
+from legbench.recording.format_1 import built_in
 from legbench.recording.writer import RunWriter
 from legbench.servo import ServoConfig
 
@@ -157,7 +159,7 @@ def record(
     xml = to_xml(build_spec(experiment.design, experiment.options))
     opened = open_plant(experiment.plant, leg)
     with opened.plant:
-        manifest = _manifest(experiment, start, xml) | opened.manifest
+        manifest = _manifest(experiment, start, xml, opened.manifest)
         kind = experiment.controller.kind
         name = f"{kind}-{experiment.design.name}"
         with RunWriter.create(out, manifest, name=name) as writer:
@@ -185,11 +187,31 @@ def record(
     return Finished(path=writer.path, outcome=outcome)
 
 
-def _manifest(experiment: Experiment, start: Start, xml: str) -> dict[str, Any]:
+def _manifest(
+    experiment: Experiment, start: Start, xml: str, plant: Mapping[str, Any]
+) -> dict[str, Any]:
     """What a run has to say of itself; everything a reader needs to judge it."""
+    kind, settings = experiment.controller.kind, asdict(experiment.controller)
+    return {
+        "experiment": _tables(experiment),
+        "controller": controller_table(kind, built_in(kind, settings)),
+        "provenance": {
+            "mjcf_sha256": xml_hash(xml),
+            "versions": {"python": platform.python_version(), **_versions()},
+        },
+        "plant": {key: value for key, value in plant.items() if key != "plant"},
+        "period": PERIOD,
+        "initial_state": {
+            "joint_pos": start.joint_pos.tolist(),
+            "motor_pos": start.motor_pos.tolist(),
+        },
+    }
+
+
+def _tables(experiment: Experiment) -> dict[str, Any]:
+    """Tables of an experiment as a file would hold them."""
     return {
         "design": design_to_mapping(experiment.design),
-        "mjcf_sha256": xml_hash(xml),
         "setup": asdict(experiment.setup),
         "linkage": asdict(experiment.linkage),
         "ground": asdict(experiment.ground),
@@ -201,13 +223,9 @@ def _manifest(experiment: Experiment, start: Start, xml: str) -> dict[str, Any]:
             "setpoint": str(experiment.meaning),
             "rating_reference": "motor",
         },
-        "period": PERIOD,
+        "plant": {"kind": experiment.plant.kind, **asdict(experiment.plant)},
+        "duration": experiment.duration,
         "seed": None,
-        "initial_state": {
-            "joint_pos": start.joint_pos.tolist(),
-            "motor_pos": start.motor_pos.tolist(),
-        },
-        "versions": {"python": platform.python_version(), **_versions()},
     }
 
 

@@ -90,6 +90,9 @@ class Command:
     """Desired motor positions (..., 2) [rad]."""
     phase: Ints
     """`Phase` of the controller (...)."""
+    signals: Floats | None = None
+    """Own signals of the controller, all components in the order of their declaration (..., m);
+    none: nothing to tell in this row."""
 
     @classmethod
     def holding(cls, motor_pos: Floats) -> "Command":

@@ -120,7 +120,7 @@ def test_settings_reach_the_run(tmp_path: Path, capfd: pytest.CaptureFixture[str
         *("--duration", "0.15", "--out", tmp_path, "--json"),
     )
     assert done.status == 0, done.err
-    manifest = load(Path(json.loads(done.out)["run"])).manifest
+    manifest = load(Path(json.loads(done.out)["run"])).description.experiment
     assert manifest["controller"]["three_levels"] is True
     assert manifest["controller"]["sign"] == -1
     assert manifest["controller"]["z2"] == 0.6

@@ -79,7 +79,11 @@ def equilibrium(design: LegDesign, motor_pos: Floats, support: Support) -> Float
         for _ in range(20):
             residual = stiffness * (motor_pos - joint_pos) - share * moment * np.sin(joint_pos)
             slope = stiffness + share * moment * np.cos(joint_pos)
+            last = joint_pos
             joint_pos = joint_pos + residual / np.where(np.abs(slope) < 1e-9, 1e-9, slope)
+            if np.array_equal(joint_pos, last):
+                # Every further step would give the same numbers.
+                break
     residual = stiffness * (motor_pos - joint_pos) - moment * np.sin(joint_pos)
     slope = stiffness + moment * np.cos(joint_pos)
     if not (np.all(np.abs(residual) < 1e-9) and np.all(slope > 0.0)):

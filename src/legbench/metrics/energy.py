@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from legbench.design.leg import LegDesign
-from legbench.design.setup import SetupKind
 from legbench.metrics.rows import runs_of
-from legbench.metrics.source import Recorded, terms_of
+from legbench.metrics.source import Recorded
 from legbench.signals import Bools, Floats
 
 STOP_MARGIN = 0.02
@@ -37,12 +36,8 @@ def spring_energy(design: LegDesign, motor_pos: Floats, joint_pos: Floats) -> Fl
 
 
 def energy_flows(recording: Recorded) -> Flows:
-    """Split the change of energy over each interval into work, loss and the unexplained.
-
-    Raises:
-        FormatError: a manifest without a leg.
-    """
-    design = terms_of(recording.manifest).design
+    """Split the change of energy over each interval into work, loss and the unexplained."""
+    design = recording.description.design
     motor, joint = recording["motor_pos"], recording["joint_pos"]
     after_move = spring_energy(design, motor[1:], joint[:-1])
     work = after_move - spring_energy(design, motor[:-1], joint[:-1])
@@ -73,7 +68,7 @@ def _integral(time: Floats, power: Floats, motor_pos: Floats) -> Floats:
 
 def stop_intervals(recording: Recorded) -> Bools:
     """Intervals (n - 1,) in which a joint stop may act, one row spared around."""
-    limits = terms_of(recording.manifest).design.limits
+    limits = recording.description.design.limits
     joint = recording["joint_pos"]
     near = np.zeros(len(joint), dtype=bool)
     angles = ((joint[:, 0], limits.hip), (joint[:, 1] - joint[:, 0], limits.knee))
@@ -85,7 +80,7 @@ def stop_intervals(recording: Recorded) -> Bools:
 def clean_intervals(recording: Recorded) -> Bools:
     """Intervals (n - 1,) in which only springs, dampers and gravity act, one row spared around."""
     stops = stop_intervals(recording)
-    if terms_of(recording.manifest).setup is not SetupKind.JUMP:
+    if not recording.description.jumps:
         return ~stops
     return ~(stops | _around(np.asarray(recording["contact"], dtype=bool)))
 
