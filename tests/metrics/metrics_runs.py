@@ -9,8 +9,10 @@ import numpy as np
 
 from legbench.design.leg import LegDesign
 from legbench.design.toml import design_to_mapping, load_design
+from legbench.phases import ControllerDescription, Counting, PhaseInfo
+from legbench.recording.controller_table import controller_table
 from legbench.recording.reader import Recording, described
-from legbench.signals import SIGNALS, Floats, Phase
+from legbench.signals import SIGNALS, Floats, Ints, Phase
 
 MODELS = Path(__file__).parents[2] / "models"
 PROTOTYPE = load_design(MODELS / "prototype.toml")
@@ -64,6 +66,31 @@ def recording(time: Floats, entries: dict[str, Any] | None = None, **signals: An
 def remade(run: Recording, entries: dict[str, Any]) -> Recording:
     """The same rows under another manifest."""
     return replace(run, described=described(entries, run.path))
+
+
+def guest(
+    phase: Ints,
+    phases: tuple[PhaseInfo, ...],
+    counting: Counting | None = None,
+    *,
+    setup: dict[str, Any] | None = None,
+    signals: dict[str, Any] | None = None,
+    like: Recording | None = None,
+) -> Recording:
+    """A run of a controller that is not built in, of given phases; its rows `like` another's."""
+    said = ControllerDescription(phases=phases, counting=counting or Counting())
+    entries = {
+        "experiment": {
+            "design": design_to_mapping(PROTOTYPE),
+            "setup": setup or {"kind": "jump"},
+            "controller": {"kind": "guest"},
+        },
+        "controller": controller_table("guest", said),
+    }
+    if like is None:
+        return recording(clock(len(phase)), entries, phase=phase, **(signals or {}))
+    columns = {**like.columns, "phase": phase.astype(np.int8)}
+    return replace(remade(like, entries), columns=MappingProxyType(columns))
 
 
 def truncated(run: Recording, rows: slice) -> Recording:

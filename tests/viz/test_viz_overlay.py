@@ -98,7 +98,11 @@ def test_overlays_are_the_same_bytes_each_time(
 
 
 def test_several_runs_have_looks_and_names_of_their_own(swing: Recording) -> None:
-    others = [swayed(swing, 0.05, plant="sim"), swayed(swing, 0.1, plant="can"), swing]
+    others = [
+        swayed(swing, 0.05, plant={"kind": "sim"}),
+        swayed(swing, 0.1, plant={"kind": "can"}),
+        swing,
+    ]
     figure = phase_figure(swing, others)
     assert len({look_of(place).colour for place in range(3)}) == 3
     for place in range(3):

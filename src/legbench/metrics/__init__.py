@@ -9,7 +9,7 @@ from legbench.metrics.modal import Trajectory, trajectory
 from legbench.metrics.periods import Periods, find_periods
 from legbench.metrics.phases import Gait, Intervals, Jumps, find_gait
 from legbench.metrics.rating import alignment, deflection, rate, rate_phases
-from legbench.metrics.run_ratings import Ratings, RunRatings
+from legbench.metrics.run_ratings import RatingLists, RunRatings
 from legbench.metrics.source import Recorded, Reference
 from legbench.metrics.summary import Summary, summarise
 
@@ -24,7 +24,7 @@ __all__ = [
     "JumpFigures",
     "Jumps",
     "Periods",
-    "Ratings",
+    "RatingLists",
     "Recorded",
     "Reference",
     "RunRatings",

@@ -81,7 +81,7 @@ class Analysis:
 
     @cached_property
     def ratings(self) -> RunRatings:
-        """Ratings of stances and flights in a jump, of periods in any other setup."""
+        """RatingLists of stances and flights in a jump, of periods in any other setup."""
         return rate_run(self, self.gait, None if self.description.jumps else self.periods)
 
     @cached_property

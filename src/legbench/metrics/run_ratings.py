@@ -11,23 +11,23 @@ from legbench.metrics.source import Recorded, Reference
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Ratings:
+class RatingLists:
     """P^r of eq. (14) [-] with one reference, one value a complete phase or period, in order."""
 
     stance: list[float]
-    """Ratings of the stances."""
+    """RatingLists of the stances."""
     flight: list[float]
-    """Ratings of the flights."""
+    """RatingLists of the flights."""
     periods: list[float]
-    """Ratings of the oscillation periods."""
+    """RatingLists of the oscillation periods."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunRatings:
-    """Ratings of a run with the reference that it asks for, and with the equilibrium."""
+    """RatingLists of a run with the reference that it asks for, and with the equilibrium."""
 
-    chosen: Ratings
-    equilibrium: Ratings
+    chosen: RatingLists
+    equilibrium: RatingLists
 
 
 def rate_run(run: Recorded, gait: Gait, periods: Periods | None) -> RunRatings:
@@ -42,9 +42,9 @@ def rate_run(run: Recorded, gait: Gait, periods: Periods | None) -> RunRatings:
     return RunRatings(chosen=chosen, equilibrium=equilibrium)
 
 
-def _rate(run: Recorded, gait: Gait, periods: Periods | None, reference: Reference) -> Ratings:
+def _rate(run: Recorded, gait: Gait, periods: Periods | None, reference: Reference) -> RatingLists:
     carried, stance, flight = SUPPORTS[run.description.setup.kind], gait.stance, gait.flight
-    return Ratings(
+    return RatingLists(
         stance=rate_phases(run, carried, reference, stance.first, stance.stop),
         flight=rate_phases(run, Support.NONE, reference, flight.first, flight.stop),
         periods=[]

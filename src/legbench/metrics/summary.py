@@ -17,7 +17,7 @@ from legbench.strict_json import null_for_nan
 class Summary:
     """Figures of one run; NaN where the run, its setup or a missing truth does not show them.
 
-    Ratings hold every complete phase or period, in order; the lists without a suffix use the
+    RatingLists hold every complete phase or period, in order; the lists without a suffix use the
     reference that the run's conventions ask for, the motor unless they say otherwise.
     """
 

@@ -61,7 +61,7 @@ class Layout:
                 )
         names = [TIME, "t", "time"]
         for signal in self.signals:
-            names += {signal.name, *signal.columns}
+            names += [*signal.columns, *([signal.name] if signal.components else [])]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             raise ConfigError(

@@ -41,9 +41,9 @@ class Facts:
         run = self.run
         values = (("z2", run.z2), ("dz2", run.dz2))
         settings = [f"{name} = {value:g}" for name, value in values if value is not None]
-        setup = run.setup.kind.value
-        controller = run.controller if run.controller != setup else ""
-        return " · ".join(filter(None, [run.design.name, setup, controller, ", ".join(settings)]))
+        words = [run.design.name, run.setup.kind.value, run.controller, ", ".join(settings)]
+        # A word that stands for two of them, the jump, is said once.
+        return " · ".join(filter(None, dict.fromkeys(words)))
 
 
 def facts_of(run: RunDescription, folder: Path) -> Facts:
