@@ -199,7 +199,7 @@ def _manifest(
             "mjcf_sha256": xml_hash(xml),
             "versions": {"python": platform.python_version(), **_versions()},
         },
-        "plant": {key: value for key, value in plant.items() if key != "plant"},
+        "plant": {"kind" if key == "plant" else key: value for key, value in plant.items()},
         "period": PERIOD,
         "initial_state": {
             "joint_pos": start.joint_pos.tolist(),
@@ -217,16 +217,21 @@ def _tables(experiment: Experiment) -> dict[str, Any]:
         "ground": asdict(experiment.ground),
         "numerics": asdict(experiment.numerics),
         "servo": asdict(experiment.servo),
-        "controller": {"kind": experiment.controller.kind, **asdict(experiment.controller)},
+        "controller": _choice(experiment.controller),
         "conventions": {
             "modal": str(experiment.convention),
             "setpoint": str(experiment.meaning),
             "rating_reference": "motor",
         },
-        "plant": {"kind": experiment.plant.kind, **asdict(experiment.plant)},
+        "plant": _choice(experiment.plant),
         "duration": experiment.duration,
         "seed": None,
     }
+
+
+def _choice(chosen: ControllerConfig | PlantChoice) -> dict[str, Any]:
+    """Table of a choice among several kinds, each with settings of its own."""
+    return {"kind": chosen.kind, "settings": asdict(chosen)}
 
 
 def _versions() -> dict[str, str]:

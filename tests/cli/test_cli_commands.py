@@ -124,9 +124,9 @@ def test_settings_reach_the_run(tmp_path: Path, capfd: pytest.CaptureFixture[str
     )
     assert done.status == 0, done.err
     manifest = load(Path(json.loads(done.out)["run"])).description.experiment
-    assert manifest["controller"]["three_levels"] is True
-    assert manifest["controller"]["sign"] == -1
-    assert manifest["controller"]["z2"] == 0.6
+    assert manifest["controller"]["settings"]["three_levels"] is True
+    assert manifest["controller"]["settings"]["sign"] == -1
+    assert manifest["controller"]["settings"]["z2"] == 0.6
     assert manifest["setup"]["boom_radius"] == 1.5
     assert manifest["servo"]["slew_rate"] == 7.0
     assert manifest["servo"]["delay_cycles"] == 2

@@ -37,7 +37,7 @@ EXPERIMENT = {
     "design": design_to_mapping(DESIGN),
     "setup": {"kind": "ffs", "boom_radius": 1.5},
     "linkage": {"kind": "bars", "crank_length": 0.03},
-    "controller": {"kind": "mine", "z2": 0.5, "freq": 2.0},
+    "controller": {"kind": "mine", "settings": {"z2": 0.5, "freq": 2.0}},
     "plant": {"kind": "sim"},
     "conventions": {"modal": "literal", "setpoint": "link", "rating_reference": "equilibrium"},
     "duration": 8.0,
@@ -47,7 +47,7 @@ GIVEN: dict[str, Any] = {
     "experiment": EXPERIMENT,
     "controller": controller_table("mine", GUEST),
     "provenance": {"mjcf_sha256": "ab12", "versions": {"mujoco-core": "4.0"}},
-    "plant": {"limits": {"command_speed": 5.0}},
+    "plant": {"kind": "sim", "limits": {"command_speed": 5.0}},
     "period": 0.001,
     "initial_state": {"joint_pos": [-0.5, 0.5], "motor_pos": [-0.4, 0.6]},
 }
@@ -167,7 +167,8 @@ def test_a_manifest_with_signals_that_no_run_can_have_writes_nothing(tmp_path: P
 def test_runs_differ_by_the_entries_of_their_experiments() -> None:
     ours = describe(GIVEN)
     assert unlike(ours, ours) == []
-    assert unlike(ours, describe(changed("experiment/controller/freq", 3.0))) == ["controller.freq"]
+    theirs = describe(changed("experiment/controller/settings/freq", 3.0))
+    assert unlike(ours, theirs) == ["controller.settings.freq"]
     # Plant, linkage and duration are what runs of one experiment are compared over.
     for entry in ("plant/kind", "linkage/crank_length", "duration"):
         value = "can" if entry == "plant/kind" else 2.0

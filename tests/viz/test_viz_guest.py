@@ -33,7 +33,8 @@ SAID = ControllerDescription(
 def guest(tmp_path: Path) -> Recording:
     """A leg with a fixed trunk under a controller with four phases and two signals."""
     run = record(tmp_path, SetupKind.HFTS, 1200)
-    experiment = {**run.manifest["experiment"], "controller": {"kind": "mine.py:Sine", "freq": 3.1}}
+    chosen = {"kind": "mine.py:Sine", "settings": {"freq": 3.1}}
+    experiment = {**run.manifest["experiment"], "controller": chosen}
     manifest = {
         **run.manifest,
         "experiment": experiment,

@@ -44,7 +44,7 @@ def manifest_of(kind: SetupKind, **extra: Any) -> dict[str, Any]:
             "design": design_to_mapping(PROTOTYPE),
             "setup": {"kind": kind.value, "boom_radius": None},
             "linkage": {"kind": "bars", "bar_mass": 0.002, "crank_length": 0.02},
-            "controller": {"kind": controller, **settings},
+            "controller": {"kind": controller, "settings": settings},
             "conventions": {"modal": "orthonormal"},
             **extra,
         },

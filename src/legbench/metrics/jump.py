@@ -65,9 +65,6 @@ def jump_figures(
 def _last_jumps(recording: Recorded, gait: Gait) -> dict[str, float]:
     jumps, flight = gait.jumps, gait.flight
     trunk, foot = recording["trunk_pos"], recording["foot_pos"]
-    shank = recording.description.design.shank.length
-    polar = joint_to_polar(recording["joint_pos"], shank)
-    ahead = polar[:, 1] * np.sin(polar[:, 0])
     flown = [
         slice(low, high)
         for low, high in zip(
@@ -84,8 +81,15 @@ def _last_jumps(recording: Recorded, gait: Gait) -> dict[str, float]:
         "foot_clearance": _largest([_largest(foot[rows, 1]) for rows in flown]),
         "drift": _range(trunk[whole, 0]),
         "foot_travel": _largest([_range(foot[rows, 0]) for rows in flown]),
-        "foot_travel_in_hip": _largest([_range(ahead[rows]) for rows in flown]),
+        "foot_travel_in_hip": _largest([_range(_ahead(recording, rows)) for rows in flown]),
     }
+
+
+def _ahead(recording: Recorded, rows: slice) -> Floats:
+    """Horizontal place of the foot tip, seen from the hip, in some rows (m,) [m]."""
+    shank = recording.description.design.shank.length
+    polar = joint_to_polar(recording["joint_pos"][rows], shank)
+    return polar[:, 1] * np.sin(polar[:, 0])
 
 
 def _limit_cycle(recording: Recorded, gait: Gait, first: int) -> dict[str, float]:

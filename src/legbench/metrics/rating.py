@@ -6,6 +6,7 @@ from legbench.design.leg import LegDesign
 from legbench.design.statics import Support, equilibrium, gravity_load
 from legbench.errors import DesignError
 from legbench.kinematics import MODE_RADIAL
+from legbench.metrics.changes import changes
 from legbench.metrics.source import Recorded, Reference
 from legbench.signals import Floats, Ints
 
@@ -24,7 +25,7 @@ def alignment(deflection: Floats) -> Floats:
 
     Source: the summand of eq. (14).
     """
-    size = np.linalg.norm(deflection, axis=-1)
+    size = np.sqrt(np.square(deflection[..., 0]) + np.square(deflection[..., 1]))
     along = np.abs(deflection @ MODE_RADIAL) / RADIAL_SIZE
     moved = size > AT_REST
     return np.where(moved, along / np.where(moved, size, 1.0), np.nan)
@@ -48,9 +49,8 @@ def link_equilibrium(design: LegDesign, motor_pos: Floats, support: Support) -> 
     """
     if support is Support.NONE or len(motor_pos) == 0:
         return motor_pos.copy()
-    moved = np.any(motor_pos[1:] != motor_pos[:-1], axis=-1)
-    known = np.all(np.isfinite(motor_pos), axis=-1)
-    begins = np.concatenate([[True], moved]) & known
+    known = np.isfinite(motor_pos[:, 0]) & np.isfinite(motor_pos[:, 1])
+    begins = np.concatenate([[True], changes(motor_pos)]) & known
     held = np.full(motor_pos.shape, np.nan)
     if known.any():
         solved = _refined(design, motor_pos[begins], support)

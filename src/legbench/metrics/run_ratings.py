@@ -35,18 +35,31 @@ def rate_run(run: Recorded, gait: Gait, periods: Periods | None) -> RunRatings:
 
     A stance is carried by the foot, a flight by nothing, a period as its setup has it.
     """
-    equilibrium = _rate(run, gait, periods, Reference.EQUILIBRIUM)
-    if run.description.reference is Reference.EQUILIBRIUM:
-        return RunRatings(chosen=equilibrium, equilibrium=equilibrium)
-    chosen = _rate(run, gait, periods, run.description.reference)
-    return RunRatings(chosen=chosen, equilibrium=equilibrium)
+    motor = _rate(run, gait, periods, Reference.MOTOR)
+    carried = SUPPORTS[run.description.setup.kind]
+    if carried is Support.NONE:
+        # Springs that carry nothing have their equilibrium at the motor.
+        return RunRatings(chosen=motor, equilibrium=motor)
+    equilibrium = _rate(run, gait, periods, Reference.EQUILIBRIUM, flight=motor.flight)
+    wanted = run.description.reference is Reference.EQUILIBRIUM
+    return RunRatings(chosen=equilibrium if wanted else motor, equilibrium=equilibrium)
 
 
-def _rate(run: Recorded, gait: Gait, periods: Periods | None, reference: Reference) -> RatingLists:
-    carried, stance, flight = SUPPORTS[run.description.setup.kind], gait.stance, gait.flight
+def _rate(
+    run: Recorded,
+    gait: Gait,
+    periods: Periods | None,
+    reference: Reference,
+    flight: list[float] | None = None,
+) -> RatingLists:
+    """Rate with one reference; flights may be rated already, since nothing carries the leg."""
+    carried, stance = SUPPORTS[run.description.setup.kind], gait.stance
+    if flight is None:
+        rows = (gait.flight.first, gait.flight.stop)
+        flight = rate_phases(run, Support.NONE, reference, *rows)
     return RatingLists(
         stance=rate_phases(run, carried, reference, stance.first, stance.stop),
-        flight=rate_phases(run, Support.NONE, reference, flight.first, flight.stop),
+        flight=flight,
         periods=[]
         if periods is None
         else rate_phases(run, carried, reference, periods.first, periods.stop),

@@ -134,7 +134,8 @@ def describe(manifest: Mapping[str, Any], fallback_id: str = "") -> RunDescripti
     # Messages leave out "experiment": the entries have the same names in either format.
     experiment = Table(entries=head.table("experiment").entries)
     controller, conventions = experiment.table("controller"), experiment.table("conventions")
-    provenance, kind = head.table("provenance"), experiment.table("plant").text("kind")
+    settings, provenance = controller.table("settings"), head.table("provenance")
+    kind = head.table("plant").text("kind") or experiment.table("plant").text("kind")
     said = parse_controller(head.table("controller"))
     return RunDescription(
         id=head.text("id") or fallback_id,
@@ -149,8 +150,8 @@ def describe(manifest: Mapping[str, Any], fallback_id: str = "") -> RunDescripti
         phases=said.phases,
         counting=said.counting,
         layout=layout_of(manifest),
-        z2=_setting(controller, "z2"),
-        dz2=_setting(controller, "dz2"),
+        z2=_setting(settings, "z2"),
+        dz2=_setting(settings, "dz2"),
         plant=kind,
         status=head.text("status"),
         cause=head.text("cause"),
@@ -202,9 +203,9 @@ def _crank_length(linkage: Table) -> float | None:
     return CRANK_LENGTH if length is None else length
 
 
-def _setting(controller: Table, key: str) -> float | None:
+def _setting(settings: Table, key: str) -> float | None:
     """Setting of a controller when it is a number; a guest may mean anything by the word."""
-    found = controller.entries.get(key)
+    found = settings.entries.get(key)
     return None if isinstance(found, bool) or not isinstance(found, int | float) else float(found)
 
 

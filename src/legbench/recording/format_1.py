@@ -98,8 +98,11 @@ def upgraded(manifest: Mapping[str, Any]) -> dict[str, Any]:
     experiment = _some(manifest, TABLES)
     if isinstance(manifest.get("plant"), str):
         experiment["plant"] = {"kind": manifest["plant"]}
-    settings = Table(entries=manifest).table("controller")
-    kind = settings.text("kind") or ""
+    table = Table(entries=manifest).table("controller")
+    kind = table.text("kind") or ""
+    settings = {key: value for key, value in table.entries.items() if key != "kind"}
+    if "controller" in manifest:
+        experiment["controller"] = {"kind": kind, "settings": settings}
     return {
         **kept,
         "experiment": experiment,
@@ -109,9 +112,9 @@ def upgraded(manifest: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _known(kind: str, settings: Table) -> ControllerDescription:
+def _known(kind: str, settings: Mapping[str, Any]) -> ControllerDescription:
     try:
-        return built_in(kind, settings.entries)
+        return built_in(kind, settings)
     except ConfigError as error:
         raise FormatError(f"manifest controller: {error}") from None
 

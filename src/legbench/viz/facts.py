@@ -1,7 +1,7 @@
 """What a picture must know of a run besides its rows."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -80,12 +80,17 @@ def as_markdown(facts: Facts, summary: Summary | None = None, against: Sequence[
 
 
 def _section(name: str, entries: Mapping[str, Any]) -> list[str]:
-    rows = [
-        f"- {key}: {_shown(value)}"
-        for key, value in entries.items()
-        if value is not None and not isinstance(value, Mapping)
-    ]
+    rows = [f"- {key}: {_shown(value)}" for key, value in _flat(entries) if value is not None]
     return ["", f"**{name}**", "", *rows] if rows else []
+
+
+def _flat(entries: Mapping[str, Any]) -> Iterator[tuple[str, object]]:
+    """Entries of a table and of the tables in it, such as the settings of a controller."""
+    for key, value in entries.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value)
+        else:
+            yield key, value
 
 
 def _results(summary: Summary) -> dict[str, str]:
