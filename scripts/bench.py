@@ -14,7 +14,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import mujoco
@@ -25,14 +25,18 @@ from legbench.control import Jump, JumpConfig, LegTargets
 from legbench.design import LegDesign, load_design
 from legbench.design.statics import Support
 from legbench.experiment import Experiment, record
+from legbench.kinematics import joint_to_modal, joint_to_polar, joint_to_polar_rate
 from legbench.loop import run
+from legbench.metrics import summarise
 from legbench.mjcf import BuildOptions
 from legbench.plant.batch import BatchPlant
 from legbench.plant.sim import SimPlant
 from legbench.plant.start import Start
-from legbench.recording.reader import load
+from legbench.recording.columns import Layout
+from legbench.recording.reader import Recording, load
+from legbench.recording.rows import BATCH_ROWS, Block, RowLayout
 from legbench.recording.writer import RunWriter
-from legbench.signals import Floats, Observation
+from legbench.signals import Command, Floats, Observation, Signal
 from legbench.viz.live.rrd import write_rrd
 
 MODELS = Path(__file__).parent.parent / "models"
@@ -139,11 +143,7 @@ def bench_batch() -> Result:
 def bench_row() -> Result:
     """A row written in the loop, without what it waits for nothing."""
     rows = 20000
-    controller, start = hopping(prototype())
-    plant = SimPlant(prototype(), BuildOptions(), start)
-    observation = plant.reset()
-    controller.reset(observation)
-    command = controller.step(observation)
+    command, observation = first_cycle()
     costs = np.empty(rows)
     with (
         tempfile.TemporaryDirectory() as folder,
@@ -157,6 +157,74 @@ def bench_row() -> Result:
     return Result(
         name="row in the loop", value=median, bound=5.0, unit="us", detail=f"p99 {high:.1f} us"
     )
+
+
+def first_cycle() -> tuple[Command, Observation]:
+    """What is recorded of the first cycle of a hop."""
+    controller, start = hopping(prototype())
+    observation = SimPlant(prototype(), BuildOptions(), start).reset()
+    controller.reset(observation)
+    return controller.step(observation), observation
+
+
+def bench_own_signals() -> Result:
+    """Four signals of the controller's own in each row against a row without any."""
+    command, observation = first_cycle()
+    telling = replace(command, signals=np.zeros(4))
+    own = tuple(Signal(f"own{place}", (), "-", "") for place in range(4))
+    plain, full = Block(), Block(RowLayout(Layout(own=own)))
+
+    def fill(block: Block, given: Command) -> None:
+        for _ in range(400):
+            block.count = 0
+            for _ in range(BATCH_ROWS):
+                block.put(given, observation, 0.0, 0.0)
+
+    ratio, detail = ratio_of(lambda: fill(full, telling), lambda: fill(plain, command))
+    return Result(
+        name="row with own signals / without", value=ratio, bound=1.15, unit="x", detail=detail
+    )
+
+
+SUMMARIES = 20
+"""Summaries in one measurement: one alone takes some milliseconds."""
+SUMMARY_BEFORE = 10.5
+"""Time of a summary in yardsticks while each figure still read the manifest and the rows for
+itself: median of ten measurements of that code, each seven pairs in turns with the yardstick."""
+
+
+def bench_summarise() -> Result:
+    """The summary of an 8 s hop, of which the rows are read once, over what it took before.
+
+    The yardstick is five times the coordinates of all rows, which are computed as ever.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        experiment = Experiment(design=prototype(), controller=JumpConfig())
+        recording = load(record(experiment, Path(folder)).path)
+
+    def ours() -> None:
+        for _ in range(SUMMARIES):
+            summarise(recording)
+
+    ratio, detail = ratio_of(ours, lambda: coordinates(recording))
+    return Result(
+        name="summary of 8 s / before",
+        value=ratio / SUMMARY_BEFORE,
+        bound=0.5,
+        unit="x",
+        detail=f"{ratio:.2f} yardsticks, {SUMMARY_BEFORE:g} before; {detail}",
+    )
+
+
+def coordinates(recording: Recording) -> None:
+    """Compute polar and modal coordinates and rates of a run, five times a summary."""
+    length = prototype().shank.length
+    for _ in range(5 * SUMMARIES):
+        joint_pos, joint_vel = recording["joint_pos"], recording["joint_vel"]
+        joint_to_polar(joint_pos, length)
+        joint_to_polar_rate(joint_pos, joint_vel, length)
+        joint_to_modal(joint_pos)
+        joint_to_modal(joint_vel)
 
 
 def bench_rrd() -> Result:
@@ -236,8 +304,13 @@ def bench_first() -> Result:
         return bench_start("run jump of one cycle", 5.0, *words, "--out", folder)
 
 
-BENCHES = {"loop": bench_loop, "batch": bench_batch, "row": bench_row, "rrd": bench_rrd}
-BENCHES |= {
+BENCHES = {
+    "loop": bench_loop,
+    "batch": bench_batch,
+    "row": bench_row,
+    "own": bench_own_signals,
+    "summary": bench_summarise,
+    "rrd": bench_rrd,
     "jump": bench_jump,
     "import": lambda: bench_start("import legbench", 0.2, "-c", "import legbench"),
     "help": lambda: bench_start("legbench --help", 0.3, "-m", "legbench", "--help"),

@@ -15,7 +15,8 @@ from legbench.loop import stop_on_interrupt
 from legbench.metrics import Summary, summarise
 from legbench.recording.reader import load
 from legbench.viz.live.rrd import write_rrd
-from legbench.viz.print.figures import phase_figure, save_figure
+from legbench.viz.print.figures import phase_figure
+from legbench.viz.print.save import save_figure
 
 ROOT = Path(__file__).parent.parent
 OUT = Path(os.environ.get("LEGBENCH_RUNS", ROOT / "runs"))

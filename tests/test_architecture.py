@@ -73,3 +73,71 @@ def test_every_command_is_documented_where_it_is_found() -> None:
 
 def test_the_package_is_typed_for_others() -> None:
     assert (ROOT / "src" / "legbench" / "py.typed").is_file()
+
+
+MEASURING = [path for path in SOURCES if {"metrics", "viz"} & set(path.parts)]
+KINDS = {"bang-bang", "position-jump", "three-levels"} | {"sim", "analytic", "can"}
+"""Words that only controllers and plants are called by; the jump is also a setup."""
+
+
+@pytest.mark.parametrize("path", MEASURING, ids=lambda path: f"{path.parent.name}-{path.stem}")
+def test_whoever_measures_or_draws_a_run_takes_its_description(path: Path) -> None:
+    """No manifest, no table of it by a key, no controller or plant by name."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    docs = {
+        id(node.value)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+    }
+    for node in ast.walk(tree):
+        where = f"{path.name}:{getattr(node, 'lineno', 0)}"
+        if isinstance(node, ast.Attribute):
+            assert node.attr != "manifest", where
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in docs:
+            assert node.value not in KINDS, where
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+            named = [isinstance(each, ast.Constant) for each in node.args[:1]]
+            environment = ast.unparse(node.func.value) == "os.environ"
+            assert environment or not (node.func.attr == "get" and named == [True]), where
+        if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Constant):
+            held = ast.unparse(node.value).rsplit(".", maxsplit=1)[-1]
+            words = ("manifest", "experiment", "controller", "description", "conventions")
+            assert held not in words, where
+        if isinstance(node, ast.Compare):
+            named = [each for each in (node.left, *node.comparators) if _is_controller(each)]
+            assert not named, where
+        if isinstance(node, ast.ImportFrom):
+            assert not (node.module or "").startswith("legbench.control"), where
+            assert "Phase" not in {name.name for name in node.names}, where
+
+
+def _is_controller(node: ast.expr) -> bool:
+    return isinstance(node, ast.Attribute) and node.attr == "controller"
+
+
+def test_classes_of_metrics_and_viz_have_names_of_their_own() -> None:
+    names: dict[str, set[Path]] = {}
+    for path in SOURCES:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ClassDef):
+                names.setdefault(node.name, set()).add(path)
+    twice = {name for name, paths in names.items() if len(paths) > 1 and paths & set(MEASURING)}
+    assert twice == set()
+
+
+@pytest.mark.parametrize(
+    ("call", "home"),
+    [
+        ("savefig", "viz/print/save.py"),
+        ("replace(path)", "recording/files.py"),
+        ("os.replace", None),
+        ("isfinite(value) else", "strict_json.py"),
+    ],
+)
+def test_there_is_one_saver_one_atomic_writer_and_one_way_to_null(
+    call: str, home: str | None
+) -> None:
+    found = [path for path in SOURCES if call in path.read_text(encoding="utf-8")]
+    inside = [path.relative_to(ROOT / "src" / "legbench").as_posix() for path in found]
+    others = ["recording/manifest.py"] if call.startswith("isfinite") else []
+    assert inside == [*others, *([home] if home else [])]

@@ -15,9 +15,8 @@ from legbench.clock import AbstractClock
 from legbench.control import BangBangConfig, JumpConfig, PositionJumpConfig
 from legbench.design import LegDesign
 from legbench.design.setup import Setup, SetupKind
-from legbench.design.toml import design_from_mapping
 from legbench.errors import ConfigError, RecordingError
-from legbench.experiment import Experiment, record
+from legbench.experiment import Experiment, record, start_of
 from legbench.loop import StopFlag
 from legbench.mjcf import Linkage, LinkageKind
 from legbench.recording.reader import load
@@ -55,7 +54,7 @@ def test_every_controller_runs_in_every_setup_that_it_knows(
     assert recording.complete
     assert np.array_equal(recording.time, np.arange(120) / 1000.0)
     assert recording["loop_gap"].max() < 2e-5
-    assert recording.manifest["setup"]["kind"] == kind
+    assert recording.description.setup.kind == kind
 
 
 def test_the_same_experiment_gives_the_same_samples(tmp_path: Path, optimal: LegDesign) -> None:
@@ -68,24 +67,30 @@ def test_the_same_experiment_gives_the_same_samples(tmp_path: Path, optimal: Leg
 def test_the_manifest_tells_what_ran(tmp_path: Path, prototype: LegDesign) -> None:
     experiment = short(prototype, servo=ServoConfig(slew_rate=5.0))
     finished = record(experiment, tmp_path)
-    manifest = load(finished.path).manifest
-    assert design_from_mapping(manifest["design"]) == prototype
+    recording = load(finished.path)
+    found, written = recording.description, recording.manifest
+    assert found.design == prototype
     xml = (finished.path / "leg.xml").read_bytes()
-    assert manifest["mjcf_sha256"] == hashlib.sha256(xml).hexdigest()
+    assert found.model_hash == hashlib.sha256(xml).hexdigest()
     mujoco.MjModel.from_xml_path(str(finished.path / "leg.xml"))
-    assert manifest["controller"]["kind"] == "jump"
-    assert manifest["controller"]["dz2"] == JumpConfig().dz2
-    assert manifest["servo"]["slew_rate"] == 5.0
-    assert manifest["conventions"] == {
+    assert (found.controller, found.plant, found.linkage) == ("jump", "sim", "bars")
+    assert (found.z2, found.dz2) == (JumpConfig().z2, JumpConfig().dz2)
+    assert (found.planned_duration, found.duration) == (experiment.duration, pytest.approx(0.119))
+    assert {"python", "numpy", "pyarrow"} <= found.versions.keys()
+    assert found.initial_state is not None
+    start = start_of(experiment)
+    assert found.initial_state.joint_pos == tuple(start.joint_pos)
+    assert found.initial_state.motor_pos == tuple(start.motor_pos)
+    assert found.period == 0.001
+    assert written["units"] == found.layout.units
+    tables = found.experiment
+    assert tables["servo"]["slew_rate"] == 5.0
+    assert tables["conventions"] == {
         "modal": "orthonormal",
         "setpoint": "link",
         "rating_reference": "motor",
     }
-    assert {"python", "numpy", "pyarrow"} <= manifest["versions"].keys()
-    assert len(manifest["initial_state"]["joint_pos"]) == 2
-    assert manifest["period"] == 0.001
-    assert manifest["units"]["joint_pos_1"] == "rad"
-    assert {"plant", "setup", "linkage", "ground", "numerics", "seed"} <= manifest.keys()
+    assert {"plant", "setup", "linkage", "ground", "numerics", "seed"} <= tables.keys()
 
 
 def test_the_applied_command_is_the_one_before(tmp_path: Path, prototype: LegDesign) -> None:
@@ -99,8 +104,8 @@ def test_a_fault_is_kept_as_the_cause(tmp_path: Path, prototype: LegDesign) -> N
     finished = record(short(soft_stop, controller=violent, duration=4.0), tmp_path)
     assert finished.outcome.status == "fault"
     recording = load(finished.path)
-    assert recording.manifest["status"] == "fault"
-    assert recording.manifest["cause"] == finished.outcome.cause
+    assert recording.description.status == "fault"
+    assert recording.description.cause == finished.outcome.cause
     assert finished.outcome.cause is not None
     assert len(recording.time) == finished.outcome.cycles
     assert recording.events[-1]["name"] == "end"
@@ -122,7 +127,7 @@ def test_a_stopped_run_is_whole(tmp_path: Path, prototype: LegDesign) -> None:
     finished = record(short(prototype), tmp_path, stop=stop, clock=Impatient())
     assert finished.outcome.status == "interrupted"
     recording = load(finished.path)
-    assert recording.manifest["status"] == "interrupted"
+    assert recording.description.status == "interrupted"
     assert recording.torn is None
     assert len(recording.time) == 71
 
@@ -135,8 +140,8 @@ def test_an_error_on_the_way_closes_the_run(tmp_path: Path, prototype: LegDesign
     with pytest.raises(ZeroDivisionError):
         record(short(prototype), tmp_path, on_started=burst)
     (run,) = tmp_path.iterdir()
-    manifest = load(run).manifest
-    assert (manifest["status"], manifest["cause"]) == ("fault", "ZeroDivisionError")
+    found = load(run).description
+    assert (found.status, found.cause) == ("fault", "ZeroDivisionError")
     assert threading.active_count() <= before
 
 
@@ -178,7 +183,7 @@ def test_an_interrupted_command_leaves_a_whole_run(
     summary = json.loads(out)
     assert summary["status"] == "interrupted"
     recording = load(Path(summary["run"]))
-    assert recording.manifest["status"] == "interrupted"
+    assert recording.description.status == "interrupted"
     assert recording.torn is None
     assert 50 <= len(recording.time) < 60_000
     assert not (Path(summary["run"]) / "samples.arrows").exists()

@@ -69,9 +69,9 @@ def told(recording: Recording, cycles: int, shares: Shares) -> bool:
     """Print what a run left; whether all of it was on time."""
     bus = next(event for event in recording.events if event["name"] == "bus")
     exchange = exchanges(recording.path / "bus.log", bus["began"])
-    rows, status = len(recording.time), recording.manifest["status"]
+    rows, status = len(recording.time), recording.description.status
     print(f"{rows} cycles of 1 ms, {status}")
-    for name, words in recording.manifest["realtime"].items():
+    for name, words in recording.manifest["plant"]["realtime"].items():
         print(f"  {name:<11} {words}")
     print(f"{'[us]':<24}" + "".join(f"{name:>9}" for name in QUANTILES))
     print(row("wake-up", recording["late_us"]))

@@ -136,8 +136,8 @@ def test_a_run_is_whole_and_its_bus_log_too(tmp_path: Path, drives: Drives) -> N
     assert child.wait() == 0, child.text
     told = manifest(tmp_path)
     assert (told["status"], told["rows"]) == ("complete", 500)
-    assert told["realtime"]["fifo"].startswith("priority")
-    assert told["realtime"]["mlockall"] == "granted"
+    assert told["plant"]["realtime"]["fifo"].startswith("priority")
+    assert told["plant"]["realtime"]["mlockall"] == "granted"
     bus = bus_event(tmp_path)
     assert bus["skipped_cycles"] == bus["late_frames"] == bus["error_frames"] == 0
     assert bus["lost_cycles"] == [0, 0]

@@ -1,5 +1,6 @@
 import hashlib
 import json
+import math
 from pathlib import Path
 
 import mujoco
@@ -8,6 +9,8 @@ from commands import DESIGN, called, started
 
 from legbench import __version__
 from legbench.cli import COMMANDS
+from legbench.cli.output import print_json, write_json
+from legbench.errors import ConfigError
 from legbench.recording.reader import load
 
 PROMISED = {
@@ -120,10 +123,10 @@ def test_settings_reach_the_run(tmp_path: Path, capfd: pytest.CaptureFixture[str
         *("--duration", "0.15", "--out", tmp_path, "--json"),
     )
     assert done.status == 0, done.err
-    manifest = load(Path(json.loads(done.out)["run"])).manifest
-    assert manifest["controller"]["three_levels"] is True
-    assert manifest["controller"]["sign"] == -1
-    assert manifest["controller"]["z2"] == 0.6
+    manifest = load(Path(json.loads(done.out)["run"])).description.experiment
+    assert manifest["controller"]["settings"]["three_levels"] is True
+    assert manifest["controller"]["settings"]["sign"] == -1
+    assert manifest["controller"]["settings"]["z2"] == 0.6
     assert manifest["setup"]["boom_radius"] == 1.5
     assert manifest["servo"]["slew_rate"] == 7.0
     assert manifest["servo"]["delay_cycles"] == 2
@@ -223,3 +226,21 @@ def test_an_interrupt_outside_of_a_run_is_no_traceback(
     monkeypatch.setattr("legbench.cli.replay.load", interrupted)
     done = called(capfd, "replay", run_folder)
     assert (done.status, done.err) == (130, "legbench: interrupted\n")
+
+
+def test_numbers_that_json_lacks_are_null(capfd: pytest.CaptureFixture[str]) -> None:
+    print_json({"a": math.nan, "b": [1.0, math.inf], "c": {"d": (-math.inf, 2)}, "e": "nan"})
+    told = json.loads(capfd.readouterr().out)
+    assert told == {"a": None, "b": [1.0, None], "c": {"d": [None, 2]}, "e": "nan"}
+
+
+def test_a_json_file_is_whole_or_what_it_was(tmp_path: Path) -> None:
+    target = tmp_path / "deep" / "found.json"
+    write_json(target, {"a": math.nan})
+    assert json.loads(target.read_text()) == {"a": None}
+    with pytest.raises(TypeError):
+        write_json(target, {"a": object()})
+    assert json.loads(target.read_text()) == {"a": None}
+    assert [path.name for path in target.parent.iterdir()] == ["found.json"]
+    with pytest.raises(ConfigError, match="cannot be written"):
+        write_json(target / "below.json", {})

@@ -11,7 +11,7 @@ from legbench.control import JumpConfig
 from legbench.design import LegDesign
 from legbench.experiment import Experiment, record
 from legbench.metrics import Summary, summarise
-from legbench.metrics.phases import find_gait
+from legbench.metrics.analysis import Analysis
 from legbench.mjcf import Linkage, LinkageKind
 from legbench.recording.reader import load
 from legbench.signals import SIGNALS, Phase
@@ -56,7 +56,7 @@ def test_every_push_is_on_the_ground_and_every_stance_has_one(
     phase, contact = run["phase"], np.asarray(run["contact"], dtype=bool)
     pushes = np.flatnonzero((phase[1:] == Phase.PUSH) & (phase[:-1] != Phase.PUSH)) + 1
     assert np.all(contact[pushes])
-    gait = find_gait(run)
+    gait = Analysis(run).gait
     begun = [
         np.count_nonzero((first <= pushes) & (pushes < stop))
         for first, stop in zip(gait.stance.first, gait.stance.stop, strict=True)
@@ -71,7 +71,7 @@ def test_a_leg_without_truth_tells_the_same_jumps(hops: dict[str, Summary], name
     run = load(Path(hops[name].run))
     truth = {c for s in SIGNALS if "simulation only" in s.doc for c in s.columns}
     columns = {key: column for key, column in run.columns.items() if key not in truth}
-    seen, told = find_gait(run), find_gait(replace(run, columns=MappingProxyType(columns)))
+    seen, told = Analysis(run).gait, Analysis(replace(run, columns=MappingProxyType(columns))).gait
     assert len(told.jumps) == len(seen.jumps) - 1
     assert np.max(np.abs(told.stance.start[-10:] - seen.stance.start[-10:])) < 0.02
     assert np.max(np.abs(told.stance.end[-10:] - seen.stance.end[-10:])) < 0.02
@@ -84,7 +84,7 @@ def test_the_optimal_leg_goes_on_hopping(optimal: LegDesign, tmp_path: Path) -> 
     finished = record(chosen, tmp_path)
     assert finished.outcome.status == "complete"
     run = load(finished.path)
-    apexes = find_gait(run).flight.apex_height[-10:]
+    apexes = Analysis(run).gait.flight.apex_height[-10:]
     assert np.ptp(apexes) < 0.002
     assert np.min(run["joint_pos"] @ [-1.0, 1.0]) > 0.1
 

@@ -32,9 +32,10 @@ def test_a_jump_over_frames_leaves_a_whole_recording(tmp_path: Path) -> None:
     run_folder = load(finished.path)
     assert run_folder.complete
     assert len(run_folder.time) == 1000
-    assert run_folder.manifest["plant"] == "can"
-    assert run_folder.manifest["bus"]["interface"] == "legbench"
-    assert run_folder.manifest["limits"]["spring_torque"] == load_limits(LIMITS).spring_torque
+    assert run_folder.description.plant == "can"
+    said = run_folder.manifest["plant"]
+    assert said["bus"]["interface"] == "legbench"
+    assert said["limits"]["spring_torque"] == load_limits(LIMITS).spring_torque
     assert {event["name"] for event in run_folder.events} == {"bus", "end"}
     log = (finished.path / "bus.log").read_text(encoding="ascii").splitlines()
     assert sum(line.endswith("080#") for line in log) > 1000
@@ -138,7 +139,7 @@ def test_limits_slew_a_simulation_as_they_slew_the_drives(tmp_path: Path) -> Non
     for plant in (SimChoice(limits=chosen_limits), replace(EMULATED, limits=chosen_limits)):
         chosen = replace(experiment(BangBangConfig(), 0.4), plant=plant)
         found = load(record(chosen, tmp_path / plant.kind).path)
-        assert found.manifest["limits"]["command_speed"] == 5.0
+        assert found.manifest["plant"]["limits"]["command_speed"] == 5.0
         assert np.max(np.abs(np.diff(found["applied_pos"], axis=0))) < 5.1e-3
         assert np.max(np.abs(np.diff(found["command_pos"], axis=0))) > 0.05
         seen.append(found["applied_pos"])
@@ -166,7 +167,7 @@ def test_a_limit_ends_the_run_with_its_name_on_every_plant(
         assert (finished.outcome.status, finished.outcome.cause) == ("fault", cause)
         kept = load(finished.path)
         assert kept.torn is None
-        assert kept.manifest["cause"] == cause
+        assert kept.description.cause == cause
         assert len(kept.time) == finished.outcome.cycles
 
 

@@ -151,7 +151,7 @@ def test_interrupting_the_master_stops_both_drives_and_keeps_the_run(tmp_path: P
     assert run.returncode == 0, complaint
     manifest = json.loads((run_folder(tmp_path) / "run.json").read_text())
     assert manifest["status"] == "interrupted"
-    assert manifest["realtime"]["kernel"]
+    assert manifest["plant"]["realtime"]["kernel"]
     assert (run_folder(tmp_path) / "bus.log").stat().st_size > 0
 
 
@@ -172,7 +172,7 @@ def test_a_run_over_the_slcan_of_python_can(tmp_path: Path) -> None:
             end(run)
     assert run.returncode == 0, complaint
     manifest = json.loads((run_folder(tmp_path) / "run.json").read_text())
-    assert (manifest["status"], manifest["bus"]["interface"]) == ("complete", "slcan")
+    assert (manifest["status"], manifest["plant"]["bus"]["interface"]) == ("complete", "slcan")
     log = (run_folder(tmp_path) / "bus.log").read_text(encoding="ascii")
     assert all(f" {cob_id}#" in log for cob_id in ("080", "181", "182", "201", "202"))
 

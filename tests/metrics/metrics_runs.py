@@ -1,6 +1,6 @@
 """Recordings with known answers, built from closed forms instead of plants."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -9,8 +9,10 @@ import numpy as np
 
 from legbench.design.leg import LegDesign
 from legbench.design.toml import design_to_mapping, load_design
-from legbench.recording.reader import Recording
-from legbench.signals import SIGNALS, Floats, Phase
+from legbench.phases import ControllerDescription, Counting, PhaseInfo
+from legbench.recording.controller_table import controller_table
+from legbench.recording.reader import Recording, described
+from legbench.signals import SIGNALS, Floats, Ints, Phase
 
 MODELS = Path(__file__).parents[2] / "models"
 PROTOTYPE = load_design(MODELS / "prototype.toml")
@@ -24,8 +26,9 @@ def clock(count: int) -> Floats:
 
 
 def manifest(design: LegDesign = PROTOTYPE, **entries: Any) -> dict[str, Any]:
-    """A manifest with what metrics read of it; `entries` replace whole tables."""
+    """A manifest of format 1 with what metrics need; `entries` replace whole tables."""
     tables: dict[str, Any] = {
+        "format": 1,
         "design": design_to_mapping(design),
         "setup": {"kind": "jump"},
         "controller": {"kind": "jump", "z2": 0.8, "dz2": 0.28},
@@ -52,11 +55,42 @@ def recording(time: Floats, entries: dict[str, Any] | None = None, **signals: An
     assert not signals, f"no such signals: {sorted(signals)}"
     return Recording(
         path=Path("runs/one"),
-        manifest=manifest() if entries is None else entries,
+        manifest={},
+        described=described(manifest() if entries is None else entries, Path("one")),
         time=time,
         columns=MappingProxyType(columns),
         events=(),
     )
+
+
+def remade(run: Recording, entries: dict[str, Any]) -> Recording:
+    """The same rows under another manifest."""
+    return replace(run, described=described(entries, run.path))
+
+
+def guest(
+    phase: Ints,
+    phases: tuple[PhaseInfo, ...],
+    counting: Counting | None = None,
+    *,
+    setup: dict[str, Any] | None = None,
+    signals: dict[str, Any] | None = None,
+    like: Recording | None = None,
+) -> Recording:
+    """A run of a controller that is not built in, of given phases; its rows `like` another's."""
+    said = ControllerDescription(phases=phases, counting=counting or Counting())
+    entries = {
+        "experiment": {
+            "design": design_to_mapping(PROTOTYPE),
+            "setup": setup or {"kind": "jump"},
+            "controller": {"kind": "guest"},
+        },
+        "controller": controller_table("guest", said),
+    }
+    if like is None:
+        return recording(clock(len(phase)), entries, phase=phase, **(signals or {}))
+    columns = {**like.columns, "phase": phase.astype(np.int8)}
+    return replace(remade(like, entries), columns=MappingProxyType(columns))
 
 
 def truncated(run: Recording, rows: slice) -> Recording:
@@ -64,7 +98,8 @@ def truncated(run: Recording, rows: slice) -> Recording:
     columns = {name: column[rows] for name, column in run.columns.items()}
     return Recording(
         path=run.path,
-        manifest=run.manifest,
+        manifest={},
+        described=run.described,
         time=run.time[rows],
         columns=MappingProxyType(columns),
         events=(),

@@ -9,7 +9,6 @@ from metrics_runs import PROTOTYPE, Hop, clock, manifest, recording, truncated
 from legbench.errors import FormatError, RecordingError
 from legbench.kinematics import modal_to_joint
 from legbench.metrics import Comparison, compare, differences, summarise
-from legbench.metrics.compare import name_of
 from legbench.recording.reader import Recording
 from legbench.signals import Floats
 
@@ -117,9 +116,9 @@ def test_both_are_measured_in_the_runs_modal_convention() -> None:
 
 def test_another_design_and_setup_are_named_entry_by_entry() -> None:
     heavy = replace(PROTOTYPE, name="heavy", trunk_mass=1.0)
-    other = Hop().recording(entries=manifest(heavy, setup={"kind": "jump", "boom_radius": 1.0}))
+    other = Hop().recording(entries=manifest(heavy, setup={"kind": "jump", "later": 1.0}))
     seen = compare(Hop().recording(), other)
-    assert seen.unlike == ["design.name", "design.trunk.mass", "setup.boom_radius"]
+    assert seen.unlike == ["design.name", "design.trunk.mass", "setup.later"]
     fixed = compare(Hop().recording(), swung(clock(1000), 0.1))
     assert fixed.liftoff == []
     assert "setup.kind" in fixed.unlike
@@ -128,9 +127,12 @@ def test_another_design_and_setup_are_named_entry_by_entry() -> None:
 
 def test_names_say_what_made_a_run() -> None:
     bars = {"kind": "bars"}
-    assert name_of(manifest(plant="sim", linkage=bars)) == "sim / bars / prototype"
-    assert name_of(manifest(plant="analytic", linkage=bars)) == "analytic / prototype"
-    assert name_of(manifest()) == "prototype"
+    for entries, title in (
+        ({"plant": "sim", "linkage": bars}, "sim / bars / prototype"),
+        ({"plant": "analytic", "linkage": bars}, "analytic / prototype"),
+        ({}, "prototype"),
+    ):
+        assert recording(clock(1), manifest(**entries)).description.title == title
 
 
 @pytest.mark.parametrize("rows", [1, 2, 5, 60, 250, 900])

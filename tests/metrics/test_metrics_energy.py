@@ -2,9 +2,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from metrics_runs import PERIOD, PROTOTYPE, Hop, clock, manifest, recording
+from metrics_runs import PERIOD, PROTOTYPE, Hop, clock, manifest, recording, remade
 from scipy.integrate import solve_ivp
 
+from legbench.metrics.analysis import Analysis
 from legbench.metrics.budget import energy_budget
 from legbench.metrics.energy import (
     clean_intervals,
@@ -13,7 +14,6 @@ from legbench.metrics.energy import (
     loop_gap_max,
     spring_energy,
 )
-from legbench.metrics.phases import find_gait
 from legbench.recording.reader import Recording
 
 INERTIA = np.array([0.002, 0.003])
@@ -110,7 +110,7 @@ def test_an_impact_counts_as_loss_and_not_as_residual() -> None:
     energy = np.stack([potential, np.ones_like(potential)], axis=-1)
     run = hop.recording(energy=energy, joint_pos=posture, motor_pos=posture)
     flows = energy_flows(run)
-    budget = energy_budget(run, find_gait(run), flows)
+    budget = energy_budget(run, Analysis(run).gait, flows)
     np.testing.assert_allclose(budget.impact_loss, [0.1, 0.1, 0.1], atol=1e-12)
     np.testing.assert_allclose(budget.gain, [-0.1, -0.1, -0.1], atol=1e-12)
     for name in ("stop_loss", "contact_loss", "other_loss", "motor_work", "damper_loss"):
@@ -129,8 +129,8 @@ def test_a_joint_at_its_stop_in_flight_has_its_own_loss() -> None:
     posture = np.where(at_stop[:, None], [-0.15, 0.15], [-0.6, 0.6])
     run = hop.recording(energy=energy, joint_pos=posture, motor_pos=posture)
     free = replace(PROTOTYPE, stiffness=(1e-12, 1e-12))
-    run = replace(run, manifest=manifest(free))
-    budget = energy_budget(run, find_gait(run), energy_flows(run))
+    run = remade(run, manifest(free))
+    budget = energy_budget(run, Analysis(run).gait, energy_flows(run))
     np.testing.assert_allclose(budget.stop_loss, 0.1, atol=1e-9)
     np.testing.assert_allclose(budget.impact_loss + budget.other_loss, 0.0, atol=1e-9)
 
@@ -140,7 +140,7 @@ def test_a_budget_adds_up() -> None:
     count = len(hop.signals()["time"])
     noise = np.random.default_rng(1).normal(size=(3, count, 2))
     run = hop.recording(energy=noise[0], joint_vel=noise[1], motor_pos=noise[2])
-    budget = energy_budget(run, find_gait(run), energy_flows(run))
+    budget = energy_budget(run, Analysis(run).gait, energy_flows(run))
     losses = budget.damper_loss + budget.impact_loss + budget.stop_loss
     losses += budget.contact_loss + budget.other_loss
     np.testing.assert_allclose(budget.gain, budget.motor_work - losses, atol=1e-9)
@@ -164,5 +164,5 @@ def test_loop_gap_is_the_widest_of_either_sign_that_is_known() -> None:
 def test_a_design_with_other_damping_is_not_the_same_leg() -> None:
     run = driven()
     stiffer = replace(PROTOTYPE, damping=(0.02, 0.02))
-    other = replace(run, manifest=manifest(stiffer, setup={"kind": "hfts"}))
+    other = remade(run, manifest(stiffer, setup={"kind": "hfts"}))
     assert energy_residual(other, energy_flows(other)) > 0.01

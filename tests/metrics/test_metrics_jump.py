@@ -6,13 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from metrics_runs import Hop, truncated
 
+from legbench.metrics.analysis import Analysis
 from legbench.metrics.jump import JumpFigures, jump_figures
-from legbench.metrics.phases import find_gait
 from legbench.recording.reader import Recording
 
 
 def figures(run: Recording, settle: float = 0.0) -> JumpFigures:
-    return jump_figures(run, find_gait(run), settle=settle)
+    return jump_figures(run, Analysis(run).gait, Analysis(run).first_action, settle=settle)
 
 
 @settings(derandomize=True, max_examples=40)
@@ -68,7 +68,7 @@ def test_figures_are_of_the_last_three_jumps_and_the_limit_cycle() -> None:
 @given(st.floats(0.0, 2.0))
 def test_first_is_the_first_jump_after_settling(settle: float) -> None:
     run = Hop().recording()
-    jumps = find_gait(run).jumps
+    jumps = Analysis(run).gait.jumps
     seen = figures(run, settle)
     begins = jumps.start - run.time[0]
     assert np.all(begins[: seen.first] < settle)

@@ -5,7 +5,8 @@ from hypothesis import strategies as st
 from metrics_runs import PERIOD, clock, manifest, recording
 
 from legbench.kinematics import modal_to_joint
-from legbench.metrics.periods import find_periods, first_action, turning_points
+from legbench.metrics.analysis import Analysis
+from legbench.metrics.periods import turning_points
 from legbench.recording.reader import Recording
 from legbench.signals import Phase
 
@@ -42,7 +43,7 @@ def released(
 def test_periods_of_a_damped_oscillation_come_out_in_closed_form(
     omega: float, decay: float, size: float, sign: int
 ) -> None:
-    seen = find_periods(released(omega, decay, sign * size))
+    seen = Analysis(released(omega, decay, sign * size)).periods
     period = 2.0 * np.pi / np.sqrt(omega**2 - decay**2)
     index = np.arange(len(seen))
     np.testing.assert_allclose(seen.start, PERIOD * REST_ROWS + index * period, atol=1e-5)
@@ -58,7 +59,7 @@ def test_periods_of_a_damped_oscillation_come_out_in_closed_form(
 
 def test_periods_follow_each_other_and_own_the_rows_inside() -> None:
     run = released(30.0, 0.5, 0.2)
-    seen = find_periods(run)
+    seen = Analysis(run).periods
     assert seen.first[0] == REST_ROWS
     np.testing.assert_array_equal(seen.first[1:], seen.stop[:-1])
     np.testing.assert_array_equal(seen.start[1:], seen.end[:-1])
@@ -68,7 +69,7 @@ def test_periods_follow_each_other_and_own_the_rows_inside() -> None:
 
 def test_amplitude_of_a_growing_oscillation_is_half_its_range_within_the_period() -> None:
     omega, growth, size = 30.0, 0.5, 0.05
-    seen = find_periods(released(omega, -growth, size, "other"))
+    seen = Analysis(released(omega, -growth, size, "other")).periods
     period = 2.0 * np.pi / np.sqrt(omega**2 - growth**2)
     halves = size * np.exp(growth * period * (np.arange(len(seen))[:, None] + [0.5, 1.0]))
     np.testing.assert_allclose(seen.amplitude, 0.5 * halves.sum(axis=-1), rtol=2e-3)
@@ -103,8 +104,8 @@ def test_a_leg_already_moving_begins_at_its_first_turn() -> None:
 
 
 def test_bang_bang_counts_twenty_periods_and_others_all() -> None:
-    assert len(find_periods(released(40.0, 0.0, 0.1, "bang-bang"))) == 20
-    assert len(find_periods(released(40.0, 0.0, 0.1, "other"))) == int(
+    assert len(Analysis(released(40.0, 0.0, 0.1, "bang-bang")).periods) == 20
+    assert len(Analysis(released(40.0, 0.0, 0.1, "other")).periods) == int(
         (7.999 - 0.137) / (np.pi / 20)
     )
 
@@ -112,7 +113,7 @@ def test_bang_bang_counts_twenty_periods_and_others_all() -> None:
 @pytest.mark.parametrize("rows", [0, 1, 5])
 def test_a_leg_at_rest_has_no_periods(rows: int) -> None:
     run = recording(clock(rows), manifest(setup={"kind": "hfts"}))
-    assert first_action(run) == rows
-    assert len(find_periods(run)) == 0
+    assert Analysis(run).first_action == rows
+    assert len(Analysis(run).periods) == 0
     stepped = recording(clock(rows), manifest(setup={"kind": "hfts"}), phase=np.ones(rows))
-    assert len(find_periods(stepped)) == 0
+    assert len(Analysis(stepped).periods) == 0

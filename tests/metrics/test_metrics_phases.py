@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from metrics_runs import PERIOD, Hop, clock, truncated
 
-from legbench.metrics.phases import find_gait
+from legbench.metrics.analysis import Analysis
 from legbench.metrics.stance import loaded_by_contact
 from legbench.signals import Phase
 
@@ -22,7 +22,7 @@ HOPS = st.builds(
 @settings(derandomize=True, max_examples=60)
 @given(HOPS)
 def test_events_of_a_ballistic_hop_come_out_in_closed_form(hop: Hop) -> None:
-    gait = find_gait(hop.recording())
+    gait = Analysis(hop.recording()).gait
     assert (len(gait.stance), len(gait.flight), len(gait.jumps)) == (4, 5, 3)
     index = np.arange(5)
     liftoff, touchdown = hop.liftoff(0) + index * hop.cycle, hop.touchdown(0) + index * hop.cycle
@@ -39,7 +39,7 @@ def test_events_of_a_ballistic_hop_come_out_in_closed_form(hop: Hop) -> None:
 
 def test_a_jump_is_a_flight_between_two_complete_stances() -> None:
     hop = Hop()
-    gait = find_gait(hop.recording())
+    gait = Analysis(hop.recording()).gait
     jumps = gait.jumps
     np.testing.assert_array_equal(gait.stance.stop[jumps.takeoff], gait.flight.first[jumps.flight])
     np.testing.assert_array_equal(gait.flight.stop[jumps.flight], gait.stance.first[jumps.landing])
@@ -48,7 +48,7 @@ def test_a_jump_is_a_flight_between_two_complete_stances() -> None:
 
 def test_rows_of_phases_are_those_of_the_contact() -> None:
     run = Hop().recording()
-    gait = find_gait(run)
+    gait = Analysis(run).gait
     for kind, touching in ((gait.stance, True), (gait.flight, False)):
         for first, stop in zip(kind.first, kind.stop, strict=True):
             assert np.all(run["contact"][first:stop] == touching)
@@ -61,11 +61,11 @@ def test_rows_of_phases_are_those_of_the_contact() -> None:
 def test_chattering_contact_changes_no_phase(seed: int) -> None:
     hop = Hop()
     signals = hop.signals()
-    contact, clean = signals["contact"].copy(), find_gait(hop.recording())
+    contact, clean = signals["contact"].copy(), Analysis(hop.recording()).gait
     chatter = np.random.default_rng(seed)
     for event in np.flatnonzero(np.diff(contact)):
         contact[event - 4 : event + 5] = chatter.random(9) < 0.5
-    gait = find_gait(hop.recording(contact=contact))
+    gait = Analysis(hop.recording(contact=contact)).gait
     for kind in ("stance", "flight"):
         seen, true = getattr(gait, kind), getattr(clean, kind)
         np.testing.assert_allclose(seen.start, true.start, atol=6 * PERIOD)
@@ -85,7 +85,7 @@ def test_contact_that_begins_while_the_foot_rises_is_no_touchdown() -> None:
 
 def test_without_truth_the_controller_phases_give_the_same_gait() -> None:
     hop = Hop()
-    seen, true = find_gait(hop.real()), find_gait(hop.recording())
+    seen, true = Analysis(hop.real()).gait, Analysis(hop.recording()).gait
     for kind in ("stance", "flight"):
         np.testing.assert_array_equal(getattr(seen, kind).first, getattr(true, kind).first)
         np.testing.assert_array_equal(getattr(seen, kind).stop, getattr(true, kind).stop)
@@ -103,7 +103,7 @@ def test_a_phase_next_to_rest_may_be_cut_and_does_not_count() -> None:
     resting = signals["time"] < hop.touchdown(0) - 0.05
     phase = np.where(resting, Phase.REST, signals["phase"])
     real = hop.real()
-    seen = find_gait(replace(real, columns={**real.columns, "phase": phase}))
+    seen = Analysis(replace(real, columns={**real.columns, "phase": phase})).gait
     assert (len(seen.stance), len(seen.flight)) == (4, 4)
     assert seen.flight.start[0] == pytest.approx(hop.liftoff(1), abs=PERIOD)
 
@@ -112,7 +112,7 @@ def test_a_phase_next_to_rest_may_be_cut_and_does_not_count() -> None:
 @pytest.mark.parametrize("real", [False, True])
 def test_phases_that_an_end_cuts_do_not_count(rows: slice, real: bool) -> None:
     run = Hop().real() if real else Hop().recording()
-    gait = find_gait(truncated(run, rows))
+    gait = Analysis(truncated(run, rows)).gait
     assert (len(gait.stance), len(gait.flight), len(gait.jumps)) == (0, 0, 0)
 
 
@@ -121,7 +121,7 @@ def test_phases_that_an_end_cuts_do_not_count(rows: slice, real: bool) -> None:
 def test_cutting_a_run_keeps_the_phases_that_are_left_whole(one: int, other: int) -> None:
     run = Hop().recording()
     low, high = sorted((one, other))
-    whole, part = find_gait(run), find_gait(truncated(run, slice(low, high)))
+    whole, part = Analysis(run).gait, Analysis(truncated(run, slice(low, high))).gait
     for kind in ("stance", "flight"):
         all_of, left = getattr(whole, kind), getattr(part, kind)
         inside = (all_of.first > low) & (all_of.stop < high)

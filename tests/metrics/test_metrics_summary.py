@@ -3,10 +3,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from metrics_runs import Hop, clock, manifest, recording, truncated
+from metrics_runs import Hop, clock, manifest, recording, remade, truncated
 
 from legbench.design.setup import SetupKind
-from legbench.metrics.phases import find_gait
+from legbench.metrics.analysis import Analysis
 from legbench.metrics.summary import summarise
 
 FIXED = [kind.value for kind in SetupKind if kind is not SetupKind.JUMP]
@@ -21,7 +21,7 @@ def test_a_whole_hop_fills_every_figure() -> None:
     run = hop.recording()
     seen = strict(summarise(run))
     assert [name for name, value in seen.items() if value is None] == ["cause"]
-    gait = find_gait(run)
+    gait = Analysis(run).gait
     assert len(seen["rating_stance"]) == len(gait.stance) == 8
     assert len(seen["rating_flight"]) == len(gait.flight) == 9
     assert seen["rating_periods"] == []
@@ -37,8 +37,8 @@ def test_a_whole_hop_fills_every_figure() -> None:
 def test_a_torn_run_gives_what_it_has(rows: int, real: bool, kind: str | None) -> None:
     run = truncated(Hop().real() if real else Hop().recording(), slice(0, rows))
     if kind is not None:
-        run.manifest["setup"] = {"kind": kind}
-        run.manifest["controller"] = {"kind": "position-jump", "z2": 1.0, "dz2": 0.1}
+        controller = {"kind": "position-jump", "z2": 1.0, "dz2": 0.1}
+        run = remade(run, manifest(setup={"kind": kind}, controller=controller))
     seen = strict(summarise(run))
     assert len(seen["rating_periods"]) == len(seen["periods"])
     assert len(seen["rating_stance"]) == len(seen["rating_stance_equilibrium"])

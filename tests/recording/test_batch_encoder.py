@@ -7,7 +7,8 @@ import pyarrow as pa
 import pytest
 from pyarrow import ipc
 
-from legbench.recording.layout import COLUMNS, INT8_COLUMNS, TIME
+from legbench.recording.columns import ONE_LEG, SMALL_INTEGERS
+from legbench.recording.layout import TIME
 from legbench.recording.stream import BatchEncoder, encode_schema, schema_for
 from legbench.signals import Floats
 
@@ -16,20 +17,20 @@ SCHEMA = schema_for({"plant": "sim"})
 
 def rows(seed: int, count: int = 50, *, truth: bool = True) -> Floats:
     rng = np.random.default_rng(seed)
-    columns = rng.normal(size=(1 + len(COLUMNS), count))
+    columns = rng.normal(size=(1 + len(ONE_LEG.names), count))
     columns[0] = np.sort(rng.uniform(0.0, 100.0, count))
-    for name in INT8_COLUMNS:
-        columns[1 + COLUMNS.index(name)] = rng.integers(0, 9, count)
+    for name in SMALL_INTEGERS:
+        columns[1 + ONE_LEG.names.index(name)] = rng.integers(0, 9, count)
     if not truth:
-        columns[1 + COLUMNS.index("contact")] = np.nan
+        columns[1 + ONE_LEG.names.index("contact")] = np.nan
     return columns
 
 
 def expected(columns: Floats) -> pa.RecordBatch:
     values: dict[str, pa.Array] = {TIME: pa.array(np.rint(columns[0] * 1e9).astype(np.int64))}
-    for name, column in zip(COLUMNS, columns[1:], strict=True):
+    for name, column in zip(ONE_LEG.names, columns[1:], strict=True):
         known = [None if np.isnan(value) else int(value) for value in column]
-        values[name] = pa.array(known, pa.int8()) if name in INT8_COLUMNS else pa.array(column)
+        values[name] = pa.array(known, pa.int8()) if name in SMALL_INTEGERS else pa.array(column)
     return pa.RecordBatch.from_pydict(values, schema=SCHEMA)
 
 
@@ -56,7 +57,7 @@ def test_other_rows_or_other_nulls_do_not_fit() -> None:
     assert not encoder.fits(rows(1, 49))
     assert not encoder.fits(rows(1, truth=False))
     some = rows(1)
-    some[1 + COLUMNS.index("contact"), 3] = np.nan
+    some[1 + ONE_LEG.names.index("contact"), 3] = np.nan
     assert not encoder.fits(some)
     (found,) = read_back(BatchEncoder(some, SCHEMA).encode(some))
     assert found.column("contact").null_count == 1

@@ -75,7 +75,7 @@ def test_a_full_disk(small_disk: Path, capfd: pytest.CaptureFixture[str]) -> Non
     appended, message = capfd.readouterr().out.splitlines()
     assert "No space left on device [ENOSPC]" in message
     check_starved(writer.path, int(appended), message)
-    (small_disk / writer.path.name / "run.json").read_text().index('"format": 1')
+    assert '"format": 2' in (writer.path / "run.json").read_text()
     rows = len(load(writer.path).time)
     subprocess.run(["mount", "-o", "remount,size=4m", str(small_disk)], check=True)
     assert recover(writer.path).rows_kept == rows

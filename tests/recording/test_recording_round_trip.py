@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 from pyarrow import parquet
 from recorded_rows import append_rows, cycle
 
-from legbench.recording.layout import COLUMNS, TIME
+from legbench.recording.columns import ONE_LEG
 from legbench.recording.reader import load
-from legbench.recording.rows import PLACES
+from legbench.recording.rows import ONE_LEG_ROWS
 from legbench.recording.writer import RunWriter
 from legbench.signals import SIGNALS, Command, Observation, Truth
 
@@ -22,8 +22,9 @@ def bits(values: np.ndarray) -> list[int]:
 
 
 def test_every_signal_has_a_place_in_a_row() -> None:
-    assert set(PLACES) == {TIME, *COLUMNS}
-    assert sorted(PLACES.values()) == list(range(len(PLACES)))
+    order = ONE_LEG_ROWS.disk_order
+    assert len(order) == 1 + len(ONE_LEG.names)
+    assert sorted(order) == list(range(ONE_LEG_ROWS.size))
 
 
 @pytest.mark.parametrize("count", [1, 49, 50, 51, 237])

@@ -70,7 +70,7 @@ def test_a_newer_format_is_refused(run: Path) -> None:
 @pytest.mark.parametrize("content", ["[1]", '{"format": "one"}', "{}", '{"format": 0}'])
 def test_a_manifest_of_another_kind_is_refused(run: Path, content: str) -> None:
     (run / "run.json").write_text(content)
-    with pytest.raises(FormatError, match=r"is no run manifest: its format is .*, not 1\.\.1"):
+    with pytest.raises(FormatError, match=r"is no run manifest: its format is .*, not 1\.\.2"):
         load(run)
 
 

@@ -23,17 +23,23 @@ def manifest_of(run: Path) -> dict[str, object]:
 
 
 def test_the_manifest_is_there_from_the_start(tmp_path: Path) -> None:
-    given = {"seed": 1, "design": {"m": np.float64(0.2)}, "versions": {"mujoco": "4.0"}}
+    given = {
+        "seed": 1,
+        "design": {"m": np.float64(0.2)},
+        "provenance": {"versions": {"mujoco": "4.0"}},
+    }
     writer = RunWriter.create(tmp_path, given, created=START)
     manifest = manifest_of(writer.path)
-    assert manifest["format"] == 1
+    assert manifest["format"] == 2
     assert manifest["legbench"] == __version__
     assert manifest["id"] == writer.path.name == "20300102-030405"
     assert manifest["status"] == "running"
     assert manifest["cause"] is None
     assert manifest["design"] == {"m": 0.2}
     assert manifest["units"]["joint_vel_1"] == "rad/s"  # pyright: ignore
-    assert set(manifest["versions"]) == {"python", "numpy", "pyarrow", "mujoco"}  # pyright: ignore
+    assert set(manifest["provenance"]["versions"]) == {  # pyright: ignore
+        *("python", "numpy", "pyarrow", "mujoco")
+    }
     assert not load(writer.path).complete
     writer.close("interrupted", "SIGINT")
     assert (manifest_of(writer.path) | {"status": "interrupted", "cause": "SIGINT"}) == (

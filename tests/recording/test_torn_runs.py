@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from recorded_rows import append_rows
 
 from legbench.errors import RecordingError
-from legbench.recording.layout import COLUMNS
+from legbench.recording.columns import ONE_LEG
 from legbench.recording.reader import load
 from legbench.recording.repair import recover
 from legbench.recording.stream import (
@@ -49,7 +49,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def boundaries(run: Path) -> list[int]:
     """Offsets after the schema and after each batch, each batch's size being the same."""
     size = (run / "samples.arrows").stat().st_size - len(END_MARK)
-    rows = np.zeros((1 + len(COLUMNS), 50))
+    rows = np.zeros((1 + len(ONE_LEG.names), 50))
     batch = len(BatchEncoder(rows, schema_for({})).encode(rows))
     return [size - batch * left for left in (3, 2, 1, 0)]
 
@@ -64,7 +64,7 @@ def cut(whole: Path, target: Path, size: int) -> Path:
 def test_a_stream_cut_at_every_byte_keeps_its_whole_batches(tmp_path: Path) -> None:
     schema = schema_for({})
     parts = [encode_schema(schema)]
-    rows = [np.full((1 + len(COLUMNS), 1), value) for value in (1.0, 2.0)]
+    rows = [np.full((1 + len(ONE_LEG.names), 1), value) for value in (1.0, 2.0)]
     parts += [BatchEncoder(row, schema).encode(row) for row in rows]
     ends = np.cumsum([len(part) for part in parts])
     path = tmp_path / "samples.arrows"

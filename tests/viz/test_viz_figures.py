@@ -8,11 +8,11 @@ from matplotlib.figure import Figure
 from viz_runs import part
 
 from legbench.errors import ConfigError, RecordingError
-from legbench.metrics.periods import find_periods
-from legbench.metrics.phases import find_gait
+from legbench.metrics.analysis import Analysis
 from legbench.recording.reader import Recording
 from legbench.viz import style
-from legbench.viz.print.figures import phase_figure, save_figure
+from legbench.viz.print.figures import phase_figure
+from legbench.viz.print.save import save_figure
 
 
 def collection(figure: Figure, panel: int) -> LineCollection:
@@ -36,7 +36,7 @@ def test_a_jump_shows_its_last_three_jumps_by_stance_and_flight(hop: Recording) 
     colours = [tuple(colour[:3]) for colour in np.asarray(lines.get_colors())]
     stance, flight = style.unit(style.STANCE), style.unit(style.FLIGHT)
     assert colours == [stance, flight] * 3 + [stance]
-    jumps = find_gait(hop).jumps
+    jumps = Analysis(hop).gait.jumps
     rows = sum(len(segment) - 1 for segment in lines.get_segments())
     assert rows == pytest.approx(1e3 * (jumps.end[-1] - jumps.start[-3]), abs=2)
     assert [text.get_text() for text in figure.legends[0].get_texts()] == [
@@ -48,7 +48,7 @@ def test_a_jump_shows_its_last_three_jumps_by_stance_and_flight(hop: Recording) 
 
 def test_periods_have_a_colour_each_and_a_bar(swing: Recording) -> None:
     figure = phase_figure(swing)
-    periods = find_periods(swing)
+    periods = Analysis(swing).periods
     assert len(collection(figure, 2).get_segments()) == len(periods)
     assert len(np.unique(collection(figure, 2).get_colors(), axis=0)) == len(periods)
     assert figure.axes[3].get_ylabel() == "oscillation period"
@@ -77,7 +77,12 @@ def test_motion_that_is_purely_radial_looks_like_a_line(swing: Recording) -> Non
     columns = dict(swing.columns)
     columns["joint_pos_2"] = -columns["joint_pos_1"] + 1e-9 * np.sin(swing.time)
     radial = Recording(
-        path=swing.path, manifest=swing.manifest, time=swing.time, columns=columns, events=()
+        path=swing.path,
+        manifest={},
+        described=swing.described,
+        time=swing.time,
+        columns=columns,
+        events=(),
     )
     low, high = phase_figure(radial).axes[0].get_xlim()
     assert high - low == pytest.approx(style.POLAR_LEAST)

@@ -1,4 +1,5 @@
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +12,14 @@ from viz_runs import PROTOTYPE, part
 
 from legbench.errors import RecordingError
 from legbench.kinematics import joint_to_polar, leg_points
+from legbench.metrics.analysis import Analysis
 from legbench.metrics.compare import differences
-from legbench.metrics.phases import find_gait
-from legbench.recording.reader import Recording
+from legbench.recording.reader import Recording, described
 from legbench.viz.live.axes import HEIGHT, WIDTH
 from legbench.viz.live.rrd import write_rrd
-from legbench.viz.print.figures import phase_figure, save_figure
+from legbench.viz.print.figures import phase_figure
 from legbench.viz.print.overlay import DECADES, LEAST, look_of
+from legbench.viz.print.save import save_figure
 
 Entities = dict[str, dict[str, Any]]
 
@@ -26,19 +28,15 @@ def swayed(recording: Recording, by: float, **entries: Any) -> Recording:
     """The same run with other hip angles, made by something else."""
     columns = dict(recording.columns)
     columns["joint_pos_1"] = columns["joint_pos_1"] + by * np.sin(9.0 * recording.time)
-    manifest: Mapping[str, Any] = {**recording.manifest, "id": "other", **entries}
-    return Recording(
-        path=recording.path.with_name("other"),
-        manifest=manifest,
-        time=recording.time,
-        columns=columns,
-        events=(),
-    )
+    experiment = {**recording.manifest["experiment"], **entries}
+    manifest: Mapping[str, Any] = {**recording.manifest, "id": "other", "experiment": experiment}
+    path = recording.path.with_name("other")
+    return replace(recording, path=path, described=described(dict(manifest), path), columns=columns)
 
 
 @pytest.fixture(scope="module")
 def other(hop: Recording) -> Recording:
-    return swayed(hop, 0.3, plant="sim", linkage={"kind": "reduced"})
+    return swayed(hop, 0.3, plant={"kind": "sim"}, linkage={"kind": "reduced"})
 
 
 def dashed(panel: Axes, place: int) -> np.ndarray:
@@ -53,7 +51,7 @@ def legend(figure: Figure) -> list[str]:
 
 def test_the_other_run_is_drawn_over_the_planes(hop: Recording, other: Recording) -> None:
     figure = phase_figure(hop, [other])
-    jumps = find_gait(other).jumps
+    jumps = Analysis(other).gait.jumps
     first, stop = np.searchsorted(other.time, [jumps.start[-3], jumps.end[-1]])
     np.testing.assert_array_equal(dashed(figure.axes[1], 0), other["joint_pos"][first : stop + 1])
     polar = joint_to_polar(other["joint_pos"], PROTOTYPE.shank.length)
@@ -100,7 +98,11 @@ def test_overlays_are_the_same_bytes_each_time(
 
 
 def test_several_runs_have_looks_and_names_of_their_own(swing: Recording) -> None:
-    others = [swayed(swing, 0.05, plant="sim"), swayed(swing, 0.1, plant="can"), swing]
+    others = [
+        swayed(swing, 0.05, plant={"kind": "sim"}),
+        swayed(swing, 0.1, plant={"kind": "can"}),
+        swing,
+    ]
     figure = phase_figure(swing, others)
     assert len({look_of(place).colour for place in range(3)}) == 3
     for place in range(3):

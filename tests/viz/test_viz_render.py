@@ -122,7 +122,12 @@ def test_a_time_outside_the_run_is_refused(hop: Recording, tmp_path: Path) -> No
 
 def test_a_run_without_model_says_so(hop: Recording, tmp_path: Path) -> None:
     bare = Recording(
-        path=tmp_path, manifest=hop.manifest, time=hop.time, columns=hop.columns, events=()
+        path=tmp_path,
+        manifest={},
+        described=hop.described,
+        time=hop.time,
+        columns=hop.columns,
+        events=(),
     )
     with pytest.raises(RecordingError, match=r"leg\.xml does not exist: the run keeps no model"):
         render(bare, tmp_path / "a.gif")

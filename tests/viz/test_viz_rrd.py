@@ -1,4 +1,4 @@
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +11,8 @@ from viz_runs import PROTOTYPE, part, record
 from legbench.design.setup import SetupKind
 from legbench.errors import FormatError, RecordingError
 from legbench.kinematics import joint_to_modal, joint_to_polar, leg_points
-from legbench.metrics.phases import find_gait
-from legbench.metrics.ratings import rate_run
-from legbench.metrics.source import terms_of
-from legbench.recording.reader import Recording
+from legbench.metrics.analysis import Analysis
+from legbench.recording.reader import Recording, described
 from legbench.signals import Phase
 from legbench.viz.facts import facts_of
 from legbench.viz.live.axes import HEIGHT, WIDTH
@@ -135,10 +133,10 @@ def test_states_change_when_they_change(hop: Recording, shown: Entities) -> None
 
 
 def test_ratings_are_those_of_the_metrics(hop: Recording, shown: Entities) -> None:
-    ratings = rate_run(hop, terms_of(hop.manifest), find_gait(hop))
+    ratings = asdict(Analysis(hop).ratings.chosen)
     for name in ("stance", "flight"):
         values = np.array(shown[f"/series/rating/{name}"]["scalars"]).ravel()
-        np.testing.assert_allclose(values, ratings[f"rating_{name}"], rtol=1e-12)
+        np.testing.assert_allclose(values, ratings[name], rtol=1e-12)
 
 
 def test_contact_that_chatters_splits_no_rating(hop: Recording, tmp_path: Path) -> None:
@@ -147,11 +145,11 @@ def test_contact_that_chatters_splits_no_rating(hop: Recording, tmp_path: Path) 
     for event in np.flatnonzero(np.diff(contact))[:-1]:
         contact[event - 4 : event + 5] = chatter.random(9) < 0.5
     rough = replace(hop, columns={**hop.columns, "contact": contact.astype(np.int8)})
-    ratings = rate_run(rough, terms_of(hop.manifest), find_gait(rough))
+    ratings = asdict(Analysis(rough).ratings.chosen)
     shown = viz_rrd.temporal(write_rrd(rough, tmp_path / "rough.rrd"))
     for name in ("stance", "flight"):
         values = np.array(shown[f"/series/rating/{name}"]["scalars"]).ravel()
-        np.testing.assert_allclose(values, ratings[f"rating_{name}"], rtol=1e-12)
+        np.testing.assert_allclose(values, ratings[name], rtol=1e-12)
 
 
 def test_facts_tell_design_controller_and_ratings(fixed: Entities) -> None:
@@ -168,7 +166,7 @@ def test_slices_publish_what_the_whole_run_publishes(
     whole = viz_rrd.temporal(write_rrd(run, tmp_path / "whole.rrd"))
     stream = rr.RecordingStream(APPLICATION, recording_id="slices")
     stream.save(tmp_path / "slices.rrd")
-    publisher = Publisher(stream, facts_of(run.manifest, run.path), live=True)
+    publisher = Publisher(stream, facts_of(run.description, run.path), live=True)
     for first in range(0, len(run.time), 333):
         publisher.push(part(run, first, first + 333))
     publisher.finish()
@@ -203,7 +201,12 @@ def test_every_setup_is_drawn(kind: SetupKind, tmp_path: Path) -> None:
 
 def test_a_run_without_model_has_all_but_the_scene(hop: Recording, tmp_path: Path) -> None:
     bare = Recording(
-        path=tmp_path, manifest=hop.manifest, time=hop.time, columns=hop.columns, events=()
+        path=tmp_path,
+        manifest={},
+        described=hop.described,
+        time=hop.time,
+        columns=hop.columns,
+        events=(),
     )
     shown = viz_rrd.temporal(write_rrd(bare, tmp_path / "bare.rrd"))
     assert not any(path.startswith("/scene") for path in shown)
@@ -213,9 +216,11 @@ def test_a_run_without_model_has_all_but_the_scene(hop: Recording, tmp_path: Pat
 def test_an_older_file_survives_a_failure(hop: Recording, tmp_path: Path) -> None:
     target = tmp_path / "view.rrd"
     target.write_bytes(b"older")
+    moon = {**hop.manifest["experiment"], "setup": {"kind": "moon"}}
     broken = Recording(
         path=tmp_path,
-        manifest={**hop.manifest, "setup": {"kind": "moon"}},
+        manifest={},
+        described=described({**hop.manifest, "experiment": moon}, tmp_path),
         time=hop.time,
         columns=hop.columns,
         events=(),
@@ -224,7 +229,12 @@ def test_an_older_file_survives_a_failure(hop: Recording, tmp_path: Path) -> Non
         write_rrd(broken, target)
     (tmp_path / "leg.xml").write_text("<mujoco><worldbody><body/></worldbody>")
     torn = Recording(
-        path=tmp_path, manifest=hop.manifest, time=hop.time, columns=hop.columns, events=()
+        path=tmp_path,
+        manifest={},
+        described=hop.described,
+        time=hop.time,
+        columns=hop.columns,
+        events=(),
     )
     with pytest.raises(RecordingError, match="MuJoCo refuses the model"):
         write_rrd(torn, target)

@@ -30,7 +30,7 @@ def test_a_growing_stream_is_read_once_whatever_its_tears(
             assert not tail.ended
             file.write(whole[first : first + chunk])
             if batches := tail.read():
-                times += rows_of(batches, hop.manifest, hop.path).time.tolist()
+                times += rows_of(batches, hop.description, hop.path).time.tolist()
     assert tail.ended
     assert tail.read() == []
     tail.close()
@@ -44,7 +44,7 @@ def test_rows_are_those_of_the_run(
     run: Recording = request.getfixturevalue(name)
     (tmp_path / STREAM).write_bytes(b"".join(stream_of(run)))
     tail = Tail(tmp_path / STREAM)
-    rows = rows_of(tail.read(), run.manifest, run.path)
+    rows = rows_of(tail.read(), run.description, run.path)
     tail.close()
     assert not tail.ended
     assert rows.has_truth == run.has_truth

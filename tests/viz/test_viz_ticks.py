@@ -1,10 +1,12 @@
 import math
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from legbench.signals import Phase
+from legbench.phases import PhaseInfo, Role
+from legbench.recording.format_1 import built_in
 from legbench.viz import style
 from legbench.viz.ticks import tick_labels, ticks
 
@@ -53,6 +55,46 @@ def test_late_periods_keep_the_last_colour() -> None:
     np.testing.assert_array_equal(colours[2], colours[4])
 
 
-def test_every_phase_has_a_colour() -> None:
-    assert set(style.PHASES) == set(Phase)
+BUILT_IN = {
+    "jump": {
+        "rest": (120, 120, 128),
+        "flight": style.FLIGHT,
+        "compress": (0, 150, 136),
+        "push": style.STANCE,
+        "release": (142, 108, 190),
+    },
+    "bang-bang": {
+        "rest": (120, 120, 128),
+        "middle": (158, 158, 120),
+        "folded": (0, 150, 136),
+        "stretched": (214, 130, 40),
+    },
+    "position-jump": {"rest": (120, 120, 128), "stepped": (142, 108, 190)},
+}
+"""Colours that pictures of these controllers have always had."""
+
+
+@pytest.mark.parametrize("kind", list(BUILT_IN))
+def test_known_phases_keep_their_colours(kind: str) -> None:
+    phases = built_in(kind, {}).phases
+    colours = style.phase_colours(phases)
+    assert {phase.name: colours[phase.code] for phase in phases} == BUILT_IN[kind]
+
+
+@pytest.mark.parametrize("role", list(Role))
+def test_phases_of_one_role_are_told_apart(role: Role) -> None:
+    codes = (3, 7, 11, 127)
+    phases = [PhaseInfo(code=code, name=f"p{code}", role=role) for code in codes]
+    assert len(set(style.phase_colours(phases).values())) == len(codes)
+    more = [*phases, PhaseInfo(code=15, name="p15", role=role)]
+    assert style.phase_colours(more)[15] in style.PHASES[role]
+
+
+def test_a_phase_that_nobody_declared_has_a_colour_of_its_own() -> None:
+    phases = built_in("jump", {}).phases
+    colours = style.colours_by_code(phases, np.array([5, 99, -1]))
+    np.testing.assert_array_equal(colours[:2], [style.FLIGHT, style.UNDECLARED])
+
+
+def test_colours_are_packed_as_rerun_wants_them() -> None:
     assert style.packed((0x12, 0x34, 0x56)) == 0x123456FF

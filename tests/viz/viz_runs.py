@@ -11,9 +11,12 @@ from legbench.design.setup import Setup, SetupKind
 from legbench.design.toml import design_to_mapping
 from legbench.kinematics import leg_points, modal_to_joint
 from legbench.mjcf import BuildOptions, build_spec, to_xml
-from legbench.recording.layout import COLUMNS, TIME
+from legbench.recording.columns import ONE_LEG
+from legbench.recording.controller_table import controller_table
+from legbench.recording.format_1 import built_in
+from legbench.recording.layout import TIME
 from legbench.recording.manifest import new_manifest, write_manifest
-from legbench.recording.reader import Recording
+from legbench.recording.reader import Recording, described
 from legbench.recording.stream import BatchEncoder, encode_schema, schema_for
 from legbench.signals import SIGNALS, Floats, Phase
 
@@ -34,14 +37,18 @@ FLIGHT_TIME = 2.0 * TAKEOFF / GRAVITY
 
 def manifest_of(kind: SetupKind, **extra: Any) -> dict[str, Any]:
     """A manifest as the loop would write it."""
-    controller = {"kind": "jump" if kind is SetupKind.JUMP else "bang-bang"}
+    controller = "jump" if kind is SetupKind.JUMP else "bang-bang"
+    settings = {"z2": 1.0, "dz2": 0.15}
     given: Mapping[str, Any] = {
-        "design": design_to_mapping(PROTOTYPE),
-        "setup": {"kind": kind.value, "boom_radius": None},
-        "linkage": {"kind": "bars", "bar_mass": 0.002, "crank_length": 0.02},
-        "controller": {**controller, "z2": 1.0, "dz2": 0.15},
-        "conventions": {"modal": "orthonormal"},
-        **extra,
+        "experiment": {
+            "design": design_to_mapping(PROTOTYPE),
+            "setup": {"kind": kind.value, "boom_radius": None},
+            "linkage": {"kind": "bars", "bar_mass": 0.002, "crank_length": 0.02},
+            "controller": {"kind": controller, "settings": settings},
+            "conventions": {"modal": "orthonormal"},
+            **extra,
+        },
+        "controller": controller_table(controller, built_in(controller, settings)),
     }
     return new_manifest(given, id=f"synthetic-{kind.value}", created="2024-01-01T00:00:00+00:00")
 
@@ -126,7 +133,7 @@ def columns_of(signals: Mapping[str, Floats]) -> dict[str, np.ndarray]:
     for signal in SIGNALS:
         values = signals[signal.name].reshape(len(signals["t"]), -1)
         columns |= dict(zip(signal.columns, values.T, strict=True))
-    return {name: columns[name] for name in (TIME, *COLUMNS)}
+    return {name: columns[name] for name in (TIME, *ONE_LEG.names)}
 
 
 def record(folder: Path, kind: SetupKind, rows: int, *, truth: bool = True) -> Recording:
@@ -140,9 +147,11 @@ def record(folder: Path, kind: SetupKind, rows: int, *, truth: bool = True) -> R
         signals["contact"] = np.full(rows, -1.0)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "leg.xml").write_text(to_xml(spec), encoding="utf-8")
+    manifest = manifest_of(kind)
     return Recording(
         path=folder,
-        manifest=manifest_of(kind),
+        manifest=manifest,
+        described=described(manifest, folder),
         time=signals["t"],
         columns=columns_of(signals),
         events=(),
@@ -155,6 +164,7 @@ def part(recording: Recording, first: int, stop: int) -> Recording:
     return Recording(
         path=recording.path,
         manifest=recording.manifest,
+        described=recording.described,
         time=recording.time[first:stop],
         columns=columns,
         events=(),
@@ -165,9 +175,9 @@ def stream_of(recording: Recording, batch: int = 50) -> list[bytes]:
     """The messages of a run's stream without its end mark; `run.json` is written, too."""
     write_manifest(recording.path, recording.manifest)
     schema = schema_for(recording.manifest)
-    values = [recording.time, *(recording.columns[name].astype(float) for name in COLUMNS)]
+    values = [recording.time, *(recording.columns[name].astype(float) for name in ONE_LEG.names)]
     table = np.stack(values)
-    contact = 1 + COLUMNS.index("contact")
+    contact = 1 + ONE_LEG.names.index("contact")
     table[contact] = np.where(table[contact] < 0.0, np.nan, table[contact])
     firsts = range(0, len(recording.time), batch)
     parts = [np.ascontiguousarray(table[:, first : first + batch]) for first in firsts]

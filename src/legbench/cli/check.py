@@ -12,6 +12,7 @@ from legbench.design import LegDesign, load_design
 from legbench.design.matching import TOLERANCE, Parameters, check_conditions, standing_angle
 from legbench.design.mending import mends
 from legbench.errors import ConfigError
+from legbench.strict_json import null_for_nan
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,14 +106,11 @@ def add_adjustments(
     """Report the weights that move a measured leg to its target."""
     from legbench.synthesis.manufacture import adjust_leg
     from legbench.synthesis.report import adjustment_lines
-    from legbench.synthesis.solve import conditions_to_json, finite_or_none
+    from legbench.synthesis.solve import conditions_to_json
 
     adjusted = adjust_leg(measured, target)
     lines += ["", *adjustment_lines(adjusted)]
-    content["weights"] = [
-        {key: finite_or_none(value) for key, value in asdict(weight).items()}
-        for weight in adjusted.adjustments
-    ]
+    content["weights"] = [null_for_nan(asdict(weight)) for weight in adjusted.adjustments]
     content["residuals_with_weights"] = conditions_to_json(adjusted.after)
 
 

@@ -207,7 +207,7 @@ def _write(chosen: DesignArguments, solution: "Solution", trace: "Trace") -> Non
 def _draw(path: Path, solution: "Solution") -> None:
     from legbench.viz.print._matplotlib import Figure, FigureCanvasAgg, styled
     from legbench.viz.print.designs import PAGE, draw_leg
-    from legbench.viz.print.figures import save_figure
+    from legbench.viz.print.save import save_figure
 
     with styled():
         figure = Figure(figsize=(PAGE[0] / 25.4, PAGE[1] / 25.4))
@@ -219,7 +219,7 @@ def _draw(path: Path, solution: "Solution") -> None:
 def _plot(path: Path, solution: "Solution", trace: "Trace") -> None:
     from legbench.viz.print._matplotlib import Figure, FigureCanvasAgg, styled
     from legbench.viz.print.designs import draw_trace
-    from legbench.viz.print.figures import save_figure
+    from legbench.viz.print.save import save_figure
 
     with styled():
         figure = Figure(figsize=(8.0, 6.4), layout="constrained")

@@ -1,6 +1,5 @@
 """`legbench hop`: the apex return map of a leg, its periodic hops and their basin."""
 
-import json
 import math
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -11,7 +10,7 @@ import tyro
 
 from legbench.analytic import LegModel
 from legbench.analytic.taylor import TaylorLeg
-from legbench.cli.output import note, print_json, progress
+from legbench.cli.output import note, print_json, progress, write_json
 from legbench.cli.parse import parse
 from legbench.control import JumpConfig
 from legbench.design import LegDesign, load_design
@@ -288,10 +287,5 @@ def _share(fates: Ints) -> dict[str, float]:
 
 
 def _save(out: Path, content: dict[str, Any]) -> None:
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        text = json.dumps(content, indent=1, allow_nan=False)
-        (out / "hop.json").write_text(text + "\n", encoding="utf-8")
-    except OSError as error:
-        raise ConfigError(f"{out} cannot be written: {error}") from error
+    write_json(out / "hop.json", content)
     note(f"wrote {out / 'hop.json'}")

@@ -1,6 +1,5 @@
 """`legbench modes`: linear and nonlinear modes of a leg around an equilibrium."""
 
-import json
 import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -8,7 +7,7 @@ from typing import Annotated, Any
 
 import tyro
 
-from legbench.cli.output import note, print_json, progress
+from legbench.cli.output import note, print_json, progress, write_json
 from legbench.cli.parse import parse
 from legbench.design import load_design
 from legbench.design.setup import SetupKind
@@ -149,11 +148,6 @@ def _line(found: BrakeOrbit) -> None:
 def _write(out: Path, content: dict[str, Any], scene: Scene, families: list[Family]) -> None:
     from legbench.viz.print.modes import plot_modes
 
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        text = json.dumps(content, indent=1, allow_nan=False)
-        (out / "modes.json").write_text(text + "\n", encoding="utf-8")
-    except OSError as error:
-        raise ConfigError(f"{out} cannot be written: {error}") from error
+    write_json(out / "modes.json", content)
     plot_modes(scene, families, out / "modes.png")
     note(f"wrote {out / 'modes.json'} and {out / 'modes.png'}")

@@ -3,7 +3,11 @@
 import select
 import sys
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
+
+from legbench.errors import ConfigError
+from legbench.strict_json import null_for_nan
 
 
 def report_error(message: str) -> None:
@@ -17,10 +21,28 @@ def note(message: str) -> None:
 
 
 def print_json(content: Mapping[str, Any]) -> None:
-    """One JSON object on stdout; not-a-number is null."""
+    """Print one JSON object on stdout; a number that JSON lacks is null."""
     import json
 
-    print(json.dumps(content, allow_nan=False))
+    print(json.dumps(null_for_nan(content), allow_nan=False))
+
+
+def write_json(path: Path, content: Mapping[str, Any]) -> None:
+    """Write one JSON object as a whole file; make its folder if need be.
+
+    Raises:
+        ConfigError: it cannot be written; an older file is untouched.
+    """
+    import json
+
+    from legbench.recording.files import write_whole
+
+    text = json.dumps(null_for_nan(content), indent=1, allow_nan=False)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(path, f"{text}\n".encode())
+    except OSError as error:
+        raise ConfigError(f"{path.parent} cannot be written: {error}") from error
 
 
 def progress(done: int, total: int) -> None:

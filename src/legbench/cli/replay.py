@@ -10,11 +10,11 @@ from tyro.conf import Positional, UseAppendAction
 from legbench.cli.output import note, print_json
 from legbench.cli.parse import parse
 from legbench.cli.table import print_comparison, print_summary
-from legbench.metrics import Comparison, compare, summarise
+from legbench.metrics import Analysis, Comparison, compare, summarise
 from legbench.recording.reader import Recording, load
 
 SHOWN = 4
-"""Entries in which two manifests differ that a note lists."""
+"""Largest number of entries in which two experiments differ that a note lists."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,15 +41,17 @@ def main(arguments: list[str]) -> int:
     """Replay; 0 also for a run that a fault had ended."""
     chosen = parse(ReplayArguments, "replay", arguments)
     recording, *others = [_loaded(path) for path in (chosen.run, *chosen.against)]
-    summary = summarise(recording)
-    comparisons = [_compared(recording, other) for other in others]
+    run, *against = [Analysis(each) for each in (recording, *others)]
+    summary = summarise(run)
+    comparisons = [_compared(run, other) for other in against]
     if chosen.figure is not None:
-        from legbench.viz.print.figures import phase_figure, save_figure
+        from legbench.viz.print.figures import phase_figure
+        from legbench.viz.print.save import save_figure
 
-        note(f"wrote {save_figure(phase_figure(recording, others), chosen.figure)}")
+        note(f"wrote {save_figure(phase_figure(run, against), chosen.figure)}")
     if chosen.json:
-        against = {"against": [each.to_json() for each in comparisons]} if others else {}
-        print_json(summary.to_json() | against)
+        added = {"against": [each.to_json() for each in comparisons]} if others else {}
+        print_json(summary.to_json() | added)
     else:
         print_summary(summary)
         for comparison in comparisons:
@@ -66,8 +68,8 @@ def _loaded(path: Path) -> Recording:
     return recording
 
 
-def _compared(recording: Recording, other: Recording) -> Comparison:
-    comparison = compare(recording, other)
+def _compared(run: Analysis, other: Analysis) -> Comparison:
+    comparison = compare(run, other)
     if unlike := comparison.unlike:
         listed = ", ".join(unlike[:SHOWN]) + (
             f" and {len(unlike) - SHOWN} more entries" if len(unlike) > SHOWN else ""

@@ -25,6 +25,8 @@ def print_summary(summary: Summary) -> None:
     for label, value, unit, factor in _rows(summary):
         if math.isfinite(value):
             print(f"{label:<17} {value * factor:.4g} {unit}")
+    for warning in summary.warnings:
+        print(f"{'note':<17} {warning}")
 
 
 def print_comparison(comparison: Comparison) -> None:

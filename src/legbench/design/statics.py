@@ -76,10 +76,15 @@ def equilibrium(design: LegDesign, motor_pos: Floats, support: Support) -> Float
     moment = np.asarray(gravity_load(design, support).moment)
     joint_pos = np.array(motor_pos, dtype=np.float64)
     for share in np.linspace(0.1, 1.0, 10):
+        pull = share * moment
         for _ in range(20):
-            residual = stiffness * (motor_pos - joint_pos) - share * moment * np.sin(joint_pos)
-            slope = stiffness + share * moment * np.cos(joint_pos)
+            residual = stiffness * (motor_pos - joint_pos) - pull * np.sin(joint_pos)
+            slope = stiffness + pull * np.cos(joint_pos)
+            last = joint_pos
             joint_pos = joint_pos + residual / np.where(np.abs(slope) < 1e-9, 1e-9, slope)
+            if (joint_pos == last).all():
+                # Every further step would give the same numbers.
+                break
     residual = stiffness * (motor_pos - joint_pos) - moment * np.sin(joint_pos)
     slope = stiffness + moment * np.cos(joint_pos)
     if not (np.all(np.abs(residual) < 1e-9) and np.all(slope > 0.0)):

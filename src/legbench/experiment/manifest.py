@@ -4,7 +4,7 @@ import hashlib
 import platform
 import sys
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,9 +14,9 @@ from legbench.experiment.data import Experiment
 from legbench.experiment.tables import write_tables
 from legbench.guests import Registry, source_of
 from legbench.mjcf import xml_hash
-from legbench.phases import ControllerDescription
 from legbench.plant.start import PERIOD, Start
 from legbench.plants import PLANTS
+from legbench.recording.controller_table import controller_table
 
 RECORDED_PACKAGES: Final = {
     "mujoco-core": "mujoco",
@@ -81,9 +81,12 @@ def manifest_of(
     guests = list(guests_of(experiment))
     for guest in guests:
         tables[guest.what]["kind"] = guest.reference
-    entries = {
+    described = experiment.controller.describe()
+    return {
         "experiment": tables,
-        "controller": _described(experiment.controller.kind, experiment.controller.describe()),
+        "controller": controller_table(
+            experiment.controller.kind, experiment.controller.describe()
+        ),
         "plant": {"kind": experiment.plant.kind, **facts},
         "provenance": {
             "versions": {"python": platform.python_version(), **_versions()},
@@ -99,42 +102,6 @@ def manifest_of(
             "joint_pos": start.joint_pos.tolist(),
             "motor_pos": start.motor_pos.tolist(),
         },
-    }
-    return entries | _as_format_1(experiment, entries)
-
-
-def _as_format_1(experiment: Experiment, entries: Mapping[str, Any]) -> dict[str, Any]:
-    """The same where readers of format 1 look for it."""
-    tables, plant = entries["experiment"], entries["plant"]
-    settings = {"kind": experiment.controller.kind, **tables["controller"].get("settings", {})}
-    return {
-        **{key: tables[key] for key in ("design", "setup", "linkage", "ground", "numerics")},
-        "servo": asdict(experiment.servo),
-        "conventions": tables["conventions"],
-        "seed": tables["seed"],
-        "controller": settings | entries["controller"],
-        "mjcf_sha256": entries["provenance"]["mjcf_sha256"],
-        "versions": entries["provenance"]["versions"],
-        **{key: value for key, value in plant.items() if key != "kind"},
-        "plant": plant["kind"],
-    }
-
-
-def _described(kind: str, description: ControllerDescription) -> dict[str, Any]:
-    return {
-        "kind": kind,
-        "phases": [
-            {
-                "code": int(phase.code),
-                "name": phase.name,
-                "role": phase.role.value,
-                "doc": phase.doc,
-                "late": phase.late,
-            }
-            for phase in description.phases
-        ],
-        "signals": [asdict(signal) for signal in description.signals],
-        "counting": asdict(description.counting),
     }
 
 

@@ -1,5 +1,6 @@
 """What is measured from recordings alone, whatever plant made them."""
 
+from legbench.metrics.analysis import Analysis, analysed
 from legbench.metrics.budget import EnergyBudget, energy_budget
 from legbench.metrics.compare import Comparison, Differences, compare, differences
 from legbench.metrics.energy import Flows, energy_flows, energy_residual, loop_gap_max
@@ -8,10 +9,12 @@ from legbench.metrics.modal import Trajectory, trajectory
 from legbench.metrics.periods import Periods, find_periods
 from legbench.metrics.phases import Gait, Intervals, Jumps, find_gait
 from legbench.metrics.rating import alignment, deflection, rate, rate_phases
-from legbench.metrics.source import Recorded, Reference, Terms, terms_of
+from legbench.metrics.run_ratings import RatingLists, RunRatings
+from legbench.metrics.source import Recorded, Reference
 from legbench.metrics.summary import Summary, summarise
 
 __all__ = [
+    "Analysis",
     "Comparison",
     "Differences",
     "EnergyBudget",
@@ -21,12 +24,14 @@ __all__ = [
     "JumpFigures",
     "Jumps",
     "Periods",
+    "RatingLists",
     "Recorded",
     "Reference",
+    "RunRatings",
     "Summary",
-    "Terms",
     "Trajectory",
     "alignment",
+    "analysed",
     "compare",
     "deflection",
     "differences",
@@ -40,6 +45,5 @@ __all__ = [
     "rate",
     "rate_phases",
     "summarise",
-    "terms_of",
     "trajectory",
 ]

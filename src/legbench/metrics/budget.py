@@ -35,6 +35,8 @@ class EnergyBudget:
 
 def energy_budget(recording: Recorded, gait: Gait, flows: Flows) -> EnergyBudget:
     """Where the energy of each complete jump comes from and goes to (m,) [J]."""
+    if len(gait.jumps) == 0:
+        return EnergyBudget(**{name: np.zeros(0) for name in EnergyBudget.__dataclass_fields__})
     impact, stance = _stance_intervals(recording.time, gait)
     stop = stop_intervals(recording) & ~impact
     stance &= ~(impact | stop)

@@ -4,7 +4,6 @@ Differences are the other run's value minus the run's. Both are taken from plant
 the run's modal convention; a run of shorter period is interpolated to the rows of the other.
 """
 
-from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from math import isfinite, nan
 from typing import Any
@@ -13,14 +12,13 @@ import numpy as np
 
 from legbench.errors import RecordingError
 from legbench.kinematics import joint_to_modal
-from legbench.metrics.phases import Gait, find_gait
-from legbench.metrics.ratings import rate_run
-from legbench.metrics.source import Recorded, terms_of
+from legbench.metrics.analysis import Analysis, analysed
+from legbench.metrics.phases import Gait
+from legbench.metrics.source import Recorded
 from legbench.metrics.stance import MINIMUM_PHASE
+from legbench.recording.unlike import unlike
 from legbench.signals import Floats
-
-ASKED = ("design", "setup", "controller", "conventions", "servo", "ground")
-"""Tables of a manifest in which two runs of the same experiment agree."""
+from legbench.strict_json import null_for_nan
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,7 +49,7 @@ class Comparison:
     """Plant, linkage and design of the run."""
     other_name: str
     unlike: list[str]
-    """Entries of the manifest, other than plant and linkage, in which they differ."""
+    """Entries of the experiment, other than plant and linkage, in which they differ."""
     period: float
     """Of the rows compared [s]."""
     duration: float
@@ -81,26 +79,26 @@ class Comparison:
 
     def to_json(self) -> dict[str, Any]:
         """Fields by name for strict JSON: NaN is None, alone and in lists."""
-        return {name: _plain(value) for name, value in asdict(self).items()}
+        return null_for_nan(asdict(self))
 
 
 def compare(recording: Recorded, other: Recorded) -> Comparison:
     """Measure how `other` differs from a run; designs, setups and periods may be different.
 
     Raises:
-        FormatError: a manifest describes no leg, or an unknown setup or convention.
+        FormatError: one of them describes no leg, or an unknown setup or convention.
         RecordingError: they have no time in common.
     """
-    apart = differences(recording, other)
-    gaits = find_gait(recording), find_gait(other)
-    landing = _first_touchdown((recording, other), gaits)
+    run, other = analysed(recording), analysed(other)
+    apart = differences(run, other)
+    landing = first_touchdown(run, other)
     before = apart.time < landing
     return Comparison(
-        run=str(recording.path),
+        run=str(run.path),
         other=str(other.path),
-        run_name=name_of(recording.manifest),
-        other_name=name_of(other.manifest),
-        unlike=unlike(recording.manifest, other.manifest),
+        run_name=run.description.title,
+        other_name=other.description.title,
+        unlike=unlike(run.description, other.description),
         period=round(_period(apart.time), 9),
         duration=float(apart.time[-1] - apart.time[0]),
         first_touchdown=landing,
@@ -108,8 +106,8 @@ def compare(recording: Recorded, other: Recorded) -> Comparison:
         z2_before_touchdown=_largest(apart.z2[before]),
         joint_max=_largest(apart.joint),
         z2_max=_largest(apart.z2),
-        **_flights(*gaits),
-        **_ratings((recording, other), gaits),
+        **_flights(run.gait, other.gait),
+        **_ratings(run, other),
     )
 
 
@@ -117,7 +115,7 @@ def differences(recording: Recorded, other: Recorded) -> Differences:
     """Subtract a run's angles from another's at the rows of the longer period.
 
     Raises:
-        FormatError: a manifest without a leg or with an unknown convention.
+        FormatError: one of them describes no leg.
         RecordingError: they have no time in common.
     """
     runs = (recording, other)
@@ -132,7 +130,7 @@ def differences(recording: Recorded, other: Recorded) -> Differences:
         spans = " and ".join(f"{run.time[0]:g} to {run.time[-1]:g} s" for run in runs)
         raise RecordingError(f"{recording.path} and {other.path} have no time in common: {spans}")
     ours, theirs = (_at(time, run) for run in runs)
-    convention = terms_of(recording.manifest).convention
+    convention = recording.description.convention
     z2 = [joint_to_modal(joint, convention)[:, 1] for joint in (ours, theirs)]
     return Differences(time=time, joint=theirs - ours, z2=z2[1] - z2[0])
 
@@ -140,34 +138,17 @@ def differences(recording: Recorded, other: Recorded) -> Differences:
 def first_touchdown(recording: Recorded, other: Recorded) -> float:
     """When the first of two runs lands first [s]; NaN where none does.
 
+    A leg that is put down at its first rows does not land.
+
     Raises:
-        FormatError: a manifest without a leg.
+        FormatError: one of them describes no leg.
     """
-    return _first_touchdown((recording, other), (find_gait(recording), find_gait(other)))
-
-
-def name_of(manifest: Mapping[str, Any]) -> str:
-    """Plant, linkage and design of a run, as far as its manifest names them.
-
-    The analytic plant has no linkage: its equations are those of the ideal one.
-    """
-    plant = manifest.get("plant")
-    linkage = manifest.get("linkage", {}).get("kind") if plant != "analytic" else None
-    return " / ".join(filter(None, [plant, linkage, manifest.get("design", {}).get("name")]))
-
-
-def unlike(ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> list[str]:
-    """Dotted entries in which two manifests differ, of the tables that both have."""
-    both = [name for name in ASKED if name in ours and name in theirs]
-    return [entry for name in both for entry in _unlike(name, ours[name], theirs[name])]
-
-
-def _unlike(path: str, ours: Any, theirs: Any) -> Iterator[str]:
-    if isinstance(ours, Mapping) and isinstance(theirs, Mapping):
-        for key in sorted(ours.keys() | theirs.keys()):
-            yield from _unlike(f"{path}.{key}", ours.get(key), theirs.get(key))
-    elif ours != theirs:
-        yield path
+    first = np.inf
+    for run in (analysed(recording), analysed(other)):
+        landings = np.concatenate([run.gait.stance.start, run.gait.flight.end])
+        later = landings[landings > run.time[0] + MINIMUM_PHASE]
+        first = float(np.min(later, initial=first))
+    return first if isfinite(first) else nan
 
 
 def _period(time: Floats) -> float:
@@ -178,16 +159,6 @@ def _at(time: Floats, run: Recorded) -> Floats:
     """Joint angles of a run at some times, (n, 2) [rad]."""
     joint = run["joint_pos"]
     return np.stack([np.interp(time, run.time, angle) for angle in joint.T], axis=-1)
-
-
-def _first_touchdown(runs: tuple[Recorded, Recorded], gaits: tuple[Gait, Gait]) -> float:
-    """When the first of two runs lands [s]; a leg put down at its first rows does not land."""
-    first = np.inf
-    for run, gait in zip(runs, gaits, strict=True):
-        landings = np.concatenate([gait.stance.start, gait.flight.end])
-        later = landings[landings > run.time[0] + MINIMUM_PHASE]
-        first = float(np.min(later, initial=first))
-    return first if isfinite(first) else nan
 
 
 def _flights(ours: Gait, theirs: Gait) -> dict[str, Any]:
@@ -202,12 +173,13 @@ def _flights(ours: Gait, theirs: Gait) -> dict[str, Any]:
     }
 
 
-def _ratings(runs: tuple[Recorded, Recorded], gaits: tuple[Gait, Gait]) -> dict[str, Any]:
-    ours, theirs = (
-        rate_run(run, terms_of(run.manifest), gait) for run, gait in zip(runs, gaits, strict=True)
-    )
-    names = ("rating_stance", "rating_flight", "rating_periods")
-    return {name: _mean(theirs[name]) - _mean(ours[name]) for name in names}
+def _ratings(run: Analysis, other: Analysis) -> dict[str, Any]:
+    ours, theirs = run.ratings.chosen, other.ratings.chosen
+    return {
+        "rating_stance": _mean(theirs.stance) - _mean(ours.stance),
+        "rating_flight": _mean(theirs.flight) - _mean(ours.flight),
+        "rating_periods": _mean(theirs.periods) - _mean(ours.periods),
+    }
 
 
 def _mean(values: list[float]) -> float:
@@ -218,9 +190,3 @@ def _mean(values: list[float]) -> float:
 def _largest(values: Floats) -> float:
     known = np.abs(values[np.isfinite(values)])
     return float(known.max()) if known.size else nan
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, list):
-        return [_plain(entry) for entry in value]
-    return None if isinstance(value, float) and not isfinite(value) else value

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from legbench.design.leg import LegDesign
-from legbench.design.setup import SetupKind
+from legbench.metrics.changes import changes
 from legbench.metrics.rows import runs_of
-from legbench.metrics.source import Recorded, terms_of
+from legbench.metrics.source import Recorded
 from legbench.signals import Bools, Floats
 
 STOP_MARGIN = 0.02
@@ -37,16 +37,13 @@ def spring_energy(design: LegDesign, motor_pos: Floats, joint_pos: Floats) -> Fl
 
 
 def energy_flows(recording: Recorded) -> Flows:
-    """Split the change of energy over each interval into work, loss and the unexplained.
-
-    Raises:
-        FormatError: a manifest without a leg.
-    """
-    design = terms_of(recording.manifest).design
+    """Split the change of energy over each interval into work, loss and the unexplained."""
+    design = recording.description.design
     motor, joint = recording["motor_pos"], recording["joint_pos"]
     after_move = spring_energy(design, motor[1:], joint[:-1])
     work = after_move - spring_energy(design, motor[:-1], joint[:-1])
-    passive = np.diff(recording["energy"].sum(axis=-1))
+    energy = recording["energy"]
+    passive = np.diff(energy[:, 0] + energy[:, 1])
     passive += spring_energy(design, motor[1:], joint[1:]) - after_move
     power = np.square(recording["joint_vel"]) @ np.asarray(design.damping)
     loss = _integral(recording.time, power, motor)
@@ -64,7 +61,7 @@ def _integral(time: Floats, power: Floats, motor_pos: Floats) -> Floats:
     if len(power) < 4:
         return integral
     bend = power[:-3] - power[1:-2] - power[2:-1] + power[3:]
-    moved = np.any(motor_pos[1:] != motor_pos[:-1], axis=-1)
+    moved = changes(motor_pos)
     even = np.abs(np.diff(step)) < 1e-6 * step[1:]
     smooth = ~(moved[1:-1] | moved[2:]) & even[:-1] & even[1:]
     integral[1:-1] -= np.where(smooth, step[1:-1] * bend / 24.0, 0.0)
@@ -73,7 +70,7 @@ def _integral(time: Floats, power: Floats, motor_pos: Floats) -> Floats:
 
 def stop_intervals(recording: Recorded) -> Bools:
     """Intervals (n - 1,) in which a joint stop may act, one row spared around."""
-    limits = terms_of(recording.manifest).design.limits
+    limits = recording.description.design.limits
     joint = recording["joint_pos"]
     near = np.zeros(len(joint), dtype=bool)
     angles = ((joint[:, 0], limits.hip), (joint[:, 1] - joint[:, 0], limits.knee))
@@ -85,7 +82,7 @@ def stop_intervals(recording: Recorded) -> Bools:
 def clean_intervals(recording: Recorded) -> Bools:
     """Intervals (n - 1,) in which only springs, dampers and gravity act, one row spared around."""
     stops = stop_intervals(recording)
-    if terms_of(recording.manifest).setup is not SetupKind.JUMP:
+    if not recording.description.jumps:
         return ~stops
     return ~(stops | _around(np.asarray(recording["contact"], dtype=bool)))
 
@@ -107,11 +104,12 @@ def energy_residual(recording: Recorded, flows: Flows) -> float:
     kinetic = recording["energy"][:, 1]
     if not (clean.any() and np.all(np.isfinite(flows.unexplained))):
         return np.nan
-    runs = runs_of(clean)
-    stretches = zip(runs.first[runs.value], runs.stop[runs.value], strict=True)
-    worst = max(np.abs(np.cumsum(flows.unexplained[low:high])).max() for low, high in stretches)
+    runs, running = runs_of(clean), np.cumsum(flows.unexplained)
+    before = np.concatenate([[0.0], running])[runs.first]
+    drift = np.abs(running - np.repeat(before, runs.stop - runs.first))
+    worst = float(np.max(drift[clean]))
     peak = float(kinetic.max())
-    return float(worst) / peak if peak > 0.0 else np.nan
+    return worst / peak if peak > 0.0 else np.nan
 
 
 def loop_gap_max(recording: Recorded) -> float:

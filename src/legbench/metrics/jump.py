@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from legbench.kinematics import joint_to_polar
-from legbench.metrics.periods import first_action
 from legbench.metrics.phases import Gait
-from legbench.metrics.source import Recorded, terms_of
+from legbench.metrics.source import Recorded
 from legbench.signals import Floats
 
 LAST = 3
@@ -52,14 +51,11 @@ class JumpFigures:
     """Largest change of the upper apex from one jump to the next [m]: zero in a limit cycle."""
 
 
-def jump_figures(recording: Recorded, gait: Gait, settle: float = SETTLE) -> JumpFigures:
-    """Measure the complete jumps of a run.
-
-    Raises:
-        FormatError: a manifest without a leg.
-    """
+def jump_figures(
+    recording: Recorded, gait: Gait, action: int, settle: float = SETTLE
+) -> JumpFigures:
+    """Measure the complete jumps of a run whose first control action is in row `action`."""
     jumps = gait.jumps
-    action = first_action(recording)
     begin = recording.time[action] + settle if action < len(recording.time) else np.inf
     first = int(np.searchsorted(jumps.start, begin))
     limit_cycle = _limit_cycle(recording, gait, first)
@@ -69,9 +65,6 @@ def jump_figures(recording: Recorded, gait: Gait, settle: float = SETTLE) -> Jum
 def _last_jumps(recording: Recorded, gait: Gait) -> dict[str, float]:
     jumps, flight = gait.jumps, gait.flight
     trunk, foot = recording["trunk_pos"], recording["foot_pos"]
-    shank = terms_of(recording.manifest).design.shank.length
-    polar = joint_to_polar(recording["joint_pos"], shank)
-    ahead = polar[:, 1] * np.sin(polar[:, 0])
     flown = [
         slice(low, high)
         for low, high in zip(
@@ -88,8 +81,15 @@ def _last_jumps(recording: Recorded, gait: Gait) -> dict[str, float]:
         "foot_clearance": _largest([_largest(foot[rows, 1]) for rows in flown]),
         "drift": _range(trunk[whole, 0]),
         "foot_travel": _largest([_range(foot[rows, 0]) for rows in flown]),
-        "foot_travel_in_hip": _largest([_range(ahead[rows]) for rows in flown]),
+        "foot_travel_in_hip": _largest([_range(_ahead(recording, rows)) for rows in flown]),
     }
+
+
+def _ahead(recording: Recorded, rows: slice) -> Floats:
+    """Horizontal place of the foot tip, seen from the hip, in some rows (m,) [m]."""
+    shank = recording.description.design.shank.length
+    polar = joint_to_polar(recording["joint_pos"][rows], shank)
+    return polar[:, 1] * np.sin(polar[:, 0])
 
 
 def _limit_cycle(recording: Recorded, gait: Gait, first: int) -> dict[str, float]:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from legbench.kinematics import joint_to_modal, joint_to_polar, joint_to_polar_rate
-from legbench.metrics.source import Recorded, terms_of
+from legbench.metrics.source import Recorded
 from legbench.signals import Floats
 
 
@@ -23,19 +23,14 @@ class Trajectory:
     """(n, 2) [rad/s]."""
 
 
-def trajectory(recording: Recorded) -> Trajectory:
-    """Transform the measured joint angles and velocities of a run, eqs. (2) and (15).
-
-    Raises:
-        FormatError: a manifest without a leg or with an unknown convention.
-    """
-    terms = terms_of(recording.manifest)
-    joint_pos, joint_vel = recording["joint_pos"], recording["joint_vel"]
-    shank = terms.design.shank.length
+def trajectory(run: Recorded) -> Trajectory:
+    """Transform the measured joint angles and velocities of a run, eqs. (2) and (15)."""
+    joint_pos, joint_vel = run["joint_pos"], run["joint_vel"]
+    shank, convention = run.description.design.shank.length, run.description.convention
     return Trajectory(
-        time=recording.time,
+        time=run.time,
         polar=joint_to_polar(joint_pos, shank),
         polar_rate=joint_to_polar_rate(joint_pos, joint_vel, shank),
-        modal=joint_to_modal(joint_pos, terms.convention),
-        modal_rate=joint_to_modal(joint_vel, terms.convention),
+        modal=joint_to_modal(joint_pos, convention),
+        modal_rate=joint_to_modal(joint_vel, convention),
     )

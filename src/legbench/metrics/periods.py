@@ -7,20 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from legbench.metrics.modal import trajectory
+from legbench.metrics.modal import Trajectory
 from legbench.metrics.rows import runs_of
-from legbench.metrics.source import Recorded, terms_of
-from legbench.signals import Floats, Ints, Phase
+from legbench.phases import Counting
+from legbench.signals import Floats, Ints
 
 STILL = 0.02
 """Share of the fastest z2 rate below which the leg counts as still [-]: noise around zero makes
 no turning point. Far below the slowest oscillation that Fig. 5 counts, a tenth of dz2."""
-
-SMALLEST = 0.1
-"""Share of dz2 that an oscillation after a position jump must exceed to count [-] (Fig. 5)."""
-
-BANG_BANG_PERIODS = 20
-"""How many periods of a bang-bang run count (Fig. 5)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,32 +58,19 @@ def turning_points(time: Floats, rate: Floats) -> Floats:
     return np.array(points, dtype=np.float64)
 
 
-def first_action(recording: Recorded) -> int:
-    """Row of the first control action: the first whose phase is not `Phase.REST`; n if none."""
-    acting = np.flatnonzero(recording["phase"] != Phase.REST)
-    return int(acting[0]) if len(acting) else len(recording.time)
+def find_periods(moved: Trajectory, first: int, counting: Counting) -> Periods:
+    """Oscillation periods of a run that count, from its first control action on.
 
-
-def find_periods(recording: Recorded) -> Periods:
-    """Periods of a run from its first control action on, as many as Fig. 5 counts.
-
-    After a position jump the leading periods whose amplitude exceeds `SMALLEST` of dz2 count,
-    under a bang-bang controller the first `BANG_BANG_PERIODS`, else all.
-
-    Raises:
-        FormatError: a manifest without a leg or with an unknown convention.
+    Args:
+        moved: how the run moved.
+        first: row of its first control action.
+        counting: which of the leading periods count.
     """
-    terms = terms_of(recording.manifest)
-    start = first_action(recording)
-    time, moved = recording.time, trajectory(recording)
-    points = turning_points(time[start:], moved.modal_rate[start:, 1])
-    periods = _between(time, moved.modal[:, 1], points)
-    if terms.controller == "bang-bang":
-        return _leading(periods, BANG_BANG_PERIODS)
-    if terms.controller == "position-jump":
-        small = np.flatnonzero(periods.amplitude <= SMALLEST * terms.deflection)
-        return _leading(periods, int(small[0]) if len(small) else len(periods))
-    return periods
+    points = turning_points(moved.time[first:], moved.modal_rate[first:, 1])
+    periods = _between(moved.time, moved.modal[:, 1], points)
+    small = np.flatnonzero(periods.amplitude <= counting.smallest)
+    count = int(small[0]) if len(small) else len(periods)
+    return _leading(periods, count if counting.most is None else min(count, counting.most))
 
 
 def _between(time: Floats, radial: Floats, points: Floats) -> Periods:

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from legbench.kinematics import leg_points
+from legbench.metrics.roles import FLIGHT, STANCE, UNKNOWN
 from legbench.metrics.rows import extreme, runs_of, zeros_before
-from legbench.metrics.source import Recorded, terms_of
-from legbench.metrics.stance import FLIGHT, STANCE, UNKNOWN, states_of
+from legbench.metrics.source import Recorded
 from legbench.signals import Floats, Ints
 
 
@@ -70,13 +70,8 @@ class Gait:
     jumps: Jumps
 
 
-def find_gait(recording: Recorded) -> Gait:
-    """Phases and jumps of a run, from its truth when it has any, else from its phase column.
-
-    Raises:
-        FormatError: a manifest without a leg.
-    """
-    states = states_of(recording)
+def find_gait(recording: Recorded, states: Ints) -> Gait:
+    """Phases and jumps of a run, from the state of the foot in every row (n,)."""
     runs = runs_of(states)
     known = runs.value != UNKNOWN
     complete = np.zeros(len(known), dtype=bool)
@@ -93,7 +88,7 @@ def _trunk_height(recording: Recorded, states: Ints) -> Floats:
     """Hip above the ground (n,) [m]; a real leg only knows it while its foot stands there."""
     if recording.has_truth:
         return recording["trunk_pos"][:, 1]
-    lengths = terms_of(recording.manifest).design.lengths
+    lengths = recording.description.design.lengths
     above_foot = -leg_points(recording["joint_pos"], lengths)[:, 3, 1]
     return np.where(states == STANCE, above_foot, np.nan)
 

@@ -6,9 +6,11 @@ from legbench.design.leg import LegDesign
 from legbench.design.statics import Support, equilibrium, gravity_load
 from legbench.errors import DesignError
 from legbench.kinematics import MODE_RADIAL
-from legbench.metrics.source import Recorded, Reference, terms_of
+from legbench.metrics.changes import changes
+from legbench.metrics.source import Recorded, Reference
 from legbench.signals import Floats, Ints
 
+RADIAL_SIZE = float(np.linalg.norm(MODE_RADIAL))
 AT_REST = 1e-9
 """Deflection below which a row has no direction and is skipped [rad]: far below any encoder's
 count, far above rounding."""
@@ -23,30 +25,48 @@ def alignment(deflection: Floats) -> Floats:
 
     Source: the summand of eq. (14).
     """
-    size = np.linalg.norm(deflection, axis=-1)
-    along = np.abs(deflection @ MODE_RADIAL) / np.linalg.norm(MODE_RADIAL)
+    size = np.sqrt(np.square(deflection[..., 0]) + np.square(deflection[..., 1]))
+    along = np.abs(deflection @ MODE_RADIAL) / RADIAL_SIZE
     moved = size > AT_REST
     return np.where(moved, along / np.where(moved, size, 1.0), np.nan)
 
 
 def rate(deflection: Floats) -> float:
     """P^r of the rows (n, 2), eq. (14); rows without direction do not count, NaN if none does."""
-    values = alignment(deflection)
-    values = values[np.isfinite(values)]
-    return float(values.mean()) if len(values) else float("nan")
+    return _mean(alignment(deflection))
+
+
+def _mean(aligned: Floats) -> float:
+    known = aligned[np.isfinite(aligned)]
+    return float(known.mean()) if len(known) else float("nan")
 
 
 def link_equilibrium(design: LegDesign, motor_pos: Floats, support: Support) -> Floats:
     """`statics.equilibrium` of many motor positions (n, 2); NaN where none is stable [rad].
 
-    Solved on the positions rounded to `GRID` that occur, then refined row by row.
+    Solved once for rows over which the motors stand still, on the positions rounded to `GRID` that
+    occur, then refined position by position.
     """
-    stiffness = np.asarray(design.stiffness)
-    moment = np.asarray(gravity_load(design, support).moment)
     if support is Support.NONE or len(motor_pos) == 0:
         return motor_pos.copy()
-    cells, cell = np.unique(np.round(motor_pos / GRID), axis=0, return_inverse=True)
-    joint_pos = _solve(design, GRID * cells, support)[cell.reshape(-1)]
+    known = np.isfinite(motor_pos[:, 0]) & np.isfinite(motor_pos[:, 1])
+    begins = np.concatenate([[True], changes(motor_pos)]) & known
+    held = np.full(motor_pos.shape, np.nan)
+    if known.any():
+        solved = _refined(design, motor_pos[begins], support)
+        held[known] = solved[np.cumsum(begins)[known] - 1]
+    return held
+
+
+def _refined(design: LegDesign, motor_pos: Floats, support: Support) -> Floats:
+    """Equilibria of distinct, finite motor positions (m, 2), NaN where none is stable [rad]."""
+    stiffness = np.asarray(design.stiffness)
+    moment = np.asarray(gravity_load(design, support).moment)
+    cells = np.round(motor_pos / GRID)
+    # One key a cell, since whole rows are slow to sort: angles stay far below a million cells.
+    keys = cells[:, 0] * 2.0**26 + cells[:, 1]
+    _, place, cell = np.unique(keys, return_index=True, return_inverse=True)
+    joint_pos = _solve(design, GRID * cells[place], support)[cell]
     for _ in range(4):
         residual = stiffness * (motor_pos - joint_pos) - moment * np.sin(joint_pos)
         slope = stiffness + moment * np.cos(joint_pos)
@@ -89,16 +109,12 @@ def deflection(
 def rate_phases(
     recording: Recorded, support: Support, reference: Reference, first: Ints, stop: Ints
 ) -> list[float]:
-    """P^r of each stretch of rows [first, stop) of a run, with what carries the leg in them.
-
-    Raises:
-        FormatError: a manifest without a leg.
-    """
-    design = terms_of(recording.manifest).design
+    """P^r of each stretch of rows [first, stop) of a run, with what carries the leg in them."""
+    design = recording.description.design
     rows = [np.arange(low, high) for low, high in zip(first, stop, strict=True)]
     if not rows:
         return []
     chosen = np.concatenate(rows)
     joint_pos, motor_pos = recording["joint_pos"][chosen], recording["motor_pos"][chosen]
-    deflected = deflection(design, joint_pos, motor_pos, support, reference)
-    return [rate(part) for part in np.split(deflected, np.cumsum(stop - first)[:-1])]
+    aligned = alignment(deflection(design, joint_pos, motor_pos, support, reference))
+    return [_mean(part) for part in np.split(aligned, np.cumsum(stop - first)[:-1])]

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from legbench.design.setup import SetupKind
+from legbench.metrics.roles import FLIGHT, STANCE, UNKNOWN, states_by_controller
 from legbench.metrics.rows import runs_of, without_short
-from legbench.metrics.source import Recorded, terms_of
-from legbench.signals import Bools, Floats, Ints, Phase
+from legbench.metrics.source import Recorded
+from legbench.signals import Bools, Floats, Ints
 
 MINIMUM_PHASE = 0.015
 """Shortest stance or flight [s]: contact chatters for a few milliseconds around both events, and
@@ -14,8 +14,6 @@ the shortest real phase of a leg this size lasts several times longer."""
 LOOK_BACK = 0.005
 """How long before a contact the foot must have been higher to be on its way down [s]: longer than
 the impact itself, much shorter than a flight."""
-
-FLIGHT, STANCE, UNKNOWN = 0, 1, -1
 
 
 def loaded_by_contact(
@@ -36,35 +34,15 @@ def loaded_by_contact(
     return loaded
 
 
-def states_by_controller(recording: Recorded) -> Ints:
-    """STANCE, FLIGHT or UNKNOWN, row by row, from the jump controller's phases (n,).
-
-    The controller calls a load ground once it has lasted for its `touchdown_time`, which the
-    manifest tells; the stance began when the load did.
-    """
-    phase, time = recording["phase"], recording.time
-    states = np.full(len(phase), UNKNOWN)
-    states[np.isin(phase, [Phase.COMPRESS, Phase.PUSH])] = STANCE
-    states[np.isin(phase, [Phase.FLIGHT, Phase.RELEASE])] = FLIGHT
-    lasted = float(recording.manifest.get("controller", {}).get("touchdown_time", 0.0))
-    told = np.flatnonzero((phase[1:] == Phase.COMPRESS) & (phase[:-1] == Phase.FLIGHT)) + 1
-    for row, began in zip(told, np.searchsorted(time, time[told] - lasted), strict=True):
-        states[began:row][phase[began:row] == Phase.FLIGHT] = STANCE
-    return states
-
-
-def states_of(recording: Recorded) -> Ints:
+def states_of(run: Recorded) -> Ints:
     """STANCE, FLIGHT or UNKNOWN of every row (n,), from truth when there is any.
 
     A leg in a fixed setup does neither: all rows are UNKNOWN.
-
-    Raises:
-        FormatError: a manifest without a leg or with an unknown setup.
     """
-    if terms_of(recording.manifest).setup is not SetupKind.JUMP:
-        return np.full(len(recording.time), UNKNOWN)
-    if not recording.has_truth:
-        return states_by_controller(recording)
-    contact = np.asarray(recording["contact"], dtype=bool)
-    loaded = loaded_by_contact(recording.time, contact, recording["foot_pos"][:, 1])
+    if not run.description.jumps:
+        return np.full(len(run.time), UNKNOWN)
+    if not run.has_truth:
+        return states_by_controller(run)
+    contact = np.asarray(run["contact"], dtype=bool)
+    loaded = loaded_by_contact(run.time, contact, run["foot_pos"][:, 1])
     return np.where(loaded, STANCE, FLIGHT)

@@ -1,28 +1,24 @@
 """One run in numbers: what tables, reports and searches read."""
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
 
-from legbench.design.setup import SetupKind
-from legbench.metrics.budget import energy_budget
-from legbench.metrics.energy import energy_flows, energy_residual, loop_gap_max
-from legbench.metrics.jump import JumpFigures, jump_figures
-from legbench.metrics.periods import first_action
-from legbench.metrics.phases import Gait, find_gait
-from legbench.metrics.ratings import rate_run
-from legbench.metrics.source import Recorded, Terms, terms_of
+from legbench.metrics.analysis import Analysis, analysed
+from legbench.metrics.caveats import warnings_of
+from legbench.metrics.energy import energy_residual, loop_gap_max
+from legbench.metrics.source import Recorded
+from legbench.strict_json import null_for_nan
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Summary:
     """Figures of one run; NaN where the run, its setup or a missing truth does not show them.
 
-    Ratings hold every complete phase or period, in order; the lists without a suffix use the
-    reference of the manifest's `conventions.rating_reference`, the motor unless it says
-    otherwise.
+    RatingLists hold every complete phase or period, in order; the lists without a suffix use the
+    reference that the run's conventions ask for, the motor unless they say otherwise.
     """
 
     run: str
@@ -30,7 +26,7 @@ class Summary:
     setup: str
     controller: str
     status: str | None
-    """How the run ended, as its manifest says."""
+    """How the run ended, as it says itself."""
     cause: str | None
     """Why it ended early."""
     duration: float
@@ -91,63 +87,71 @@ class Summary:
     other_loss: float
     """[J]"""
 
+    warnings: list[str] = field(default_factory=list)
+    """What is not measured although one might expect it, and why."""
+
     def to_json(self) -> dict[str, Any]:
         """Fields by name for strict JSON: NaN is None, alone and in lists."""
-        return {name: _plain(value) for name, value in asdict(self).items()}
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, list):
-        return [_plain(entry) for entry in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
+        return null_for_nan(asdict(self))
 
 
 def summarise(recording: Recorded) -> Summary:
     """Measure a run of any setup, whole, torn or empty.
 
     Raises:
-        FormatError: the manifest describes no leg, or an unknown setup or convention.
+        FormatError: the run describes no leg, or an unknown setup or convention.
     """
-    terms = terms_of(recording.manifest)
-    gait = find_gait(recording)
-    figures = jump_figures(recording, gait)
+    run = analysed(recording)
+    description, ratings = run.description, run.ratings
+    chosen, equilibrium = ratings.chosen, ratings.equilibrium
+    periods = [] if description.jumps else (run.periods.end - run.periods.start).tolist()
     return Summary(
-        run=str(recording.path),
-        setup=terms.setup.value,
-        controller=terms.controller,
-        status=recording.manifest.get("status"),
-        cause=recording.manifest.get("cause"),
-        rating_reference=terms.reference.value,
-        loop_gap_max=loop_gap_max(recording),
-        **_clock(recording),
-        **rate_run(recording, terms, gait),
-        **_jumping(recording, terms, figures),
-        **_energy(recording, gait, figures.first),
+        run=str(run.path),
+        setup=description.setup.kind.value,
+        controller=description.controller,
+        status=description.status,
+        cause=description.cause,
+        rating_reference=description.reference.value,
+        rating_stance=chosen.stance,
+        rating_flight=chosen.flight,
+        rating_periods=chosen.periods,
+        rating_stance_equilibrium=equilibrium.stance,
+        rating_flight_equilibrium=equilibrium.flight,
+        rating_periods_equilibrium=equilibrium.periods,
+        periods=periods,
+        loop_gap_max=loop_gap_max(run),
+        warnings=warnings_of(run),
+        **_clock(run),
+        **_jumping(run),
+        **_energy(run),
     )
 
 
-def _clock(recording: Recorded) -> dict[str, Any]:
-    time, cycles = recording.time, recording["cycle_us"]
+def _clock(run: Analysis) -> dict[str, Any]:
+    time, cycles = run.time, run["cycle_us"]
     duration = float(time[-1] - time[0]) if len(time) else math.nan
     wall = float(np.sum(cycles)) / 1e6
     return {"duration": duration, "real_time_factor": duration / wall if wall > 0.0 else math.nan}
 
 
-def _jumping(recording: Recorded, terms: Terms, figures: JumpFigures) -> dict[str, Any]:
-    values = asdict(figures)
+def _jumping(run: Analysis) -> dict[str, Any]:
+    values = asdict(run.jump_figures)
     values["jumps"] = values.pop("count")
-    if terms.setup is not SetupKind.JUMP:
-        moved = recording["joint_pos"][first_action(recording) :].sum(axis=-1)
+    if not run.description.jumps:
+        moved = run["joint_pos"][run.first_action :].sum(axis=-1)
         values["polar_max"] = 0.5 * float(np.max(np.abs(moved))) if len(moved) else math.nan
     return values
 
 
-def _energy(recording: Recorded, gait: Gait, first: int) -> dict[str, Any]:
-    flows = energy_flows(recording)
-    budget = energy_budget(recording, gait, flows)
-    losses = ("motor_work", "damper_loss", "impact_loss", "stop_loss", "contact_loss", "other_loss")
-    means = {name: getattr(budget, name)[first:] for name in losses}
+def _energy(run: Analysis) -> dict[str, Any]:
+    budget, first = run.budget, run.jump_figures.first
+    means = {
+        "motor_work": budget.motor_work[first:],
+        "damper_loss": budget.damper_loss[first:],
+        "impact_loss": budget.impact_loss[first:],
+        "stop_loss": budget.stop_loss[first:],
+        "contact_loss": budget.contact_loss[first:],
+        "other_loss": budget.other_loss[first:],
+    }
     values = {name: float(np.mean(each)) if len(each) else math.nan for name, each in means.items()}
-    return {"energy_residual": energy_residual(recording, flows), **values}
+    return {"energy_residual": energy_residual(run, run.flows), **values}

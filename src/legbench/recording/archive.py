@@ -11,7 +11,7 @@ from pyarrow import parquet
 from legbench.errors import RecordingError
 from legbench.recording.files import put_in_place, reason
 from legbench.recording.layout import ARCHIVE
-from legbench.recording.stream import WholeBatches, schema_for
+from legbench.recording.stream import WholeBatches, carrying, schema_for
 
 GROUP_ROWS: Final = 65_536
 """Rows compressed together: 65 s at 1 kHz, 15 MB of memory."""
@@ -32,9 +32,10 @@ def write_archive(run: Path, batches: WholeBatches, manifest: Mapping[str, Any])
         RecordingError: it could not be written or read back; an older archive is untouched.
     """
     draft = run / f".{ARCHIVE}.draft"
-    schema = schema_for(manifest)
-    if batches.schema is not None:
-        schema = batches.schema.with_metadata(schema.metadata)
+    if batches.schema is None:
+        schema = schema_for(manifest)
+    else:
+        schema = batches.schema.with_metadata(carrying(manifest))
     try:
         written = _write(draft, batches, schema)
         found = count_rows(draft)

@@ -10,8 +10,7 @@ import numpy as np
 import pyarrow as pa
 
 from legbench.recording.files import Appender
-from legbench.recording.layout import TIME
-from legbench.recording.rows import BATCH_ROWS, PLACES, Block
+from legbench.recording.rows import BATCH_ROWS, ONE_LEG_ROWS, Block, RowLayout
 from legbench.recording.stream import END_MARK, BatchEncoder, encode_schema
 
 POOL: Final = 20
@@ -37,20 +36,24 @@ class Disk:
         error: the first failure, after which no more rows are written.
     """
 
-    def __init__(self, samples: Appender, events: Appender, schema: pa.Schema) -> None:
+    def __init__(
+        self, samples: Appender, events: Appender, schema: pa.Schema, rows: RowLayout = ONE_LEG_ROWS
+    ) -> None:
         """Write the opening of the stream and start the thread; raises OSError."""
         self.rows = 0
         self.first = self.last = 0.0
         self.error: Exception | None = None
         self._samples, self._events, self._schema = samples, events, schema
+        self._rows = rows
         self._queue: SimpleQueue[Block | bytes | None] = SimpleQueue()
-        self._spare: deque[Block] = deque(Block() for _ in range(POOL))
+        self._spare: deque[Block] = deque(Block(rows) for _ in range(POOL))
         self._handed = self._returned = 0
         self._ended = False
         self._synced = time.monotonic()
         # The first call is slow: not in the loop.
-        self._encoder = BatchEncoder(np.zeros((len(PLACES), BATCH_ROWS)), schema)
-        self._encoder.encode(np.zeros((len(PLACES), BATCH_ROWS)))
+        nothing = np.zeros((len(schema), BATCH_ROWS))
+        self._encoder = BatchEncoder(nothing, schema)
+        self._encoder.encode(nothing)
         samples.append(encode_schema(schema))
         self._thread = threading.Thread(target=self._work, name="recording", daemon=True)
         self._thread.start()
@@ -64,7 +67,7 @@ class Disk:
         """Take a block to write and give an empty one; never waits."""
         self._handed += 1
         self._queue.put(block)
-        return self._spare.popleft() if self._spare else Block()
+        return self._spare.popleft() if self._spare else Block(self._rows)
 
     def event(self, line: bytes) -> None:
         """Take one whole line for the events; never waits."""
@@ -107,7 +110,7 @@ class Disk:
         if not self._encoder.fits(columns):
             self._encoder = BatchEncoder(columns, self._schema)
         self._samples.append(self._encoder.encode(columns))
-        times = block.values[: block.count, PLACES[TIME]]
+        times = block.values[: block.count, self._rows.time]
         if self.rows == 0:
             self.first = float(times[0])
         self.last = float(times[-1])

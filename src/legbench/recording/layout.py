@@ -1,11 +1,9 @@
-"""The names inside a run folder and the columns of its samples."""
+"""The names inside a run folder."""
 
 import re
 from typing import Final
 
-from legbench.signals import SIGNALS
-
-FORMAT: Final = 1
+FORMAT: Final = 2
 """Rises when an older reader would misread a run; a new column alone does not raise it."""
 
 RUN: Final = "run.json"
@@ -16,17 +14,7 @@ TORN: Final = ".torn"
 """Suffix under which `recover` keeps a file that had something unreadable in it."""
 
 TIME: Final = "t_ns"
-"""Plant time since reset, rounded to the nanosecond (int64) [ns]."""
-
-INT8_COLUMNS: Final = frozenset({"phase", "contact"})
-"""Columns stored as int8; `contact` is null where the plant does not know it."""
-
-COLUMNS: Final[tuple[str, ...]] = tuple(column for signal in SIGNALS for column in signal.columns)
-"""Columns of the samples after `t_ns`, in their order on disk; float64 but `INT8_COLUMNS`."""
-
-UNITS: Final[dict[str, str]] = {TIME: "ns"} | {
-    column: signal.unit for signal in SIGNALS for column in signal.columns
-}
+"""Column of the plant time since reset, rounded to the nanosecond (int64) [ns]."""
 
 RUNNING: Final = "running"
 COMPLETE: Final = "complete"

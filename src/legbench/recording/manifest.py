@@ -12,13 +12,14 @@ import numpy as np
 from legbench import __version__
 from legbench.errors import ConfigError, FormatError, RecordingError
 from legbench.guests import load_text
+from legbench.recording.description import layout_of
 from legbench.recording.files import reason, write_whole
-from legbench.recording.layout import FORMAT, RUN, RUNNING, UNITS
+from legbench.recording.layout import FORMAT, RUN, RUNNING
 
 Manifest = dict[str, Any]
 
 OWN_KEYS = ("format", "legbench", "id", "created", "status", "cause", "units", "rows", "duration")
-"""Keys that the recording fills in itself; `versions` is merged with the caller's."""
+"""Keys that the recording fills in itself; to the versions of provenance it adds some."""
 
 
 def plain(value: Any) -> Any:
@@ -45,16 +46,19 @@ def new_manifest(given: Mapping[str, Any], *, id: str, created: str) -> Manifest
 
     Raises:
         ConfigError: the caller's part names a key that the recording fills in itself.
+        FormatError: it declares signals that no run can have.
     """
     taken = [key for key in OWN_KEYS if key in given]
     if taken:
         raise ConfigError(f"the manifest's {', '.join(taken)} are filled in by the recording")
-    told = dict(given.get("versions", {}))
-    versions = {name: _version(name) for name in ("numpy", "pyarrow") if name not in told}
-    versions = {"python": platform.python_version()} | versions | told
+    told = dict(given.get("provenance", {}))
+    named = dict(told.get("versions", {}))
+    versions = {name: _version(name) for name in ("numpy", "pyarrow") if name not in named}
+    provenance = {**told, "versions": {"python": platform.python_version()} | versions | named}
     head = {"format": FORMAT, "legbench": __version__, "id": id, "created": created}
     end = {"status": RUNNING, "cause": None}
-    return plain({**head, **end, **given, "versions": versions, "units": UNITS})
+    said = {**given, "provenance": provenance, "units": layout_of(given).units}
+    return plain({**head, **end, **said})
 
 
 def _version(package: str) -> str:

@@ -8,14 +8,16 @@ from types import MappingProxyType
 import numpy as np
 import pyarrow as pa
 
-from legbench.errors import LegbenchError, RecordingError
+from legbench.errors import FormatError, LegbenchError, RecordingError
 from legbench.recording.archive import read_archive
+from legbench.recording.columns import ONE_LEG, Layout
+from legbench.recording.description import RunDescription, describe
 from legbench.recording.events import Event, read_events
 from legbench.recording.files import reason
 from legbench.recording.layout import ARCHIVE, COMPLETE, EVENTS, RUN, STREAM, TIME
 from legbench.recording.manifest import Manifest, read_manifest
 from legbench.recording.stream import WholeBatches, carried_manifest, schema_for
-from legbench.signals import SIGNALS, Floats
+from legbench.signals import Floats
 
 
 class UnknownSignalError(LegbenchError, KeyError):
@@ -32,7 +34,10 @@ class Recording:
     path: Path
     """The run folder."""
     manifest: Manifest
-    """`run.json`, or the copy in the samples as of the start of the run."""
+    """`run.json` as it is written, or the copy in the samples as of the start of the run; for
+    provenance, since `description` says what it means."""
+    described: RunDescription | FormatError
+    """What the run says of itself, or why that cannot be understood: its rows can be read still."""
     time: Floats
     """Plant time since reset (n,) [s]."""
     columns: Mapping[str, np.ndarray]
@@ -53,7 +58,7 @@ class Recording:
         """
         if name in ("t", "time"):
             return self.time.copy()
-        columns = {signal.name: signal.columns for signal in SIGNALS}.get(name, (name,))
+        columns = self._columns_of(name)
         if any(column not in self.columns for column in columns):
             known = ", ".join(self.signals)
             raise UnknownSignalError(f"{self.path.name} has no signal {name!r}; it has {known}")
@@ -67,8 +72,25 @@ class Recording:
     @property
     def signals(self) -> tuple[str, ...]:
         """Names of the signals that this run has, "t" first."""
-        names = [s.name for s in SIGNALS if all(column in self.columns for column in s.columns)]
-        return ("t", *names)
+        names = [signal.name for signal in self.layout.signals]
+        there = [name for name in names if all(c in self.columns for c in self._columns_of(name))]
+        return ("t", *there)
+
+    @property
+    def description(self) -> RunDescription:
+        """What the run says of itself.
+
+        Raises:
+            FormatError: its manifest describes no leg, or cannot be understood.
+        """
+        if isinstance(self.described, FormatError):
+            raise self.described
+        return self.described
+
+    @property
+    def layout(self) -> Layout:
+        """Columns that the run declares."""
+        return ONE_LEG if isinstance(self.described, FormatError) else self.described.layout
 
     @property
     def complete(self) -> bool:
@@ -80,6 +102,11 @@ class Recording:
         """Whether every row has what only a simulation knows (False for an empty run)."""
         contact = self.columns.get("contact")
         return contact is not None and len(contact) > 0 and bool(np.all(contact >= 0))
+
+    def _columns_of(self, name: str) -> tuple[str, ...]:
+        """Columns of a signal of one leg; the name itself for anything else."""
+        signals = {signal.name: signal for signal in self.layout.signals}
+        return self.layout.columns_of(signals[name])[0] if name in signals else (name,)
 
 
 def load(path: Path) -> Recording:
@@ -106,11 +133,20 @@ def load(path: Path) -> Recording:
     return Recording(
         path=run,
         manifest=manifest,
+        described=described(manifest, run),
         time=columns[TIME] / 1e9,
         columns=MappingProxyType(columns),
         events=tuple(events),
         torn=torn,
     )
+
+
+def described(manifest: Manifest, run: Path) -> RunDescription | FormatError:
+    """Parse the manifest of the folder `run`, or return why it cannot be."""
+    try:
+        return describe(manifest, run.name)
+    except FormatError as error:
+        return error
 
 
 def run_folder(path: Path) -> Path:

@@ -13,26 +13,32 @@ import pyarrow as pa
 from pyarrow import ipc
 
 from legbench.errors import RecordingError
-from legbench.recording.layout import COLUMNS, INT8_COLUMNS, RUN, TIME
+from legbench.recording.description import layout_of
+from legbench.recording.layout import RUN, TIME
 from legbench.recording.manifest import Manifest, parse_manifest, to_json
 from legbench.signals import Floats
 
-INT8S: Final = [1 + COLUMNS.index(name) for name in INT8_COLUMNS]
-FLOAT_COLUMNS: Final = [name for name in COLUMNS if name not in INT8_COLUMNS]
-FLOATS: Final = [1 + COLUMNS.index(name) for name in FLOAT_COLUMNS]
-"""Places of the columns in a batch, after time."""
 END_MARK: Final = b"\xff\xff\xff\xff\x00\x00\x00\x00"
 MANIFEST_KEY: Final = b"legbench"
 """Key of the schema's metadata under which the samples carry their manifest."""
 
 
 def schema_for(manifest: Mapping[str, Any]) -> pa.Schema:
-    """Return the schema of the samples, with a copy of the manifest."""
+    """Return the schema of the samples, with a copy of the manifest.
+
+    Raises:
+        FormatError: the manifest declares signals that no run can have.
+    """
     fields = [pa.field(TIME, pa.int64(), nullable=False)]
-    for name in COLUMNS:
-        kind = pa.int8() if name in INT8_COLUMNS else pa.float64()
-        fields.append(pa.field(name, kind, nullable=name == "contact"))
-    return pa.schema(fields, metadata={MANIFEST_KEY: to_json(manifest)})
+    for column in layout_of(manifest).columns:
+        kind = pa.int8() if column.small else pa.float64()
+        fields.append(pa.field(column.name, kind, nullable=column.signal.name == "contact"))
+    return pa.schema(fields, metadata=carrying(manifest))
+
+
+def carrying(manifest: Mapping[str, Any]) -> dict[bytes, bytes]:
+    """Return the metadata with which samples carry a copy of their manifest."""
+    return {MANIFEST_KEY: to_json(manifest)}
 
 
 def carried_manifest(schema: pa.Schema | None, run: Path) -> Manifest:
@@ -64,30 +70,35 @@ class BatchEncoder:
     def __init__(self, like: Floats, schema: pa.Schema) -> None:
         """Prepare for columns like these, with a schema as `schema_for` returns it.
 
-        Columns are (1 + len(COLUMNS), rows), time first in seconds; NaN is null in an int8 column.
+        Columns are (fields of the schema, rows), time first in seconds; NaN is null in an int8
+        column.
         """
+        self._wide = [n for n, field in enumerate(schema) if field.type == pa.float64()]
+        self._narrow = [n for n, field in enumerate(schema) if field.type == pa.int8()]
         self._time = np.empty(like.shape[1], dtype=np.int64)
-        self._floats, self._known = np.empty_like(like[FLOATS]), ~np.isnan(like[INT8S])
+        self._floats = np.empty_like(like[self._wide])
+        self._known = ~np.isnan(like[self._narrow])
         self._small = np.empty(self._known.shape, dtype=np.int8)
-        arrays = {TIME: _array(pa.int64(), self._time)}
-        for name, place in zip(FLOAT_COLUMNS, self._floats, strict=True):
-            arrays[name] = _array(pa.float64(), place)
-        for name, place, known in zip(INT8_COLUMNS, self._small, self._known, strict=True):
-            arrays[name] = _array(pa.int8(), place, None if known.all() else known)
-        ordered = [arrays[name] for name in schema.names]
+        arrays = {0: _array(pa.int64(), self._time)}
+        for place, values in zip(self._wide, self._floats, strict=True):
+            arrays[place] = _array(pa.float64(), values)
+        for place, values, known in zip(self._narrow, self._small, self._known, strict=True):
+            arrays[place] = _array(pa.int8(), values, None if known.all() else known)
+        ordered = [arrays[place] for place in range(len(schema))]
         self._batch = pa.RecordBatch.from_arrays(ordered, schema=schema)
 
     def fits(self, columns: Floats) -> bool:
         """Whether columns are like those that it was prepared for."""
         return columns.shape[1] == len(self._time) and np.array_equal(
-            ~np.isnan(columns[INT8S]), self._known
+            ~np.isnan(columns[self._narrow]), self._known
         )
 
     def encode(self, columns: Floats) -> memoryview:
         """Return the message of a batch that fits."""
         np.rint(columns[0] * 1e9, out=self._time, casting="unsafe")
-        self._floats[:] = columns[FLOATS]
-        np.copyto(self._small, np.where(self._known, columns[INT8S], -1.0), casting="unsafe")
+        self._floats[:] = columns[self._wide]
+        small = np.where(self._known, columns[self._narrow], -1.0)
+        np.copyto(self._small, small, casting="unsafe")
         return memoryview(self._batch.serialize())
 
 

@@ -10,6 +10,7 @@ from typing import Any, Self, final
 
 from legbench.errors import ConfigError, PlantFault, RecordingError
 from legbench.recording.archive import write_archive
+from legbench.recording.description import layout_of
 from legbench.recording.disk import Disk
 from legbench.recording.events import encode_event
 from legbench.recording.files import append_to, lock, reason
@@ -23,7 +24,7 @@ from legbench.recording.layout import (
     file_safe,
 )
 from legbench.recording.manifest import Manifest, new_manifest, write_manifest
-from legbench.recording.rows import BATCH_ROWS, Block
+from legbench.recording.rows import BATCH_ROWS, Block, RowLayout
 from legbench.recording.stream import WholeBatches, schema_for
 from legbench.signals import Command, Observation
 
@@ -45,7 +46,7 @@ class RunWriter:
         self.path = path
         self._manifest = manifest
         self._disk = disk
-        self._block = Block()
+        self._block = Block(RowLayout(layout_of(manifest)))
         self._handed = 0
         self._closed = False
         self._told = False
@@ -238,6 +239,7 @@ def _open(run: Path, manifest: Manifest) -> Disk:
         events = append_to(run / EVENTS)
         undo.callback(events.close)
         write_manifest(run, manifest)
-        disk = Disk(samples, events, schema_for(manifest))
+        rows = RowLayout(layout_of(manifest))
+        disk = Disk(samples, events, schema_for(manifest), rows)
         undo.pop_all()
     return disk

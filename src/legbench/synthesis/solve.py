@@ -13,6 +13,7 @@ from legbench.design.requirements import VARIABLES, Requirements, requirements_t
 from legbench.design.toml import design_to_mapping
 from legbench.errors import DesignError
 from legbench.signals import Floats
+from legbench.strict_json import null_for_nan
 from legbench.synthesis.crosscheck import evolve
 from legbench.synthesis.search import (
     Cost,
@@ -69,20 +70,12 @@ class Solution:
             "objective": self.objective,
             "cost": self.cost,
             "residuals": conditions_to_json(self.conditions),
-            "active_bounds": [
-                {key: finite_or_none(value) for key, value in asdict(bound).items()}
-                for bound in self.active
-            ],
+            "active_bounds": [null_for_nan(asdict(bound)) for bound in self.active],
             "evaluations": self.evaluations,
             "complete": self.complete,
             "seed": self.seed,
             "differential_evolution": checked,
         }
-
-
-def finite_or_none(value: Any) -> Any:
-    """JSON has no not-a-number."""
-    return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
 def conditions_to_json(conditions: Sequence[Condition]) -> dict[str, Any]:

@@ -6,7 +6,6 @@ computing them again, and refuses a file that some other search wrote.
 """
 
 import json
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TextIO, final
@@ -14,6 +13,7 @@ from typing import Any, TextIO, final
 import numpy as np
 
 from legbench.errors import ConfigError
+from legbench.recording.files import write_whole
 from legbench.signals import Floats, Ints
 
 LINE = {"points", "costs"}
@@ -120,9 +120,7 @@ class Trace:
 
 def _rewrite(path: Path, entries: list[Any]) -> None:
     """Put whole lines in place of what is there, all at once."""
-    draft = path.with_name(f".{path.name}.draft")
-    draft.write_text("".join(json.dumps(entry) + "\n" for entry in entries), encoding="utf-8")
-    os.replace(draft, path)
+    write_whole(path, "".join(json.dumps(entry) + "\n" for entry in entries).encode())
 
 
 def _whole(lines: list[str]) -> list[Any]:

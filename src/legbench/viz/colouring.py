@@ -5,11 +5,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from legbench.metrics.periods import find_periods
-from legbench.metrics.phases import find_gait
-from legbench.metrics.ratings import rate_run
-from legbench.metrics.source import Recorded, terms_of
-from legbench.metrics.stance import STANCE, states_of
+from legbench.metrics.analysis import Analysis, analysed
+from legbench.metrics.roles import STANCE
+from legbench.metrics.source import Recorded
 from legbench.signals import Floats
 from legbench.viz import style
 
@@ -18,7 +16,7 @@ LAST_JUMPS = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Stretch:
+class ColouredRows:
     """Rows [first, stop) in one colour."""
 
     first: int
@@ -30,7 +28,7 @@ class Stretch:
 class Colouring:
     """What a figure's lines show."""
 
-    stretches: tuple[Stretch, ...]
+    stretches: tuple[ColouredRows, ...]
     """Highlighted rows in order."""
     periods: int = 0
     """How many periods the colours count; zero for stance and flight."""
@@ -40,35 +38,35 @@ class Colouring:
 
 def colouring_of(recording: Recorded) -> Colouring:
     """Colour a jump's last jumps by stance and flight, any other run by period."""
-    gait = find_gait(recording)
-    ratings = rate_run(recording, terms_of(recording.manifest), gait)
-    if len(gait.jumps):
-        begin, end = gait.jumps.start[-LAST_JUMPS:][0], gait.jumps.end[-1]
-        first, stop = np.searchsorted(recording.time, [begin, end])
+    run = analysed(recording)
+    ratings, jumps = run.ratings.chosen, run.gait.jumps
+    if len(jumps):
+        begin, end = jumps.start[-LAST_JUMPS:][0], jumps.end[-1]
+        first, stop = np.searchsorted(run.time, [begin, end])
         return Colouring(
-            stretches=_by_stance(recording, int(first), int(stop)),
-            ratings=_jump_ratings(ratings["rating_stance"], ratings["rating_flight"]),
+            stretches=_by_stance(run, int(first), int(stop)),
+            ratings=_jump_ratings(ratings.stance, ratings.flight),
         )
-    periods = find_periods(recording)
+    periods = run.periods
     count = len(periods)
     colours = style.viridis(np.linspace(0.0, 0.95, max(count, 2)))[:count] / 255.0
     return Colouring(
         stretches=tuple(
-            Stretch(first=int(first), stop=int(stop), colour=(r, g, b))
+            ColouredRows(first=int(first), stop=int(stop), colour=(r, g, b))
             for first, stop, (r, g, b) in zip(
                 periods.first, periods.stop, colours.tolist(), strict=True
             )
         ),
         periods=count,
-        ratings=_period_ratings(ratings["rating_periods"]),
+        ratings=_period_ratings(ratings.periods),
     )
 
 
-def _by_stance(recording: Recorded, first: int, stop: int) -> tuple[Stretch, ...]:
-    stands = states_of(recording)[first:stop] == STANCE
+def _by_stance(run: Analysis, first: int, stop: int) -> tuple[ColouredRows, ...]:
+    stands = run.states[first:stop] == STANCE
     edges = [0, *(np.flatnonzero(np.diff(stands)) + 1).tolist(), stop - first]
     return tuple(
-        Stretch(
+        ColouredRows(
             first=first + low,
             stop=first + high,
             colour=style.unit(style.STANCE if stands[low] else style.FLIGHT),

@@ -1,12 +1,12 @@
 """Files that appear whole or not at all."""
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from legbench.errors import RecordingError
-from legbench.recording.reader import Recording
+from legbench.metrics.source import Recorded
+from legbench.recording.files import put_in_place
 
 
 @contextmanager
@@ -19,16 +19,17 @@ def draft_of(path: Path) -> Iterator[Path]:
     draft = path.with_name(f".{path.stem}.draft{path.suffix}")
     try:
         draft.touch()
-    except OSError as error:
-        raise RecordingError(f"cannot write {path}: {error.strerror}") from error
-    try:
         yield draft
-        os.replace(draft, path)
+        put_in_place(draft, path)
+    except RecordingError:
+        raise
+    except OSError as error:
+        raise RecordingError(f"cannot write {path}: {error.strerror or error}") from error
     finally:
         draft.unlink(missing_ok=True)
 
 
-def require_rows(recording: Recording) -> None:
+def require_rows(recording: Recorded) -> None:
     """Check that there is something to draw.
 
     Raises:

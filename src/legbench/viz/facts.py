@@ -1,7 +1,7 @@
 """What a picture must know of a run besides its rows."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,78 +9,47 @@ from typing import Any
 import numpy as np
 
 from legbench.design.leg import LegDesign
-from legbench.design.setup import SetupKind
 from legbench.kinematics import modal_to_joint
-from legbench.metrics.source import Terms, terms_of
 from legbench.metrics.summary import Summary
+from legbench.recording.description import RunDescription
 
 MODEL = "leg.xml"
-"""The run's own MJCF, next to its manifest."""
+"""File of a run's own MJCF, next to its manifest."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Facts:
-    """What a run's manifest says to a picture."""
+    """What pictures say of a run: its description, and the model that it keeps."""
 
-    run_id: str
-    terms: Terms
-    manifest: Mapping[str, Any]
-    crank_length: float | None = None
-    """Of the parallel bars [m]; none: the linkage has no bars."""
+    run: RunDescription
     model: Path | None = None
-    """The run's MJCF, where there is one."""
-
-    @property
-    def design(self) -> LegDesign:
-        """The leg."""
-        return self.terms.design
-
-    @property
-    def jumps(self) -> bool:
-        """Whether stance and flight tell the run apart, rather than periods."""
-        return self.terms.setup is SetupKind.JUMP
-
-    @property
-    def controller(self) -> Mapping[str, Any]:
-        """The controller's table; empty when the manifest has none."""
-        return self.manifest.get("controller", {})
+    """MJCF of the run, where there is one."""
 
     @property
     def rest(self) -> tuple[float, float] | None:
-        """Joint angles of the posture z = (0, z2) that the controller starts from [rad]."""
-        if (z2 := self.controller.get("z2")) is None:
+        """Joint angles of the posture z = (0, z2) about which the controller moves the leg [rad];
+        none: its settings have no z2.
+        """
+        if self.run.z2 is None:
             return None
-        q1, q2 = modal_to_joint(np.array([0.0, float(z2)]), self.terms.convention)
+        q1, q2 = modal_to_joint(np.array([0.0, self.run.z2]), self.run.convention)
         return (float(q1), float(q2))
 
     @property
     def headline(self) -> str:
         """Design, setup and controller in one line."""
-        settings = [
-            f"{key} = {_shown(self.controller[key])}"
-            for key in ("z2", "dz2")
-            if key in self.controller
-        ]
-        setup, controller = self.terms.setup.value, self.terms.controller
-        words = [self.design.name, setup, controller if controller != setup else ""]
-        return " · ".join(filter(None, [*words, ", ".join(settings)]))
+        run = self.run
+        values = (("z2", run.z2), ("dz2", run.dz2))
+        settings = [f"{name} = {value:g}" for name, value in values if value is not None]
+        words = [run.design.name, run.setup.kind.value, run.controller, ", ".join(settings)]
+        # A word that stands for two of them, the jump, is said once.
+        return " · ".join(filter(None, dict.fromkeys(words)))
 
 
-def facts_of(manifest: Mapping[str, Any], folder: Path) -> Facts:
-    """Read what pictures need from a run's manifest and folder.
-
-    Raises:
-        FormatError: a manifest without a leg, or with an unknown setup or convention.
-    """
-    linkage = manifest.get("linkage", {})
-    bars = linkage.get("kind") == "bars"
-    return Facts(
-        run_id=str(manifest.get("id", folder.name)),
-        terms=terms_of(manifest),
-        manifest=manifest,
-        crank_length=float(linkage.get("crank_length", 0.02)) if bars else None,
-        model=folder / MODEL if (folder / MODEL).is_file() else None,
-    )
+def facts_of(run: RunDescription, folder: Path) -> Facts:
+    """What pictures need of a run and its folder."""
+    model = folder / MODEL
+    return Facts(run=run, model=model if model.is_file() else None)
 
 
 def _shown(value: object) -> str:
@@ -89,31 +58,39 @@ def _shown(value: object) -> str:
 
 def as_markdown(facts: Facts, summary: Summary | None = None, against: Sequence[str] = ()) -> str:
     """The run's facts as a document: what ran, on what, what came of it, what it is shown with."""
-    manifest = facts.manifest
-    lines = [f"**{facts.headline}**", "", f"run `{facts.run_id}`", ""]
-    lines += [
-        f"- {key}: {_shown(manifest[key])}"
-        for key in ("created", "status", "cause", "rows", "duration")
-        if manifest.get(key) is not None
-    ]
+    run = facts.run
+    lines = [f"**{facts.headline}**", "", f"run `{run.id}`", ""]
+    ending = {
+        "created": run.created,
+        "status": run.status,
+        "cause": run.cause,
+        "rows": run.rows,
+        "duration": run.duration,
+    }
+    lines += [f"- {key}: {_shown(value)}" for key, value in ending.items() if value is not None]
     if against:
         lines += ["", "**drawn over it**", "", *(f"- {name}" for name in against)]
     if summary is not None:
         lines += _section("what came of it", _results(summary))
-    for name in ("controller", "setup", "linkage", "ground", "servo"):
-        table = manifest.get(name)
+        lines += _section("note", {str(n): text for n, text in enumerate(summary.warnings, 1)})
+    for name, table in run.experiment.items():
         if isinstance(table, Mapping):
-            lines += _section(name, table)
-    return "\n".join([*lines, *_section("design", _design_rows(facts.design))]) + "\n"
+            lines += _section(name, _design_rows(run.design) if name == "design" else table)
+    return "\n".join(lines) + "\n"
 
 
 def _section(name: str, entries: Mapping[str, Any]) -> list[str]:
-    rows = [
-        f"- {key}: {_shown(value)}"
-        for key, value in entries.items()
-        if value is not None and not isinstance(value, Mapping)
-    ]
+    rows = [f"- {key}: {_shown(value)}" for key, value in _flat(entries) if value is not None]
     return ["", f"**{name}**", "", *rows] if rows else []
+
+
+def _flat(entries: Mapping[str, Any]) -> Iterator[tuple[str, object]]:
+    """Entries of a table and of the tables in it, such as the settings of a controller."""
+    for key, value in entries.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value)
+        else:
+            yield key, value
 
 
 def _results(summary: Summary) -> dict[str, str]:

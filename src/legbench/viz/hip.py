@@ -16,6 +16,6 @@ def hip_of(rows: Recorded, facts: Facts) -> Floats:
     hip = rows["trunk_pos"]
     if np.isfinite(hip).all():
         return hip
-    if facts.terms.setup in GROUNDED:
-        return -leg_points(rows["joint_pos"], facts.design.lengths)[:, 3]
+    if facts.run.setup.kind in GROUNDED:
+        return -leg_points(rows["joint_pos"], facts.run.design.lengths)[:, 3]
     return np.zeros_like(hip)

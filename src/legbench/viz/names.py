@@ -2,14 +2,13 @@
 
 from collections.abc import Sequence
 
-from legbench.metrics.compare import name_of
 from legbench.metrics.source import Recorded
 
 
 def names_of(runs: Sequence[Recorded]) -> list[str]:
     """Plant, linkage and design of each run; its folder, too, where that names several."""
-    names = [name_of(run.manifest) for run in runs]
+    names = [run.description.title for run in runs]
     return [
-        name if name and names.count(name) == 1 else " ".join(filter(None, [name, run.path.name]))
+        name if names.count(name) == 1 else " ".join([name, run.path.name])
         for name, run in zip(names, runs, strict=True)
     ]

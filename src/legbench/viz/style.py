@@ -1,11 +1,13 @@
 """Colours and words of every picture, shared by the viewer and the print figures."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from legbench.signals import Floats, Phase
+from legbench.phases import LARGEST_CODE, PhaseInfo, Role
+from legbench.signals import Floats, Ints
 
 Rgb = tuple[int, int, int]
 Colours = NDArray[np.uint8]
@@ -31,18 +33,16 @@ TRUNK: Rgb = (52, 104, 172)
 BAR_GREEN: Rgb = (67, 160, 88)
 BAR_BLACK: Rgb = (96, 98, 104)
 
-PHASES: dict[Phase, Rgb] = {
-    Phase.REST: (120, 120, 128),
-    Phase.STEPPED: (142, 108, 190),
-    Phase.MIDDLE: (158, 158, 120),
-    Phase.FOLDED: (0, 150, 136),
-    Phase.STRETCHED: (214, 130, 40),
-    Phase.FLIGHT: FLIGHT,
-    Phase.COMPRESS: (0, 150, 136),
-    Phase.PUSH: STANCE,
-    Phase.RELEASE: (142, 108, 190),
+PHASES: dict[Role, tuple[Rgb, ...]] = {
+    Role.REST: ((120, 120, 128), (150, 150, 158), (92, 92, 100), (170, 164, 150)),
+    Role.ACTING: ((214, 130, 40), (142, 108, 190), (158, 158, 120), (0, 150, 136)),
+    Role.STANCE: ((236, 140, 96), (178, 60, 84), (0, 150, 136), STANCE),
+    Role.FLIGHT: ((142, 108, 190), FLIGHT, (110, 170, 250), (84, 96, 200)),
 }
-"""Colour of what the controller does."""
+"""Colours of what the controller does, by what that means for the leg."""
+
+UNDECLARED: Rgb = (70, 70, 76)
+"""Colour of a phase that no controller has declared."""
 
 PERIODS_SHOWN = 20
 """Periods over which the colours run; later ones keep the last colour (the paper rates 20)."""
@@ -73,19 +73,19 @@ _VIRIDIS = np.array(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Axis:
+class AxisTitle:
     """What one axis shows: plain text for the viewer, mathematics for print."""
 
     text: str
     math: str
 
 
-X1 = Axis(text="x1 [rad]", math=r"$x_1$ [rad]")
-X2 = Axis(text="x2 [m]", math=r"$x_2$ [m]")
-Q1 = Axis(text="q1 [rad]", math=r"$q_1$ [rad]")
-Q2 = Axis(text="q2 [rad]", math=r"$q_2$ [rad]")
-Z2 = Axis(text="z2 [rad]", math=r"$z_2$ [rad]")
-DZ2 = Axis(text="dz2/dt [rad/s]", math=r"$\dot z_2$ [rad/s]")
+X1 = AxisTitle(text="x1 [rad]", math=r"$x_1$ [rad]")
+X2 = AxisTitle(text="x2 [m]", math=r"$x_2$ [m]")
+Q1 = AxisTitle(text="q1 [rad]", math=r"$q_1$ [rad]")
+Q2 = AxisTitle(text="q2 [rad]", math=r"$q_2$ [rad]")
+Z2 = AxisTitle(text="z2 [rad]", math=r"$z_2$ [rad]")
+DZ2 = AxisTitle(text="dz2/dt [rad/s]", math=r"$\dot z_2$ [rad/s]")
 
 POLAR_LEAST = 0.01
 """Shortest range of x1 that a plot shows [rad]: purely radial motion looks like a line."""
@@ -111,6 +111,28 @@ def stance_colours(stance: NDArray[np.bool_]) -> Colours:
     """Colours (n, 3) of stance and flight."""
     palette = np.array([FLIGHT, STANCE], dtype=np.uint8)
     return palette[stance.astype(np.intp)]
+
+
+def phase_colours(phases: Sequence[PhaseInfo]) -> dict[int, Rgb]:
+    """Colour by the code of a phase: its role chooses the palette, its code the place in it.
+
+    Phases of one role have different colours as long as the palette has any left.
+    """
+    taken: dict[int, Rgb] = {}
+    for phase in phases:
+        palette = PHASES[phase.role]
+        turns = [palette[(phase.code + step) % len(palette)] for step in range(len(palette))]
+        free = [colour for colour in turns if colour not in taken.values()]
+        taken[phase.code] = (free or turns)[0]
+    return taken
+
+
+def colours_by_code(phases: Sequence[PhaseInfo], codes: Ints) -> Colours:
+    """Colours (n, 3) of the phases with these codes (n,)."""
+    palette = np.tile(np.array(UNDECLARED, dtype=np.uint8), (LARGEST_CODE + 1, 1))
+    for code, colour in phase_colours(phases).items():
+        palette[code] = colour
+    return palette[np.clip(codes, 0, LARGEST_CODE)]
 
 
 def packed(colour: Rgb) -> int:

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from legbench.design.setup import SetupKind
 from legbench.kinematics import joint_to_modal, joint_to_polar
+from legbench.metrics.roles import STANCE, states_by_controller
 from legbench.metrics.source import Recorded
-from legbench.metrics.stance import MINIMUM_PHASE, STANCE, states_by_controller
+from legbench.metrics.stance import MINIMUM_PHASE
 from legbench.signals import Bools, Floats, Ints
 from legbench.viz.facts import Facts
 
@@ -24,7 +25,7 @@ RATE_SHARE = 0.05
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Trace:
+class TracedRows:
     """Some rows with what pictures derive from them."""
 
     rows: Recorded
@@ -52,18 +53,18 @@ class Tracer:
         self._fastest = 0.0
         self._grounded = -np.inf
 
-    def extend(self, rows: Recorded) -> Trace:
-        """The trace of the next rows."""
+    def extend(self, rows: Recorded) -> TracedRows:
+        """Derive what pictures need of the next rows."""
         joint = rows["joint_pos"]
-        convention = self._facts.terms.convention
+        convention = self._facts.run.convention
         z2 = joint_to_modal(joint, convention)[..., 1]
         rate = joint_to_modal(rows["joint_vel"], convention)[..., 1]
-        stance = stance_of(rows, self._facts.terms.setup)
-        return Trace(
+        stance = stance_of(rows, self._facts.run.setup.kind)
+        return TracedRows(
             rows=rows,
             time=rows.time,
             joint=joint,
-            polar=joint_to_polar(joint, self._facts.design.shank.length),
+            polar=joint_to_polar(joint, self._facts.run.design.shank.length),
             modal=np.stack([z2, rate], axis=-1),
             period=self._count_periods(*self._extremes(rows.time, stance, rate)),
             stance=stance,
@@ -71,7 +72,7 @@ class Tracer:
 
     def _extremes(self, time: Floats, stance: Bools, rate: Floats) -> tuple[Bools, Bools]:
         """Rows that may begin a period, and rows that must lie between two beginnings."""
-        if self._facts.jumps:
+        if self._facts.run.jumps:
             grounded = np.maximum.accumulate(
                 np.append(self._grounded, np.where(stance, time, -np.inf))
             )

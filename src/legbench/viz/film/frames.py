@@ -44,7 +44,7 @@ class Film:
 
     def __init__(self, recording: Recording) -> None:
         require_rows(recording)
-        facts = facts_of(recording.manifest, recording.path)
+        facts = facts_of(recording.description, recording.path)
         self._puppet = Puppet(recording.path / MODEL)
         model = self._puppet.model
         self._camera = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_CAMERA, CAMERA)
@@ -53,7 +53,7 @@ class Film:
         self._hip = self._puppet.hip(hip_of(recording, facts))
         self._joint = recording["joint_pos"]
         self._time = recording.time
-        self._start = self._frame(leg_points(self._joint, facts.design.lengths))
+        self._start = self._frame(leg_points(self._joint, facts.run.design.lengths))
 
     def shoot(self, rows: Ints, size: Size, *, follow: bool = True) -> Iterator[Image]:
         """Images of the rows, one after the other; the camera moves along, or stays amid them.

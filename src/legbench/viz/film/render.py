@@ -7,8 +7,7 @@ from typing import cast
 import numpy as np
 
 from legbench.errors import ConfigError
-from legbench.metrics.periods import find_periods
-from legbench.metrics.phases import find_gait
+from legbench.metrics.analysis import Analysis
 from legbench.recording.reader import Recording
 from legbench.signals import Ints
 from legbench.viz.drafts import draft_of
@@ -128,10 +127,11 @@ def _row_at(recording: Recording, time: float) -> Ints:
 
 def _still_rows(recording: Recording) -> Ints:
     """Evenly spread over the last jump, lower apex to lower apex; else the last period."""
-    jumps, begin, end = find_gait(recording).jumps, recording.time[0], recording.time[-1]
+    run = Analysis(recording)
+    jumps, periods, begin, end = run.gait.jumps, run.periods, run.time[0], run.time[-1]
     if len(jumps):
         begin, end = jumps.start[-1], jumps.end[-1]
-    elif len(periods := find_periods(recording)):
+    elif len(periods):
         begin, end = periods.start[-1], periods.end[-1]
     instants = np.linspace(begin, end, STILLS)
     return np.minimum(np.searchsorted(recording.time, instants), len(recording.time) - 1)

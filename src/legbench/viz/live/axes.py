@@ -28,8 +28,8 @@ class PlotSpec:
 
     path: str
     title: str
-    x: style.Axis
-    y: style.Axis
+    x: style.AxisTitle
+    y: style.AxisTitle
     equal: bool = False
     """One unit is as long on both axes."""
     through: tuple[float, float] | None = None

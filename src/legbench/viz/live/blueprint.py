@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from legbench.signals import Signal
 from legbench.viz.facts import Facts
 from legbench.viz.live._rerun import rr, rrb
 from legbench.viz.live.leg2d import leg_view
@@ -40,15 +41,17 @@ def blueprint(
     panels = rrb.TimePanel(
         state="collapsed", timeline="t", play_state="following" if live else None
     )
+    right = _series(facts.run.layout.own, live)
     return rrb.Blueprint(
-        rrb.Horizontal(left, middle, _series(live), column_shares=[2, 5, 3.2]),
+        rrb.Horizontal(left, middle, right, column_shares=[2, 5, 3.2]),
         panels,
         collapse_panels=True,
         auto_views=False,
     )
 
 
-def _series(live: bool) -> rrb.Vertical:
+def _series(own: Sequence[Signal], live: bool) -> rrb.Vertical:
+    """The signals over time; each of the controller's own has a tab to itself."""
     axis = rrb.TimeAxis(view_range=_window()) if live else None
 
     def view(path: str, name: str) -> rrb.TimeSeriesView:
@@ -66,6 +69,7 @@ def _series(live: bool) -> rrb.Vertical:
             view("force", "contact force [N]"),
             view("height", "height [m]"),
             view("energy", "energy [J]"),
+            *(view(f"own/{signal.name}", f"{signal.name} [{signal.unit}]") for signal in own),
         ),
         view("rating", "P^r [-]"),
         view("cycle", "control cycle [us]"),

@@ -9,6 +9,7 @@ import pyarrow as pa
 
 from legbench.errors import RecordingError
 from legbench.metrics.summary import summarise
+from legbench.recording.description import describe
 from legbench.recording.layout import ARCHIVE, STREAM
 from legbench.recording.manifest import read_manifest
 from legbench.recording.reader import load
@@ -38,12 +39,13 @@ def follow(folder: Path, stream: rr.RecordingStream, pace: Pace) -> int:
         The number of rows that were published while the run was being written.
 
     Raises:
-        RecordingError: there is no run in the folder.
+        RecordingError: there is no run in the folder, or it describes no leg.
     """
     manifest = read_manifest(folder)
     if manifest is None:
         raise RecordingError(f"{folder} is no run folder: it has no manifest")
-    publisher = Publisher(stream, facts_of(manifest, folder), live=True)
+    description = describe(manifest, folder.name)
+    publisher = Publisher(stream, facts_of(description, folder), live=True)
     count = 0
     try:
         tail = Tail(folder / STREAM)
@@ -52,7 +54,7 @@ def follow(folder: Path, stream: rr.RecordingStream, pace: Pace) -> int:
     else:
         with closing(tail):
             for batches in _looks(tail, folder, pace):
-                rows = rows_of(batches, manifest, folder)
+                rows = rows_of(batches, description, folder)
                 count += len(rows.time)
                 publisher.push(rows)
     _conclude(folder, publisher, pace)
@@ -78,4 +80,4 @@ def _conclude(folder: Path, publisher: Publisher, pace: Pace) -> None:
         pace.wait()
     recording = load(folder)
     publisher.finish()
-    publisher.describe(facts_of(recording.manifest, folder), summarise(recording))
+    publisher.describe(facts_of(recording.description, folder), summarise(recording))

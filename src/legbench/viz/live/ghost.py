@@ -9,7 +9,6 @@ from typing import final
 import numpy as np
 
 from legbench.kinematics import leg_points
-from legbench.metrics.compare import name_of
 from legbench.recording.reader import Recording
 from legbench.signals import Floats
 from legbench.viz import style
@@ -44,7 +43,7 @@ class Other:
     @property
     def name(self) -> str:
         """Plant, linkage and design."""
-        return name_of(self.recording.manifest)
+        return self.facts.run.title
 
     @property
     def label(self) -> str:
@@ -61,11 +60,11 @@ def other_of(recording: Recording, place: int, facts: Facts) -> Other:
     """Another run to show beside the run of `facts`, whose modal convention it is shown in.
 
     Raises:
-        FormatError: its manifest cannot be drawn.
+        FormatError: it describes no leg.
     """
-    own = facts_of(recording.manifest, recording.path)
-    terms = replace(own.terms, convention=facts.terms.convention)
-    return Other(recording=recording, facts=replace(own, terms=terms), place=place)
+    own = facts_of(recording.description, recording.path)
+    run = replace(own.run, convention=facts.run.convention)
+    return Other(recording=recording, facts=replace(own, run=run), place=place)
 
 
 @final
@@ -114,4 +113,4 @@ class Ghost:
     def _leg(self) -> Floats:
         """Hip, knees and tip in the world (n, 4, 2) [m]."""
         hip = hip_of(self._other.recording, self._other.facts)
-        return hip[:, None] + leg_points(self.trace.joint, self._other.facts.design.lengths)
+        return hip[:, None] + leg_points(self.trace.joint, self._other.facts.run.design.lengths)

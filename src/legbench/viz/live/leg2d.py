@@ -10,7 +10,7 @@ from legbench.viz import style
 from legbench.viz.facts import Facts
 from legbench.viz.hip import GROUNDED, hip_of
 from legbench.viz.live._rerun import rr, rrb
-from legbench.viz.trace import Thinner, Trace
+from legbench.viz.trace import Thinner, TracedRows
 
 FREQ = 100.0
 """Of the drawings [Hz]."""
@@ -47,7 +47,7 @@ class Leg2D:
         flip = rr.Transform3D(mat3x3=np.diag([1.0, -1.0, 1.0]))
         stream.log(PATH, flip, static=True)
         self._draw_trunk()
-        if facts.terms.setup in GROUNDED:
+        if facts.run.setup.kind in GROUNDED:
             self._draw_ground()
         for name, colour, radius, order in (
             ("segments", style.SEGMENT, SEGMENT, 10),
@@ -65,17 +65,17 @@ class Leg2D:
         force = rr.Arrows2D.from_fields(colors=[style.FORCE], radii=[0.002], draw_order=30)
         stream.log(f"{PATH}/force", force, static=True)
 
-    def push(self, trace: Trace) -> None:
+    def push(self, trace: TracedRows) -> None:
         """Add drawings of some of these rows."""
         kept = self._thinner.pick(trace.time)
         if len(kept) == 0:
             return
         hip, joint = hip_of(trace.rows, self._facts)[kept], trace.joint[kept]
-        points = hip[:, None] + leg_points(joint, self._facts.design.lengths)
+        points = hip[:, None] + leg_points(joint, self._facts.run.design.lengths)
         index = [rr.TimeColumn("t", duration=trace.time[kept])]
         self._send(index, "segments", points)
-        if self._facts.crank_length is not None:
-            bars = bar_points(joint, self._facts.design.lengths, self._facts.crank_length)
+        if self._facts.run.crank_length is not None:
+            bars = bar_points(joint, self._facts.run.design.lengths, self._facts.run.crank_length)
             for name, bar in zip(("bar_green", "bar_black"), bars, strict=True):
                 self._send(index, name, hip[:, None] + bar)
         ahead = np.pad(hip[:, :1], ((0, 0), (0, 2)))
@@ -121,10 +121,10 @@ class Leg2D:
 
 def leg_room(facts: Facts, hip: Floats, *, live: bool) -> tuple[float, float]:
     """Lowest and highest point that pictures show [m], from the hip's path (n, 2) so far."""
-    reach = sum(facts.design.lengths)
-    if facts.terms.setup not in GROUNDED:
+    reach = sum(facts.run.design.lengths)
+    if facts.run.setup.kind not in GROUNDED:
         return float(hip[:, 1].min()) - 1.15 * reach, float(hip[:, 1].max()) + 0.3 * reach
-    usual = (1.7 if live and facts.jumps else 1.3) * reach
+    usual = (1.7 if live and facts.run.jumps else 1.3) * reach
     return -0.12 * reach, max(usual, float(hip[:, 1].max()) + 0.3 * reach)
 
 

@@ -10,7 +10,7 @@ from legbench.viz.facts import Facts
 from legbench.viz.live._rerun import rr
 from legbench.viz.live.axes import PlotSpec
 from legbench.viz.live.xyplot import XYPlot
-from legbench.viz.trace import Thinner, Trace
+from legbench.viz.trace import Thinner, TracedRows
 
 FREQ = 200.0
 """Of the trajectories: a period has a hundred points [Hz]."""
@@ -18,7 +18,7 @@ FREQ = 200.0
 
 def plot_specs(facts: Facts) -> dict[str, PlotSpec]:
     """The plots by name; jumps are coloured by stance and flight, the rest by period."""
-    coloured = "stance / flight" if facts.jumps else "periods"
+    coloured = "stance / flight" if facts.run.jumps else "periods"
     return {
         "polar": PlotSpec(
             path="/plots/polar",
@@ -38,7 +38,7 @@ def plot_specs(facts: Facts) -> dict[str, PlotSpec]:
         ),
         "periods": PlotSpec(
             path="/plots/periods",
-            title=f"{style.MODAL}: {'jumps' if facts.jumps else 'periods'}",
+            title=f"{style.MODAL}: {'jumps' if facts.run.jumps else 'periods'}",
             x=style.Z2,
             y=style.DZ2,
         ),
@@ -49,7 +49,7 @@ def plot_specs(facts: Facts) -> dict[str, PlotSpec]:
 
 
 def _phases(facts: Facts) -> str:
-    return "stance / flight" if facts.jumps else "controller"
+    return "stance / flight" if facts.run.jumps else "controller"
 
 
 @final
@@ -57,19 +57,19 @@ class Plots:
     """Publishes trajectories in the four planes."""
 
     def __init__(self, stream: rr.RecordingStream, facts: Facts) -> None:
-        self._jumps = facts.jumps
+        self._jumps, self._phases = facts.run.jumps, facts.run.phases
         self._plots = {name: XYPlot(stream, spec) for name, spec in plot_specs(facts).items()}
         self._thinner = Thinner(FREQ)
         self._seen: dict[str, list[Floats]] = {name: [] for name in self._plots}
         self._others: dict[str, list[Floats]] = {name: [] for name in self._plots}
 
-    def push(self, trace: Trace) -> None:
+    def push(self, trace: TracedRows) -> None:
         """Add rows to the trails."""
         kept = self._thinner.pick(trace.time)
         if len(kept) == 0:
             return
         periods = style.period_colours(trace.period[kept])
-        phases = _phase_colours(trace, self._jumps)[kept]
+        phases = self._phase_colours(trace)[kept]
         for name, plot in self._plots.items():
             points = _points(trace, name)[kept]
             seen = self._seen[name]
@@ -83,7 +83,7 @@ class Plots:
                 phases if by_phase else periods,
             )
 
-    def overlay(self, key: str, trace: Trace, colour: style.Rgb) -> None:
+    def overlay(self, key: str, trace: TracedRows, colour: style.Rgb) -> None:
         """Draw the whole of another run over the trails."""
         kept = Thinner(FREQ).pick(trace.time)
         for name, plot in self._plots.items():
@@ -98,16 +98,12 @@ class Plots:
                 others = self._others[name]
                 plot.ghost(np.concatenate(seen), np.concatenate(others) if others else None)
 
+    def _phase_colours(self, trace: TracedRows) -> style.Colours:
+        if self._jumps:
+            return style.stance_colours(trace.stance)
+        return style.colours_by_code(self._phases, trace.rows["phase"])
 
-def _points(trace: Trace, name: str) -> Floats:
+
+def _points(trace: TracedRows, name: str) -> Floats:
     planes = {"polar": trace.polar, "joint": trace.joint}
     return planes.get(name, trace.modal)
-
-
-def _phase_colours(trace: Trace, jumps: bool) -> style.Colours:
-    if jumps:
-        return style.stance_colours(trace.stance)
-    palette = np.zeros((max(style.PHASES) + 1, 3), dtype=np.uint8)
-    for phase, colour in style.PHASES.items():
-        palette[phase] = colour
-    return palette[trace.rows["phase"]]

@@ -15,8 +15,8 @@ from legbench.viz.live.blueprint import blueprint
 from legbench.viz.live.ghost import Ghost, Other
 from legbench.viz.live.leg2d import Leg2D, hip_of, leg_room
 from legbench.viz.live.plots import Plots
-from legbench.viz.live.rating import Rating
-from legbench.viz.live.scene import Scene
+from legbench.viz.live.rating_series import RatingSeries
+from legbench.viz.live.scene import ModelScene
 from legbench.viz.live.series import Series
 from legbench.viz.live.states import States
 from legbench.viz.trace import Tracer
@@ -43,13 +43,13 @@ class Publisher:
         self._others = tuple(others)
         self._tracer = Tracer(facts)
         self._laid_out = False
-        self._plots, self._rating = Plots(stream, facts), Rating(stream, facts)
+        self._plots, self._rating = Plots(stream, facts), RatingSeries(stream, facts)
         self._sections = (
             self._plots,
             Leg2D(stream, facts),
-            Scene(stream, facts),
+            ModelScene(stream, facts),
             States(stream, facts),
-            Series(stream),
+            Series(stream, facts),
             self._rating,
         )
         self.describe(facts)
@@ -57,7 +57,7 @@ class Publisher:
     def describe(self, facts: Facts, summary: Summary | None = None) -> None:
         """Show a run's facts; again once it has ended and is rated."""
         others = [
-            f"{other.label}: {other.name}, run `{other.facts.run_id}`" for other in self._others
+            f"{other.label}: {other.name}, run `{other.facts.run.id}`" for other in self._others
         ]
         text = as_markdown(facts, summary, others)
         document = rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)

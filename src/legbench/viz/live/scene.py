@@ -11,7 +11,7 @@ from legbench.viz.live._rerun import rr, rrb
 from legbench.viz.live.leg2d import FREQ
 from legbench.viz.pose import Puppet
 from legbench.viz.style import Colours
-from legbench.viz.trace import Thinner, Trace
+from legbench.viz.trace import Thinner, TracedRows
 
 PATH, VIEW = "/scene/model", "/scene/view"
 """What is drawn, and the frame it is seen from, which goes along with the hip."""
@@ -28,7 +28,7 @@ Shape = rr.Boxes3D | rr.Capsules3D | rr.Cylinders3D | rr.Ellipsoids3D
 
 
 @final
-class Scene:
+class ModelScene:
     """Publishes the model's bodies; nothing at all for a run without a model."""
 
     def __init__(self, stream: rr.RecordingStream, facts: Facts) -> None:
@@ -40,7 +40,7 @@ class Scene:
             stream.log("/scene", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
             _draw_shapes(stream, self._puppet.model)
 
-    def push(self, trace: Trace) -> None:
+    def push(self, trace: TracedRows) -> None:
         """Add poses of some of these rows."""
         kept = self._thinner.pick(trace.time)
         if self._puppet is None or len(kept) == 0:

@@ -5,10 +5,11 @@ from typing import final
 
 import numpy as np
 
-from legbench.signals import Floats
+from legbench.signals import Floats, Signal
 from legbench.viz import style
+from legbench.viz.facts import Facts
 from legbench.viz.live._rerun import rr
-from legbench.viz.trace import Trace
+from legbench.viz.trace import TracedRows
 
 COMPONENTS = (style.FIRST, style.SECOND)
 TARGETS = (style.FIRST_FAINT, style.SECOND_FAINT)
@@ -78,13 +79,30 @@ HEIGHTS = Line(
 )
 
 
+OWN = "/series/own"
+"""Parent of the signals that the controller declared."""
+OWN_COLOURS = (*COMPONENTS, style.ACCENT, style.MODE_1, style.MODE_2, style.GREY)
+
+
+def own_line(signal: Signal) -> Line:
+    """A signal that a controller declared, one line a component."""
+    count = len(signal.columns)
+    return Line(
+        signal=signal.name,
+        path=f"{OWN}/{signal.name}",
+        names=signal.components or (signal.name,),
+        colours=tuple(OWN_COLOURS[place % len(OWN_COLOURS)] for place in range(count)),
+    )
+
+
 @final
 class Series:
     """Publishes the signals over time."""
 
-    def __init__(self, stream: rr.RecordingStream) -> None:
+    def __init__(self, stream: rr.RecordingStream, facts: Facts) -> None:
         self._stream = stream
-        for line in (*LINES, HEIGHTS):
+        self._lines = (*LINES, *map(own_line, facts.run.layout.own))
+        for line in (*self._lines, HEIGHTS):
             looks = rr.SeriesLines(
                 names=list(line.names),
                 colors=list(line.colours),
@@ -93,9 +111,9 @@ class Series:
             )
             stream.log(line.path, looks, static=True)
 
-    def push(self, trace: Trace) -> None:
+    def push(self, trace: TracedRows) -> None:
         """Add every row; a signal that the run does not have is left out."""
-        for line in LINES:
+        for line in self._lines:
             self._send(line, trace.time, trace.rows[line.signal])
         hip, foot = trace.rows["trunk_pos"][:, 1], trace.rows["foot_pos"][:, 1]
         self._send(HEIGHTS, trace.time, np.stack([hip, foot], axis=-1))

@@ -1,19 +1,18 @@
 """What foot and controller are doing, as coloured lanes over time."""
 
+from collections.abc import Mapping
 from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from legbench.signals import Phase
 from legbench.viz import style
 from legbench.viz.facts import Facts
 from legbench.viz.live._rerun import rr, rrb
-from legbench.viz.trace import Trace
+from legbench.viz.trace import TracedRows
 
 FOOT, CONTROLLER = "/states/foot", "/states/controller"
-FOOT_NAMES = ("flight", "stance")
-PHASE_NAMES = tuple(phase.name.lower() for phase in Phase)
+FOOT_NAMES = {0: "flight", 1: "stance"}
 
 
 @final
@@ -23,24 +22,27 @@ class States:
     def __init__(self, stream: rr.RecordingStream, facts: Facts) -> None:
         self._stream = stream
         self._last: dict[str, int] = {}
-        self._foot = facts.jumps
+        self._foot = facts.run.jumps
         if self._foot:
             self._configure(FOOT, FOOT_NAMES, [style.FLIGHT, style.STANCE])
-        self._configure(CONTROLLER, PHASE_NAMES, [style.PHASES[phase] for phase in Phase])
+        phases = facts.run.phases
+        self._names = {phase.code: phase.name for phase in phases}
+        self._configure(CONTROLLER, self._names, list(style.phase_colours(phases).values()))
 
-    def push(self, trace: Trace) -> None:
+    def push(self, trace: TracedRows) -> None:
         """Add the changes within these rows."""
         if self._foot:
             self._send(FOOT, trace, trace.stance.astype(np.int64), FOOT_NAMES)
-        self._send(CONTROLLER, trace, trace.rows["phase"], PHASE_NAMES)
+        self._send(CONTROLLER, trace, trace.rows["phase"], self._names)
 
-    def _configure(self, path: str, names: tuple[str, ...], colours: list[style.Rgb]) -> None:
-        packed = [style.packed(colour) for colour in colours]
-        configuration = rr.StateConfiguration(values=list(names), colors=packed)
+    def _configure(self, path: str, names: Mapping[int, str], colours: list[style.Rgb]) -> None:
+        # As an array, since rerun takes a list of four numbers for one colour.
+        packed = np.array([style.packed(colour) for colour in colours], dtype=np.uint32)
+        configuration = rr.StateConfiguration(values=list(names.values()), colors=packed)
         self._stream.log(path, configuration, static=True)
 
     def _send(
-        self, path: str, trace: Trace, codes: NDArray[np.int64], names: tuple[str, ...]
+        self, path: str, trace: TracedRows, codes: NDArray[np.int64], names: Mapping[int, str]
     ) -> None:
         before = self._last.get(path, -1)
         changes = np.flatnonzero(np.diff(codes, prepend=before))
@@ -48,7 +50,7 @@ class States:
             return
         self._last[path] = int(codes[-1])
         index = [rr.TimeColumn("t", duration=trace.time[changes])]
-        names_here = [names[code] for code in codes[changes]]
+        names_here = [names.get(code, f"phase {code}") for code in codes[changes].tolist()]
         self._stream.send_columns(path, index, rr.StateChange.columns(state=names_here))
 
 

@@ -1,14 +1,14 @@
 """Reading the samples of a run while it is still being written."""
 
-from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, final
+from typing import final
 
 import numpy as np
 import pyarrow as pa
 from pyarrow import ipc
 
+from legbench.recording.description import RunDescription
 from legbench.recording.layout import TIME
 from legbench.recording.reader import Recording
 from legbench.recording.stream import END_MARK
@@ -60,13 +60,14 @@ class Tail:
         self._file.close()
 
 
-def rows_of(batches: list[pa.RecordBatch], manifest: Mapping[str, Any], folder: Path) -> Recording:
+def rows_of(batches: list[pa.RecordBatch], run: RunDescription, folder: Path) -> Recording:
     """Some batches as a recording of their rows alone."""
     table = pa.Table.from_batches(batches)
     columns = {name: _values(table[name]) for name in table.column_names}
     return Recording(
         path=folder,
-        manifest=dict(manifest),
+        manifest={},
+        described=run,
         time=columns[TIME] / 1e9,
         columns=MappingProxyType(columns),
         events=(),

@@ -52,7 +52,7 @@ class Options:
 
 
 @final
-class Ending:
+class EndRequest:
     """Whether the run's process has asked for an end, or has gone."""
 
     def __init__(self, parent: int | None) -> None:
@@ -71,7 +71,7 @@ class Ending:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Follow one run to its end; returns the exit status."""
     options = _parse(arguments)
-    ending = Ending(options.parent)
+    ending = EndRequest(options.parent)
     _step_back()
     try:
         with open(os.devnull, "w", encoding="utf-8") as nowhere:
@@ -82,7 +82,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def watch(options: Options, ending: Ending, nowhere: IO[str]) -> None:
+def watch(options: Options, ending: EndRequest, nowhere: IO[str]) -> None:
     """Open the viewer, publish the run, and serve it for as long as the run's process lives.
 
     Raises:
@@ -115,7 +115,7 @@ def watch(options: Options, ending: Ending, nowhere: IO[str]) -> None:
         server.terminate()
 
 
-def _open_viewer(options: Options, ending: Ending) -> "subprocess.Popen[bytes] | None":
+def _open_viewer(options: Options, ending: EndRequest) -> "subprocess.Popen[bytes] | None":
     """A viewer that accepts connections; None where one was there already."""
     if viewer.listening(options.port):
         return None

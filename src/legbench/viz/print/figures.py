@@ -1,16 +1,15 @@
 """Print figures: the three planes of Figs. 4 and 6."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
-from legbench.errors import ConfigError
-from legbench.recording.reader import Recording
+from legbench.metrics.analysis import analysed
+from legbench.metrics.source import Recorded
 from legbench.signals import Floats
 from legbench.viz import style
 from legbench.viz.colouring import Colouring, colouring_of
-from legbench.viz.drafts import draft_of, require_rows
+from legbench.viz.drafts import require_rows
 from legbench.viz.facts import Facts, facts_of
 from legbench.viz.names import names_of
 from legbench.viz.print._matplotlib import (
@@ -27,12 +26,10 @@ from legbench.viz.print.overlay import (
     planes_of,
 )
 
-SUFFIXES = (".png", ".svg", ".pdf")
 SIZE, TALL = (10.0, 3.7), (10.0, 6.4)
 """Of one row of panels, of two [inch]."""
 WIDTH, WIDE = 1.3, 2.4
 """Of the coloured lines alone, and under those of another run [pt]."""
-DPI = 200
 PLANES = (
     (style.POLAR, style.X1, style.X2),
     (style.JOINT, style.Q1, style.Q2),
@@ -41,7 +38,7 @@ PLANES = (
 """Title and axes of the three panels."""
 
 
-def phase_figure(recording: Recording, against: Sequence[Recording] = ()) -> Figure:
+def phase_figure(recording: Recorded, against: Sequence[Recorded] = ()) -> Figure:
     """Foot tip in polar coordinates, joint space with w1 and w2, modal phase, side by side.
 
     A jump shows its last three jumps in the colours of stance and flight, earlier rows faintly;
@@ -53,13 +50,14 @@ def phase_figure(recording: Recording, against: Sequence[Recording] = ()) -> Fig
             time make a second row.
 
     Raises:
-        FormatError: a run's manifest cannot be drawn.
+        FormatError: a run describes no leg.
         RecordingError: a run has no rows, or none at the time of another.
     """
-    for run in (recording, *against):
-        require_rows(run)
-    facts, colouring = facts_of(recording.manifest, recording.path), colouring_of(recording)
-    points = planes_of(recording, facts.terms.convention)
+    run, *others = (analysed(each) for each in (recording, *against))
+    for each in (run, *others):
+        require_rows(each)
+    facts, colouring = facts_of(run.description, run.path), colouring_of(run)
+    points = planes_of(run, facts.run.convention)
     with styled():
         figure = Figure(figsize=TALL if against else SIZE, layout="constrained")
         FigureCanvasAgg(figure)
@@ -71,33 +69,16 @@ def phase_figure(recording: Recording, against: Sequence[Recording] = ()) -> Fig
             panel.locator_params(axis="x", nbins=4)
             panel.locator_params(axis="y", nbins=5)
             _draw(panel, plane, colouring, WIDE if against else WIDTH)
-        for place, other in enumerate(against):
-            draw_other(panels, other, facts.terms.convention, place)
-        if against:
-            draw_differences(below, recording, against)
+        for place, other in enumerate(others):
+            draw_other(panels, other, facts.run.convention, place)
+        if others:
+            draw_differences(below, run, others)
         _at_least(panels[0], style.POLAR_LEAST)
-        _draw_modes(panels[1], facts, recording["joint_pos"])
-        explain(figure, panels, colouring, names_of([recording, *against]) if against else [])
+        _draw_modes(panels[1], facts, run["joint_pos"])
+        explain(figure, panels, colouring, names_of([run, *others]) if others else [])
         title = " — ".join(filter(None, [facts.headline, colouring.ratings]))
         figure.suptitle(title, fontsize=10.5)
     return figure
-
-
-def save_figure(figure: Figure, path: Path) -> Path:
-    """Write a figure as .png, .svg or .pdf, the same bytes every time.
-
-    Raises:
-        ConfigError: any other suffix.
-        RecordingError: nothing can be written there.
-    """
-    kind = path.suffix.lower()
-    if kind not in SUFFIXES:
-        known = ", ".join(SUFFIXES)
-        raise ConfigError(f"a figure cannot be written as {path.name!r}; choose from {known}")
-    undated = {".png": {"Software": None}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
-    with draft_of(path) as draft, styled():
-        figure.savefig(draft, format=kind[1:], dpi=DPI, metadata=undated[kind])
-    return path
 
 
 def _panels(figure: Figure, two_rows: bool) -> tuple[list[Axes], list[Axes]]:

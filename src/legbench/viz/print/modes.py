@@ -1,11 +1,9 @@
 """Pictures of modes and hops: figures of their own, no window."""
 
-import os
 from pathlib import Path
 
 import numpy as np
 
-from legbench.errors import ConfigError
 from legbench.modes.basin import Fate, Question
 from legbench.modes.brake import Family
 from legbench.modes.flow import orbit
@@ -14,11 +12,11 @@ from legbench.signals import Floats, Ints
 from legbench.viz.print._matplotlib import (
     BoundaryNorm,
     Figure,
-    FigureCanvasAgg,
     Line2D,
     ListedColormap,
     styled,
 )
+from legbench.viz.print.save import save_figure
 
 RADIAL, POLAR, GREY = "#00acc1", "#e69f00", "#808080"
 COLOURS = {"radial": RADIAL, "polar": POLAR}
@@ -31,20 +29,6 @@ FATES = {
     Fate.BURIED: ("#e0e0e0", "foot under the ground"),
 }
 DPI = 150
-
-
-def save(figure: Figure, path: Path) -> None:
-    """Write a figure as the ending of `path` says.
-
-    Raises:
-        ConfigError: it cannot be written.
-    """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        FigureCanvasAgg(figure)
-        figure.savefig(os.fspath(path), dpi=DPI)
-    except (OSError, ValueError) as error:
-        raise ConfigError(f"{path} cannot be written: {error}") from error
 
 
 def plot_modes(scene: Scene, families: list[Family], path: Path) -> None:
@@ -71,7 +55,7 @@ def plot_modes(scene: Scene, families: list[Family], path: Path) -> None:
         )
         title = f"{scene.design.name}, {scene.kind}, rest at z2 = {np.sqrt(2) * scene.rest[1]:.3g}"
         figure.suptitle(f"{title} rad, undamped")
-        save(figure, path)
+        save_figure(figure, path, DPI)
 
 
 def _joint_space(axes, scene: Scene, families: list[Family]) -> None:  # type: ignore[no-untyped-def]
@@ -150,7 +134,7 @@ def plot_return(heights: Floats, fixed: float | None, title: str, path: Path) ->
             title=title,
         )
         axes.set_aspect("equal")
-        save(figure, path)
+        save_figure(figure, path, DPI)
 
 
 def plot_basin(question: Question, fates: Ints, path: Path) -> None:
@@ -183,4 +167,4 @@ def plot_basin(question: Question, fates: Ints, path: Path) -> None:
         axes.set(
             xlabel=labels[0], ylabel=labels[1], title=f"{question.design.name}: where a hop leads"
         )
-        save(figure, path)
+        save_figure(figure, path, DPI)

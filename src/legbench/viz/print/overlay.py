@@ -7,8 +7,7 @@ import numpy as np
 
 from legbench.kinematics import ModalConvention, joint_to_modal, joint_to_polar
 from legbench.metrics.compare import differences, first_touchdown
-from legbench.metrics.source import terms_of
-from legbench.recording.reader import Recording
+from legbench.metrics.source import Recorded
 from legbench.signals import Floats
 from legbench.viz import style
 from legbench.viz.colouring import colouring_of
@@ -49,20 +48,16 @@ def look_of(place: int) -> Look:
     return LOOKS[place % len(LOOKS)]
 
 
-def planes_of(recording: Recording, convention: ModalConvention) -> tuple[Floats, Floats, Floats]:
-    """Points of the three planes, polar, joint and modal (n, 2) each.
-
-    Raises:
-        FormatError: a manifest without a leg.
-    """
-    joint, shank = recording["joint_pos"], terms_of(recording.manifest).design.shank.length
+def planes_of(recording: Recorded, convention: ModalConvention) -> tuple[Floats, Floats, Floats]:
+    """Points of the three planes, polar, joint and modal (n, 2) each."""
+    joint, shank = recording["joint_pos"], recording.description.design.shank.length
     rate = joint_to_modal(recording["joint_vel"], convention)[:, 1]
     radial = np.stack([joint_to_modal(joint, convention)[:, 1], rate], axis=-1)
     return joint_to_polar(joint, shank), joint, radial
 
 
 def draw_other(
-    panels: Sequence[Axes], other: Recording, convention: ModalConvention, place: int
+    panels: Sequence[Axes], other: Recorded, convention: ModalConvention, place: int
 ) -> None:
     """Draw those rows of another run over the planes that its own figure would highlight."""
     stretches, look = colouring_of(other).stretches, look_of(place)
@@ -79,7 +74,7 @@ def draw_other(
 
 
 def draw_differences(
-    panels: Sequence[Axes], recording: Recording, others: Sequence[Recording]
+    panels: Sequence[Axes], recording: Recorded, others: Sequence[Recorded]
 ) -> None:
     """Draw |dz2| and |dq| over time on logarithmic axes, and the first touchdowns.
 

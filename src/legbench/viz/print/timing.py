@@ -4,15 +4,16 @@ from pathlib import Path
 
 import numpy as np
 
-from legbench.errors import RecordingError
 from legbench.signals import Floats
-from legbench.viz.print._matplotlib import Figure, FigureCanvasAgg, styled
+from legbench.viz.print._matplotlib import Figure, styled
+from legbench.viz.print.save import save_figure
 
 
 def draw_timing(late_us: Floats, exchange_us: Floats, path: Path) -> None:
     """Draw the share of cycles that took longer than a time, for both, one value a cycle [us].
 
     Raises:
+        ConfigError: the file's suffix is not .png, .svg or .pdf.
         RecordingError: the file cannot be written.
     """
     with styled():
@@ -21,7 +22,6 @@ def draw_timing(late_us: Floats, exchange_us: Floats, path: Path) -> None:
 
 def _draw(late_us: Floats, exchange_us: Floats, path: Path) -> None:
     figure = Figure(figsize=(7.0, 4.0), layout="constrained")
-    FigureCanvasAgg(figure)
     axes = figure.subplots()
     for values, label in ((late_us, "wake-up"), (exchange_us, "exchange")):
         ordered = np.sort(values)
@@ -32,7 +32,4 @@ def _draw(late_us: Floats, exchange_us: Floats, path: Path) -> None:
     axes.set_ylabel("share of cycles that took longer")
     axes.grid(alpha=0.3)
     axes.legend()
-    try:
-        figure.savefig(path)
-    except (OSError, ValueError) as error:
-        raise RecordingError(f"cannot draw {path}: {error}") from None
+    save_figure(figure, path)

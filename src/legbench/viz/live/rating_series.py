@@ -8,13 +8,13 @@ import numpy as np
 from legbench.design.setup import SUPPORTS
 from legbench.design.statics import Support
 from legbench.metrics.rating import alignment, deflection
+from legbench.metrics.roles import STANCE
 from legbench.metrics.rows import runs_of
-from legbench.metrics.stance import STANCE
 from legbench.signals import Floats
 from legbench.viz import style
 from legbench.viz.facts import Facts
 from legbench.viz.live._rerun import rr
-from legbench.viz.trace import Trace
+from legbench.viz.trace import TracedRows
 
 SHORTEST = 15
 """Stretches of fewer rows are contact chatter and belong to the stretch around them."""
@@ -23,7 +23,7 @@ LANES = {"period": style.ACCENT, "stance": style.STANCE, "flight": style.FLIGHT}
 
 
 @dataclass(slots=True)
-class Stretch:
+class RatedRows:
     """Rows of one period or phase that have been seen so far."""
 
     key: int
@@ -35,7 +35,7 @@ class Stretch:
     total: float
     """Of their alignments."""
 
-    def add(self, more: "Stretch | None") -> None:
+    def add(self, more: "RatedRows | None") -> None:
         """Rows that turned out to belong to it."""
         if more is not None:
             self.rows += more.rows
@@ -44,20 +44,20 @@ class Stretch:
 
 
 @final
-class Rating:
+class RatingSeries:
     """Publishes P^r of every finished period; of stance and flight apart for jumps."""
 
     def __init__(self, stream: rr.RecordingStream, facts: Facts) -> None:
         self._stream = stream
-        self._terms = facts.terms
-        self._jumps = facts.jumps
-        self._now: Stretch | None = None
-        self._next: Stretch | None = None
+        self._run = facts.run
+        self._jumps = facts.run.jumps
+        self._now: RatedRows | None = None
+        self._next: RatedRows | None = None
         """What may be the stretch after it, or chatter."""
-        self._gap: Stretch | None = None
+        self._gap: RatedRows | None = None
         """Between contacts of which none has lasted."""
         self._whole = False
-        for name in ("flight", "stance") if facts.jumps else ("period",):
+        for name in ("flight", "stance") if facts.run.jumps else ("period",):
             looks = rr.SeriesLines(
                 names=[name],
                 colors=[LANES[name]],
@@ -66,7 +66,7 @@ class Rating:
             )
             stream.log(f"{ORIGIN}/{name}", looks, static=True)
 
-    def push(self, trace: Trace) -> None:
+    def push(self, trace: TracedRows) -> None:
         """Rate the stretches that end within these rows."""
         motor = trace.rows["motor_pos"]
         runs = runs_of(trace.stance.astype(np.int64) if self._jumps else trace.period)
@@ -74,14 +74,14 @@ class Rating:
             values = self._alignment(trace.joint[first:stop], motor[first:stop], key)
             rated, total = int(np.isfinite(values).sum()), float(np.nansum(values))
             time = float(trace.time[first])
-            self._take(Stretch(key, time, int(stop - first), rated, total))
+            self._take(RatedRows(key, time, int(stop - first), rated, total))
 
     def finish(self) -> None:
         """The run is over: what had begun may have been longer than what was seen of it."""
         if self._now is not None and self._next is not None:
             self._close(self._now, self._next.time)
 
-    def _take(self, rows: Stretch) -> None:
+    def _take(self, rows: RatedRows) -> None:
         """Rows of one kind, in the order of `metrics.stance`: gaps are filled, then contacts."""
         if self._now is None:
             self._now = rows
@@ -111,12 +111,12 @@ class Rating:
             self._next = self._gap = None
 
     def _alignment(self, joint: Floats, motor: Floats, key: int) -> Floats:
-        terms = self._terms
+        run = self._run
         flies = self._jumps and key == 0
-        support = Support.NONE if flies else SUPPORTS[terms.setup]
-        return alignment(deflection(terms.design, joint, motor, support, terms.reference))
+        support = Support.NONE if flies else SUPPORTS[run.setup.kind]
+        return alignment(deflection(run.design, joint, motor, support, run.reference))
 
-    def _close(self, stretch: Stretch, time: float) -> None:
+    def _close(self, stretch: RatedRows, time: float) -> None:
         if not self._whole or stretch.rated < SHORTEST:
             return
         name = ("flight", "stance")[stretch.key] if self._jumps else "period"

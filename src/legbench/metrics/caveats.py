@@ -1,0 +1,42 @@
+"""What a run does not show although its reader may look for it, in words."""
+
+from legbench.metrics.analysis import Analysis
+from legbench.metrics.roles import STATES, resting
+
+
+def warnings_of(run: Analysis) -> list[str]:
+    """Sentences that say why a run has no rating, or by what stand-in it was measured."""
+    if len(run.time) == 0:
+        return ["the run has no rows: there is nothing to rate"]
+    found: list[str] = []
+    described = run.description
+    says_rest = bool(resting(run["phase"], described.phases).all())
+    if run.first_action == len(run.time):
+        found.append(
+            f"no control action: all {len(run.time)} rows are at rest and the command does not move"
+        )
+    elif says_rest:
+        found.append(
+            "controller"
+            f" {described.controller} names no phase but rest: it is taken to act from"
+            f" {run.time[run.first_action]:g} s on, where its command first moves"
+        )
+    rated = run.ratings.chosen
+    if described.jumps and not run.has_truth and not _tells_stance(run):
+        found.append(
+            "no stance and no flight is known: the run has no truth, and no phase of controller"
+            f" {described.controller} has the role stance or flight"
+        )
+    elif not (rated.stance or rated.flight or rated.periods):
+        what = (
+            "no stance or flight lies complete within the run"
+            if described.jumps
+            else "z2 did not turn back and forth once after the first control action, or by less"
+            f" than the {described.counting.smallest:.3g} rad that count"
+        )
+        found.append(f"nothing was rated: {what}")
+    return found
+
+
+def _tells_stance(run: Analysis) -> bool:
+    return any(phase.role in STATES for phase in run.description.phases)

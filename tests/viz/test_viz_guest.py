@@ -1,0 +1,88 @@
+"""A controller that is not built in: its own signals and phases in every picture."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import viz_rrd
+from viz_runs import part, record
+
+from legbench.design.setup import SetupKind
+from legbench.phases import ControllerDescription, PhaseInfo, Role
+from legbench.recording.controller_table import controller_table
+from legbench.recording.reader import Recording, described
+from legbench.signals import Signal
+from legbench.viz.facts import as_markdown, facts_of
+from legbench.viz.live.blueprint import blueprint
+from legbench.viz.live.rrd import write_rrd
+from legbench.viz.print.figures import phase_figure
+
+TARGET = Signal("target", ("hip", "knee"), "rad", "set point")
+EFFORT = Signal("effort", (), "W", "power asked for")
+SAID = ControllerDescription(
+    phases=tuple(
+        PhaseInfo(code=code, name=name, role=Role.ACTING)
+        for code, name in ((20, "out"), (21, "back"), (22, "hold"), (23, "wait"))
+    ),
+    signals=(TARGET, EFFORT),
+)
+
+
+@pytest.fixture
+def guest(tmp_path: Path) -> Recording:
+    """A leg with a fixed trunk under a controller with four phases and two signals."""
+    run = record(tmp_path, SetupKind.HFTS, 1200)
+    chosen = {"kind": "mine.py:Sine", "settings": {"freq": 3.1}}
+    experiment = {**run.manifest["experiment"], "controller": chosen}
+    manifest = {
+        **run.manifest,
+        "experiment": experiment,
+        "controller": controller_table("mine.py:Sine", SAID),
+    }
+    effort = np.where(run.time < 0.1, np.nan, run.time)
+    columns = {
+        **run.columns,
+        "phase": np.where(run.columns["phase"] == 3, 20, 21).astype(np.int8),
+        "target_hip": -run.time,
+        "target_knee": run.time,
+        "effort": effort,
+    }
+    return replace(run, manifest=manifest, described=described(manifest, run.path), columns=columns)
+
+
+def test_own_signals_and_phases_are_shown(guest: Recording, tmp_path: Path) -> None:
+    shown = viz_rrd.temporal(write_rrd(guest, tmp_path / "guest.rrd"))
+    target = np.array(shown["/series/own/target"]["scalars"])
+    np.testing.assert_allclose(target, np.stack([-guest.time, guest.time], axis=-1))
+    effort = shown["/series/own/effort"]
+    np.testing.assert_allclose(np.ravel(effort["scalars"]), guest.time[100:])
+    states = [state[0] for state in shown["/states/controller"]["state"]]
+    assert set(states) == {"out", "back"}
+
+
+def test_each_own_signal_has_a_tab_with_its_unit(guest: Recording) -> None:
+    facts = facts_of(guest.description, guest.path)
+    names = _view_names(blueprint(facts, room=(0.0, 1.0)).root_container)
+    assert {"target [rad]", "effort [W]"} <= set(names)
+
+
+def _view_names(container: object) -> list[str]:
+    inside = getattr(container, "contents", None)
+    own = [str(container.name)] if getattr(container, "name", None) else []
+    parts = inside if isinstance(inside, list | tuple) else []
+    return own + [name for each in parts for name in _view_names(each)]
+
+
+def test_a_figure_of_a_guest_is_coloured_by_period(guest: Recording) -> None:
+    figure = phase_figure(guest)
+    assert "mine.py:Sine" in figure.get_suptitle()
+    assert len(figure.axes) == 4
+    np.testing.assert_array_equal(guest["target"][:, 1], guest.time)
+    np.testing.assert_array_equal(part(guest, 0, 300)["effort"][100:], guest.time[100:300])
+
+
+def test_the_facts_of_a_guest_are_its_settings(guest: Recording) -> None:
+    text = as_markdown(facts_of(guest.description, guest.path))
+    assert "- kind: mine.py:Sine" in text
+    assert "- freq: 3.1" in text
