@@ -125,7 +125,7 @@ def test_read_only_commands_nothing(tmp_path: Path) -> None:
     assert " 202#" not in log
     seen = load(finished.path)
     np.testing.assert_array_equal(seen["applied_pos"], seen["motor_pos"])
-    assert json.loads((finished.path / "run.json").read_text())["bus"]["read_only"]
+    assert json.loads((finished.path / "run.json").read_text())["plant"]["bus"]["read_only"]
 
 
 # --- the same limits on every plant ----------------------------------------------------------

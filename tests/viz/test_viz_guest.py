@@ -68,10 +68,9 @@ def test_each_own_signal_has_a_tab_with_its_unit(guest: Recording) -> None:
 
 
 def _view_names(container: object) -> list[str]:
-    inside = getattr(container, "contents", None)
-    own = [str(container.name)] if getattr(container, "name", None) else []
+    inside, name = getattr(container, "contents", None), getattr(container, "name", None)
     parts = inside if isinstance(inside, list | tuple) else []
-    return own + [name for each in parts for name in _view_names(each)]
+    return [str(name), *(each for part in parts for each in _view_names(part))]
 
 
 def test_a_figure_of_a_guest_is_coloured_by_period(guest: Recording) -> None:

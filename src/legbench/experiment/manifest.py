@@ -84,9 +84,7 @@ def manifest_of(
     described = experiment.controller.describe()
     return {
         "experiment": tables,
-        "controller": controller_table(
-            experiment.controller.kind, experiment.controller.describe()
-        ),
+        "controller": controller_table(experiment.controller.kind, described),
         "plant": {"kind": experiment.plant.kind, **facts},
         "provenance": {
             "versions": {"python": platform.python_version(), **_versions()},

@@ -169,7 +169,8 @@ class Block:
         if shapes != [layout.shape]:
             legs = "one leg" if len(layout.shape) == 1 else f"{layout.shape[0]} legs"
             return ConfigError(f"a run records {legs}, shapes {layout.shape}, not {shapes}")
+        shape = None if signals is None else np.shape(signals)
         return ConfigError(
-            f"the controller's own signals have shape {np.shape(signals)}; it declared"
+            f"the controller's own signals have shape {shape}; it declared"
             f" {(*layout.shape[:-1], layout.own)}"
         )

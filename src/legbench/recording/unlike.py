@@ -1,4 +1,4 @@
-"""In what the experiments of two runs differ."""
+"""Entries in which the experiments of two runs differ."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
