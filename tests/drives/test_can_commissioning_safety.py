@@ -11,7 +11,6 @@ import can
 import pytest
 from can_rig import BUS, LIMITS, MS, ROOT
 
-from legbench import plants
 from legbench.cli import main
 from legbench.commissioning.home import Homed, home
 from legbench.commissioning.jog import jog
@@ -29,6 +28,7 @@ from legbench.drives.errors import BusError, DriveError
 from legbench.drives.limits import SafetyLimits
 from legbench.drives.session import Session
 from legbench.errors import ConfigError
+from legbench.plant import can_open
 
 STIFFNESS = (4.0, 5.0)
 STOP = 1.0
@@ -286,7 +286,7 @@ def test_a_signal_stops_all_drives_before_the_command_ends(
         """At every frame from now on: a second one must not end the stop."""
         signal.raise_signal(SENDERS[name])
 
-    monkeypatch.setattr(plants, "emulate", the_bench)
+    monkeypatch.setattr(can_open, "emulate", the_bench)
     disturb(monkeypatch, under_way, send_signal)
     before = {number: signal.getsignal(number) for number in SENDERS.values()}
     status = main(["drives", *action, *bench(tmp_path)])

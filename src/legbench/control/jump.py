@@ -120,10 +120,7 @@ class _OneLeg:
         self._turn = config.apex_turn
         self._exits = phase_exits(config)
         self._commands = {
-            phase: Command(
-                motor_pos=stretched if phase is JumpPhase.PUSH else folded,
-                phase=np.asarray(phase, dtype=np.int64),
-            )
+            phase: _fixed(stretched if phase is JumpPhase.PUSH else folded, phase)
             for phase in JumpPhase
         }
         self._standing, self._since, self._furthest = 1.0, 0.0, 0.0
@@ -160,6 +157,14 @@ class _OneLeg:
         self._next, self._apex, self._sense = leave.to, leave.apex, leave.sense
         self._load, self._dwell = leave.load, leave.dwell
         self._command = self._commands[phase]
+
+
+def _fixed(motor_pos: Floats, phase: JumpPhase) -> Command:
+    """A command that is given again and again, so that nobody may write into it."""
+    held, code = motor_pos.copy(), np.array(phase, dtype=np.int64)
+    held.setflags(write=False)
+    code.setflags(write=False)
+    return Command(motor_pos=held, phase=code)
 
 
 @final

@@ -49,10 +49,11 @@ def guests_of(experiment: Experiment) -> Iterator[GuestFile]:
         path = source_of(guest)
         if guest.kind in registry.builtin or path is None:
             continue
+        name = f"{registry.what}_{path.name.removeprefix(f'{registry.what}_')}"
         yield GuestFile(
             what=registry.what,
-            name=f"{registry.what}_{path.name}",
-            reference=_reference(registry, guest, f"{registry.what}_{path.name}"),
+            name=name,
+            reference=_reference(registry, guest, name),
             content=path.read_bytes(),
         )
 

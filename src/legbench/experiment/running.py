@@ -13,7 +13,7 @@ from legbench.experiment.start import start_of, targets_of
 from legbench.loop import Outcome, Progress, StopFlag, run
 from legbench.mjcf import model_text
 from legbench.plant.start import PERIOD
-from legbench.plants import Leg, open_plant
+from legbench.plants import Leg, OpenPlant, open_plant
 from legbench.recording.writer import RunWriter
 
 
@@ -53,7 +53,6 @@ def record(
     """
     controller = make_controller(experiment.controller, targets_of(experiment))
     start = start_of(experiment)
-    cycles = round(experiment.duration / PERIOD)
     leg = Leg(
         design=experiment.design, options=experiment.options, start=start, servo=experiment.servo
     )
@@ -61,30 +60,45 @@ def record(
     opened = open_plant(experiment.plant, leg)
     with opened.plant:
         manifest = manifest_of(experiment, start, xml, opened.facts, out / "run")
-        kind = experiment.controller.kind
-        name = f"{kind}-{experiment.design.name}"
+        name = f"{experiment.controller.kind}-{experiment.design.name}"
         with RunWriter.create(out, manifest, name=name) as writer:
-            try:
-                (writer.path / "leg.xml").write_text(xml, encoding="utf-8")
-                for guest in guests_of(experiment):
-                    (writer.path / guest.name).write_bytes(guest.content)
-                opened.start_log(writer.path)
-                if on_started is not None:
-                    on_started(writer.path)
-            except OSError as error:
-                raise RecordingError(f"{writer.path}: {error}") from error
+            _begin(writer, experiment, xml, opened, on_started)
             outcome = run(
                 opened.plant,
                 controller,
-                cycles,
+                round(experiment.duration / PERIOD),
                 clock=clock or opened.clock,
                 sink=writer,
                 stop=stop,
                 progress=progress,
             )
-            opened.plant.close()
-            for event, detail in opened.events().items():
-                writer.event(outcome.cycles * PERIOD, event, **detail)
-            writer.event(outcome.cycles * PERIOD, "end", status=outcome.status, cause=outcome.cause)
-            writer.close(outcome.status, outcome.cause)
+            _end(writer, opened, outcome)
     return Finished(path=writer.path, outcome=outcome)
+
+
+def _begin(
+    writer: RunWriter,
+    experiment: Experiment,
+    xml: str,
+    opened: OpenPlant,
+    on_started: Callable[[Path], None] | None,
+) -> None:
+    """Put model, guests and logs into the run folder; raises RecordingError."""
+    try:
+        (writer.path / "leg.xml").write_text(xml, encoding="utf-8")
+        for guest in guests_of(experiment):
+            (writer.path / guest.name).write_bytes(guest.content)
+        opened.start_log(writer.path)
+        if on_started is not None:
+            on_started(writer.path)
+    except OSError as error:
+        raise RecordingError(f"{writer.path}: {error}") from error
+
+
+def _end(writer: RunWriter, opened: OpenPlant, outcome: Outcome) -> None:
+    """Close the plant, then the run, with what both have to tell."""
+    opened.plant.close()
+    for event, detail in opened.events().items():
+        writer.event(outcome.cycles * PERIOD, event, **detail)
+    writer.event(outcome.cycles * PERIOD, "end", status=outcome.status, cause=outcome.cause)
+    writer.close(outcome.status, outcome.cause)
