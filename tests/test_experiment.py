@@ -18,7 +18,7 @@ from legbench.design.setup import Setup, SetupKind
 from legbench.design.toml import design_from_mapping
 from legbench.errors import ConfigError, RecordingError
 from legbench.experiment import Experiment, record
-from legbench.loop import StopFlag
+from legbench.interrupts import StopFlag
 from legbench.mjcf import Linkage, LinkageKind
 from legbench.recording.reader import load
 from legbench.servo import ServoConfig

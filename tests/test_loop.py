@@ -10,7 +10,8 @@ import pytest
 from legbench.clock import AbstractClock, VirtualClock, WallClock
 from legbench.control import AbstractController
 from legbench.errors import PlantFault, RecordingError
-from legbench.loop import PROGRESS_EVERY, StopFlag, run, stop_on_interrupt
+from legbench.interrupts import StopFlag, stop_on_interrupt
+from legbench.loop import PROGRESS_EVERY, run
 from legbench.plant.abstract import AbstractPlant
 from legbench.signals import Command, Floats, Observation, Phase
 

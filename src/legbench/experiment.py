@@ -2,8 +2,9 @@
 
 import math
 import platform
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import asdict, dataclass, field, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -23,12 +24,14 @@ from legbench.control import (
 from legbench.design import LegDesign
 from legbench.design.setup import Setup, SetupKind
 from legbench.design.toml import design_to_mapping
+from legbench.drives.master.stop_report import CAUSE, StopReport, add_trouble
 from legbench.errors import ConfigError, RecordingError
+from legbench.interrupts import StopFlag, shielded
 from legbench.kinematics import ModalConvention
-from legbench.loop import Outcome, Progress, StopFlag, run
+from legbench.loop import Outcome, Progress, run
 from legbench.mjcf import BuildOptions, Ground, Linkage, Numerics, build_spec, to_xml, xml_hash
 from legbench.plant.start import PERIOD, Start
-from legbench.plants import Leg, PlantChoice, SimChoice, open_plant
+from legbench.plants import Leg, OpenPlant, PlantChoice, SimChoice, open_plant
 from legbench.recording.writer import RunWriter
 from legbench.servo import ServoConfig
 
@@ -141,8 +144,13 @@ def record(
         progress: told now and then how far the run is.
         on_started: told the run folder before the first cycle.
 
+    A run whose drives could not be shown to be without power in the end is a fault, whatever it
+    was until then. An interruption before the run folder is there leaves nothing behind; one
+    before the first row leaves a folder that says `interrupted` and holds no rows.
+
     Raises:
         ConfigError: settings that the leg or the plant refuses; nothing is written.
+        KeyboardInterrupt: interrupted before the plant began to go to its start.
         BusError, DriveError: a bus or a drive is not what it should be; before the first cycle.
         PlantFault: something went wrong on the way to the start posture.
         RecordingError: the folder cannot be written, or the disk failed on the way; what was
@@ -160,7 +168,7 @@ def record(
         manifest = _manifest(experiment, start, xml) | opened.manifest
         kind = experiment.controller.kind
         name = f"{kind}-{experiment.design.name}"
-        with RunWriter.create(out, manifest, name=name) as writer:
+        with _recording(out, manifest, name) as writer:
             try:
                 (writer.path / "leg.xml").write_text(xml, encoding="utf-8")
                 opened.start_log(writer.path)
@@ -168,21 +176,53 @@ def record(
                     on_started(writer.path)
             except OSError as error:
                 raise RecordingError(f"{writer.path}: {error}") from error
-            outcome = run(
-                opened.plant,
-                controller,
-                cycles,
-                clock=clock or opened.clock,
-                sink=writer,
-                stop=stop,
-                progress=progress,
-            )
+            try:
+                outcome = run(
+                    opened.plant,
+                    controller,
+                    cycles,
+                    clock=clock or opened.clock,
+                    sink=writer,
+                    stop=stop,
+                    progress=progress,
+                )
+            except BaseException as error:
+                opened.plant.close()
+                _tell_events(opened, writer)
+                add_trouble(error, opened.stopped)
+                raise
             opened.plant.close()
-            for event, detail in opened.events().items():
-                writer.event(outcome.cycles * PERIOD, event, **detail)
+            outcome = _judged(outcome, opened.stopped)
+            _tell_events(opened, writer)
             writer.event(outcome.cycles * PERIOD, "end", status=outcome.status, cause=outcome.cause)
             writer.close(outcome.status, outcome.cause)
     return Finished(path=writer.path, outcome=outcome)
+
+
+@contextmanager
+def _recording(out: Path, manifest: dict[str, Any], name: str) -> Iterator[RunWriter]:
+    """Write a new run; one that is interrupted while its folder is made is closed as usual."""
+    with ExitStack() as stack:
+        with shielded():
+            writer = stack.enter_context(RunWriter.create(out, manifest, name=name))
+        yield writer
+
+
+def _tell_events(opened: OpenPlant, writer: RunWriter) -> None:
+    for event, detail in opened.events().items():
+        writer.event(writer.rows * PERIOD, event, **detail)
+
+
+def _judged(outcome: Outcome, stopped: StopReport | None) -> Outcome:
+    """An outcome after the stop of the drives: without a verified stop no run has ended well.
+
+    The first cause stays the cause; what the stop has to tell is added to the message.
+    """
+    trouble = None if stopped is None else stopped.trouble
+    if trouble is None:
+        return outcome
+    message = trouble if outcome.message is None else f"{outcome.message}; {trouble}"
+    return replace(outcome, status="fault", cause=outcome.cause or CAUSE, message=message)
 
 
 def _manifest(experiment: Experiment, start: Start, xml: str) -> dict[str, Any]:

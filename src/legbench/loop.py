@@ -1,17 +1,14 @@
 """The only while-loop: observation in, command out, one row a cycle."""
 
-import signal
-import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
-from types import FrameType
 from typing import Protocol
 
 from legbench.clock import AbstractClock, VirtualClock
 from legbench.control import AbstractController
 from legbench.errors import PlantFault
+from legbench.interrupts import StopFlag
 from legbench.plant.abstract import AbstractPlant
 from legbench.signals import Command, Observation
 
@@ -19,8 +16,6 @@ Progress = Callable[[int, int], None]
 """Called now and then, and at the end, with cycles done and cycles in all."""
 PROGRESS_EVERY = 250
 """Cycles between two calls of the progress function."""
-STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-"""^C, a polite end, and the terminal's end."""
 
 
 class RowSink(Protocol):
@@ -48,49 +43,6 @@ class Outcome:
     """[s]"""
 
 
-class StopFlag:
-    """Set by ^C or by whoever holds it; the loop ends before the next cycle.
-
-    Attributes:
-        is_set: whether the loop has been asked to end.
-        raises: whether to ask by KeyboardInterrupt: while a plant goes to its start posture, no
-            loop looks at the flag.
-    """
-
-    def __init__(self) -> None:
-        self.is_set = False
-        self.raises = False
-
-    def set(self) -> None:
-        """Ask the loop to end.
-
-        Raises:
-            KeyboardInterrupt: a plant is being reset.
-        """
-        self.is_set = True
-        if self.raises:
-            raise KeyboardInterrupt
-
-
-@contextmanager
-def stop_on_interrupt() -> Iterator[StopFlag]:
-    """Turn ^C, SIGTERM and SIGHUP into a flag, so that the loop ends between two rows."""
-    flag = StopFlag()
-    if threading.current_thread() is not threading.main_thread():
-        yield flag
-        return
-
-    def handle(_signal: int, _frame: FrameType | None) -> None:
-        flag.set()
-
-    previous = {name: signal.signal(name, handle) for name in STOP_SIGNALS}
-    try:
-        yield flag
-    finally:
-        for name, handler in previous.items():
-            signal.signal(name, handler)
-
-
 def run(
     plant: AbstractPlant,
     controller: AbstractController,
@@ -105,23 +57,25 @@ def run(
 
     The first fault ends the run and is returned as its cause; every row until then is kept. An
     exception of any kind closes the plant before anything else happens: drives come to rest
-    while disks are still busy.
+    while disks are still busy. A stop that comes before the first row ends the run there, with no
+    cycle; from the first row on it ends the run between two rows.
 
     Raises:
         PlantFault: the plant did not get to its start.
         RecordingError: the recording failed.
     """
     clock, stop = clock or VirtualClock(), stop or StopFlag()
+    began = False
     try:
         stop.raises = True
         observation = plant.reset()
-        stop.raises = False
         controller.reset(observation)
+        began, stop.raises = True, False
         return _cycle(plant, controller, observation, cycles, clock, sink, stop, progress)
     except BaseException as error:
         stop.raises = False
         plant.close()
-        if isinstance(error, KeyboardInterrupt) and stop.is_set:
+        if not began and isinstance(error, KeyboardInterrupt) and stop.is_set:
             return Outcome(status="interrupted", cause=None, message=None, cycles=0, wall_time=0.0)
         raise
 

@@ -17,11 +17,12 @@ from legbench.drives.emulated.network import Network
 from legbench.drives.limits import UNLIMITED, Range, SafetyLimits
 from legbench.drives.link import Link
 from legbench.drives.master.lock import ChannelLock
+from legbench.drives.master.stop_report import StopReport
 from legbench.drives.open_bus import adapter_of, open_bus
 from legbench.drives.session import Session
 from legbench.drives.stopping import check_stopping
 from legbench.drives.wire import check_load
-from legbench.errors import ConfigError, LegbenchError
+from legbench.errors import ConfigError
 from legbench.mjcf import BuildOptions
 from legbench.plant.abstract import AbstractPlant
 from legbench.plant.analytic import AnalyticPlant
@@ -128,12 +129,20 @@ class OpenPlant:
         """Time of row 0 on the bus's own time base, as in the bus log [s]."""
         return self.plant.began if isinstance(self.plant, CanPlant) else None
 
+    @property
+    def stopped(self) -> StopReport | None:
+        """How the stop of the drives has ended; none where there were none to stop."""
+        return None if self.link is None else self.link.stopped
+
     def events(self) -> dict[str, dict[str, Any]]:
         """What a run on it has to tell in the end, by name."""
         if self.link is None:
             return {}
-        cycle = self.link.cycle
-        return {
+        cycle, stopped = self.link.cycle, self.link.stopped
+        events: dict[str, dict[str, Any]] = {}
+        if stopped is not None and stopped != StopReport():
+            events["stop"] = asdict(stopped)
+        return events | {
             "bus": {
                 "skipped_cycles": self.link.skipped_total,
                 "silent_cycles": cycle.silent_total,
@@ -221,11 +230,11 @@ def _open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
     if not choice.is_virtual(config):
         limits.require_complete()
     session = open_session(config, choice, leg, leads=not choice.read_only)
-    granted = session.be_punctual()
     try:
+        granted = session.be_punctual()
         link = session.link(limits, leg.design.stiffness, read_only=choice.read_only)
         link.open()
-    except LegbenchError:
+    except BaseException:
         session.close()
         raise
     plant = CanPlant(session, link, leg.start, read_only=choice.read_only)

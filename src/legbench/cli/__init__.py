@@ -83,8 +83,13 @@ def _run(arguments: list[str] | None) -> int:
     try:
         return import_module(f"legbench.cli.{name}").main(rest)
     except LegbenchError as error:
-        report_error(str(error))
+        report_error("; ".join([str(error), *_notes(error)]))
         return 1
-    except KeyboardInterrupt:
-        report_error("interrupted")
+    except KeyboardInterrupt as error:
+        report_error("; ".join(["interrupted", *_notes(error)]))
         return 130
+
+
+def _notes(error: BaseException) -> list[str]:
+    """What was added to an exception on its way, such as drives that keep their power."""
+    return getattr(error, "__notes__", [])

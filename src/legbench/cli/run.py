@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import subcommand
 
-from legbench.cli.output import note, print_json, progress
+from legbench.cli.output import note, print_json, progress, report_error
 from legbench.cli.parse import parse
 from legbench.cli.table import print_summary
 from legbench.clock import WallClock
@@ -15,8 +15,8 @@ from legbench.design import load_design
 from legbench.design.setup import Setup, SetupKind
 from legbench.errors import ConfigError, MissingExtraError
 from legbench.experiment import USUAL_SETUP, Experiment, record
+from legbench.interrupts import stop_on_interrupt
 from legbench.kinematics import ModalConvention
-from legbench.loop import stop_on_interrupt
 from legbench.metrics import summarise
 from legbench.mjcf import Ground, Linkage, LinkageKind
 from legbench.plant.start import PERIOD
@@ -158,14 +158,19 @@ class Watching:
 
 
 def main(arguments: list[str]) -> int:
-    """Run; 0 when it came to its end or was stopped by ^C, 1 when a fault ended it."""
+    """Run a controller on a leg and record it.
+
+    Returns:
+        0 when the run came to its end or was stopped by ^C after its first row, 1 when a fault
+        ended it or a drive kept its power, 130 when ^C came before the first row.
+    """
     chosen = parse(RunArguments, "run", arguments)
     experiment = experiment_of(chosen)
     watched = chosen.view or chosen.serve
     watching = Watching(serve=chosen.serve)
     paced = watched or chosen.real_time
     clock = WallClock(PERIOD) if paced and plays_alone(chosen) else None
-    with stop_on_interrupt() as stop:
+    with stop_on_interrupt(raises=True) as stop:
         finished = record(
             experiment,
             chosen.out,
@@ -175,6 +180,9 @@ def main(arguments: list[str]) -> int:
             on_started=watching.start if watched else None,
         )
     watching.stop()
+    if finished.outcome.status == "interrupted" and finished.outcome.cycles == 0:
+        report_error(f"interrupted before the first row; {finished.path} holds 0 rows")
+        return 130
     if finished.outcome.message is not None:
         note(f"legbench: {finished.outcome.message}")
     summary = summarise(load(finished.path))

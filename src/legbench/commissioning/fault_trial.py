@@ -28,7 +28,8 @@ from legbench.drives.errors import DriveError
 from legbench.drives.limits import SafetyLimits
 from legbench.errors import ConfigError
 from legbench.experiment import Experiment, make_controller, start_of, targets_of
-from legbench.loop import Outcome, StopFlag, run
+from legbench.interrupts import StopFlag
+from legbench.loop import Outcome, run
 from legbench.plants import BUS_LOG, EMULATED, LIMITS_NAME, CanChoice, Leg, OpenPlant, open_plant
 from legbench.recording.reader import load
 from legbench.recording.writer import RunWriter

@@ -18,11 +18,10 @@ from typing import final
 
 import can
 
-from legbench.closing import Closing
 from legbench.drives.cia402 import Goal
 from legbench.drives.codec.nmt import NmtState
 from legbench.drives.config import BusConfig, check_start_speed
-from legbench.drives.errors import BusError, DriveError
+from legbench.drives.errors import DriveError
 from legbench.drives.limits import Guard, SafetyLimits
 from legbench.drives.master.bring_up import BringUp
 from legbench.drives.master.cycle import Cycle, Tick
@@ -30,13 +29,16 @@ from legbench.drives.master.lock import ChannelLock
 from legbench.drives.master.port import Listener, Port
 from legbench.drives.master.read_only import may_pace, may_read
 from legbench.drives.master.sample import Sample, sample_of
+from legbench.drives.master.sdo_stop import leave_operational
 from legbench.drives.master.start_up import StartUp
 from legbench.drives.master.stop import StopLadder
+from legbench.drives.master.stop_report import Lead, StopReport
 from legbench.drives.master.supervisor import Supervisor
 from legbench.drives.open_bus import timebase_of
 from legbench.drives.timebase import Timebase
 from legbench.drives.wire import check_load
 from legbench.errors import PlantFault
+from legbench.interrupts import Shield, shielded
 
 LISTEN_NS = 100_000_000
 """So long read-only listens for the SYNC of another master, and for heartbeats."""
@@ -54,16 +56,20 @@ class LinkState(Enum):
     """Process data flows, targets follow the motors."""
     RUNNING = auto()
     """All drives in operation enabled, commands are taken."""
+    STOPPING = auto()
+    """Told to stop, and not every drive has been seen without power yet."""
     STOPPED = auto()
+    """Every drive has been seen without power; or this link never led one."""
 
 
 @final
-class Link(Closing):
+class Link(Lead):
     """One master, its bus and its drives.
 
     Attributes:
         state: how far it has come.
         fault: the first fault; what ended the link.
+        stopped: how the stop of the drives has ended, none before it.
         skipped_total: ticks without SYNC since the start.
         listening: read-only, and another master sends SYNC: this one sends nothing.
     """
@@ -107,6 +113,7 @@ class Link(Closing):
         self.state = LinkState.NEW
         self.fault: PlantFault | None = None
         self.skipped_total = 0
+        self.stopped: StopReport | None = None
         self._supervisor = Supervisor(self.cycle, config, self._limits, self._port.timebase)
         self._start_up = StartUp(self._port, self.cycle, config, read_only=read_only)
         self._last = Tick(0, 0, 0, 0, False)
@@ -385,29 +392,51 @@ class Link(Closing):
     # --- the end -----------------------------------------------------------------------------
 
     def stop(self) -> None:
-        """Quick stop of all drives in this cycle, then no power; never raises."""
-        if self.state in (LinkState.CYCLIC, LinkState.RUNNING):
-            self.state = LinkState.STOPPED
+        """Quick stop of all drives in this cycle, then no power, then a look whether it is gone.
+
+        Raises no error; `stopped` tells how it has ended. No signal gets in between: a ^C that
+        comes meanwhile is raised at the end. While the stop is not verified, calling it again
+        repeats it.
+        """
+        if self.state not in (LinkState.CYCLIC, LinkState.RUNNING, LinkState.STOPPING):
+            return
+        with shielded() as shield:
+            self.state = LinkState.STOPPING
             if not self._read_only:
-                StopLadder(self.cycle).run()
+                self._note(StopLadder(self.cycle, shield.hold).run())
+            else:
+                self.state = LinkState.STOPPED
 
     def close(self) -> None:
-        """Stop, leave the drives in pre-operational, release the channel; never raises.
+        """Stop, leave the drives in pre-operational, release the channel; raises no error.
 
-        Twice is once. A link that only looks leaves the drives of another master alone.
+        Twice is once. A stop that is not verified is repeated, in the end over SDO. A link that
+        only looks leaves the drives of another master alone.
         """
         if self.state is LinkState.NEW or self._closed:
             return
-        self._closed = True
-        looked = self.listening or self.state is LinkState.CONFIGURED
-        try:
+        with shielded() as shield:
+            looked = self.listening or self.state is LinkState.CONFIGURED
             self.stop()
-        finally:
-            try:
-                if not (self._read_only and (looked or self.cycle.led_by_another())):
-                    self.bring_up.pre_operational()
-            except BusError as error:
-                self.cycle.bus_error = error
-            finally:
-                self._let_go()
+            if not (self._read_only and (looked or self._led_by_another(shield))):
+                order, nodes = self.bring_up.pre_operational, self._config.nodes
+                report = leave_operational(order, self._port, nodes, self.stopped, shield.hold)
+                if report is not None:
+                    self._note(report)
+            self._let_go()
+            self._closed = True
+            if self.state is not LinkState.STOPPING:
                 self.state = LinkState.STOPPED
+
+    def _note(self, report: StopReport) -> None:
+        """Remember how a stop has ended; one that repeats another keeps what that had to tell."""
+        self.stopped = report.after(self.stopped)
+        if report.verified:
+            self.state = LinkState.STOPPED
+
+    def _led_by_another(self, shield: Shield) -> bool:
+        try:
+            return self.cycle.led_by_another()
+        except BaseException as error:  # Whatever a driver raises, the bus is left alone then.
+            shield.hold(error)
+            return True

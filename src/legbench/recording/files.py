@@ -78,12 +78,12 @@ def put_in_place(draft: Path, path: Path) -> None:
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Write `content` as the file `path`, or leave `path` untouched and raise OSError."""
+    """Write `content` as the file `path`, or leave `path` untouched; raises OSError."""
     draft = path.with_name(f".{path.name}.draft")
     try:
         draft.write_bytes(content)
         put_in_place(draft, path)
-    except OSError:
+    except BaseException:
         with suppress(OSError):
             draft.unlink()
         raise

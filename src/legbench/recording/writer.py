@@ -9,6 +9,7 @@ from types import TracebackType
 from typing import Any, Self, final
 
 from legbench.errors import ConfigError, PlantFault, RecordingError
+from legbench.interrupts import shielded
 from legbench.recording.archive import write_archive
 from legbench.recording.disk import Disk
 from legbench.recording.events import encode_event
@@ -84,6 +85,11 @@ class RunWriter:
                 " choose a folder that you can write to with --out"
             ) from error
 
+    @property
+    def rows(self) -> int:
+        """Number of rows that were appended so far."""
+        return self._handed + self._block.count
+
     def append(
         self, command: Command, observation: Observation, cycle_us: float, late_us: float
     ) -> None:
@@ -120,7 +126,8 @@ class RunWriter:
     def close(self, status: str = COMPLETE, cause: str | None = None) -> None:
         """End the run: write what waits, make the archive, say in `run.json` how it ended.
 
-        Whatever fails, the rows already on disk stay readable. A second call does nothing.
+        Whatever fails, the rows already on disk stay readable. A second call does nothing. No
+        signal gets in between: a ^C that comes meanwhile is raised when the run is closed.
 
         Args:
             status: "complete", "interrupted" or "fault"; a run that lost rows is a fault.
@@ -135,15 +142,16 @@ class RunWriter:
             return
         if status not in CLOSING:
             raise ConfigError(f"a run cannot end as {status!r}; choose from {', '.join(CLOSING)}")
-        self._closed = True
-        if self._block.count:
-            self._hand_over()
-        self._disk.finish()
-        try:
-            self._note_end(status, cause)
-            problem = self._settle()
-        finally:
-            self._disk.close()
+        with shielded():
+            self._closed = True
+            if self._block.count:
+                self._hand_over()
+            self._disk.finish()
+            try:
+                self._note_end(status, cause)
+                problem = self._settle()
+            finally:
+                self._disk.close()
         if problem is not None and not self._told:
             raise RecordingError(problem)
 
@@ -158,12 +166,15 @@ class RunWriter:
     ) -> None:
         if error is None:
             self.close()
+            return
+        fault = _fault_in(error)
+        if fault is not None:
+            self.close(FAULT, fault.cause)
         elif isinstance(error, KeyboardInterrupt):
+            error.add_note(f"{self.path} holds {self.rows} rows")
             self.close(INTERRUPTED, "KeyboardInterrupt")
         else:
-            self.close(
-                FAULT, error.cause if isinstance(error, PlantFault) else type(error).__name__
-            )
+            self.close(FAULT, type(error).__name__)
 
     def _hand_over(self) -> None:
         self._handed += self._block.count
@@ -214,6 +225,14 @@ class RunWriter:
             return self._loss(f"run.json was not updated: {reason(error)}")
         why = self._manifest.get("recording_error")
         return None if why is None else self._loss(why)
+
+
+def _fault_in(error: BaseException) -> PlantFault | None:
+    """The fault that ended a run, also where a ^C came while it was dealt with."""
+    link: BaseException | None = error
+    while link is not None and not isinstance(link, PlantFault):
+        link = link.__context__
+    return link
 
 
 def _fresh_folder(parent: Path, stem: str) -> Path:

@@ -6,13 +6,7 @@ from typing import final
 
 import can
 
-from legbench.drives.cia402 import (
-    POWERED,
-    Controlword,
-    Mode,
-    decode_state,
-    describe_statusword,
-)
+from legbench.drives.cia402 import POWERED, Mode, decode_state
 from legbench.drives.codec.datatypes import DataType
 from legbench.drives.codec.emcy import MEANINGS
 from legbench.drives.codec.nmt import NmtCommand, nmt_frame
@@ -23,14 +17,14 @@ from legbench.drives.errors import BusError, DriveError, SdoAbortError
 from legbench.drives.master.first_contact import first_contact
 from legbench.drives.master.port import Port
 from legbench.drives.master.sdo_port import SdoPort
+from legbench.drives.master.sdo_stop import SdoStop
 from legbench.drives.objects import name_of
+from legbench.interrupts import shielded
 
 PROFILE_402 = 0x0192
 """Low word of 1000h."""
 CSP_BIT = 1 << 7
 """Of 6502h: cyclic synchronous position mode."""
-STOP_PATIENCE, OFF_PATIENCE = 100, 20
-"""Reads of 6041h until a drive that is found with power has stopped, 10 ms apart."""
 MODE_PATIENCE = 50
 """Reads of 6061h until the mode must be there, 10 ms apart."""
 _MISSING = (Abort.NO_OBJECT, Abort.NO_SUB_INDEX)
@@ -177,6 +171,19 @@ class BringUp:
         Raises:
             DriveError: the drive refuses, or holds another value afterwards.
         """
+        try:
+            count = self._configure(node)
+        except KeyboardInterrupt as error:
+            error.add_note(
+                f"drive '{node.name}' (node {node.node_id}) has no power, and holds its "
+                "configuration in part: every run writes it anew, `legbench drives configure "
+                "--write` does, too"
+            )
+            raise
+        self._await_mode(node)
+        return count
+
+    def _configure(self, node: NodeConfig) -> int:
         sdo, count = self.sdo(node), 0
         for parameter in configuration(self._bus, node):
             if not self._write(node, parameter):
@@ -189,7 +196,6 @@ class BringUp:
                     f"{there}; the drive does not take this value"
                 )
             count += 1
-        self._await_mode(node)
         return count
 
     def _write(self, node: NodeConfig, parameter: Parameter) -> bool:
@@ -268,19 +274,13 @@ class BringUp:
             DriveError: one keeps its power.
         """
         powered = [node for node in self._bus.nodes if self.powered(node)]
-        for word, patience in ((Controlword.QUICK_STOP, STOP_PATIENCE), (0, OFF_PATIENCE)):
-            for node in powered:
-                self.sdo(node).put(0x6040, 0, U16, word)
-            for _ in range(patience):
-                powered = [node for node in powered if self.powered(node)]
-                if not powered:
-                    break
-                self._port.timebase.wait_until(self._port.timebase.now_ns() + 10_000_000)
-        for node in powered:
-            state = describe_statusword(self.sdo(node).get_int(0x6041, 0, U16))
+        if not powered:
+            return
+        with shielded() as shield:
+            report = SdoStop(self._port, powered, shield.hold).run()
+        if report.trouble is not None:
             raise DriveError(
-                f"node {node.node_id} ('{node.name}') is found with power and keeps it: {state}; "
-                "end the program that leads it, or switch its power off"
+                f"found with power: {report.trouble}; or end the program that leads it"
             )
 
     def powered(self, node: NodeConfig) -> bool:
