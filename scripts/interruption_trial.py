@@ -259,6 +259,9 @@ class Theatre:
             command: one of `COMMANDS`.
             point: where; without one all calls are counted.
             lines: count the passes of source lines, too.
+
+        Raises:
+            KeyboardInterrupt: somebody else has interrupted.
         """
         witness = Witness()
         injector = Injector(point, witness.strike)
@@ -285,6 +288,8 @@ class Theatre:
             row = command == "run" and injector.phase == "run"
             witness.conclude(row=row)
             self._judge(injector.phase, status, error.getvalue(), witness.faults)
+        elif point is not None and status == 130:
+            raise KeyboardInterrupt  # From outside: nothing of ours has come yet.
         if set(now) != {signal.default_int_handler}:
             witness.faults.append("a signal handler is left")
         return Trial(
