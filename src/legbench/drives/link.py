@@ -27,6 +27,7 @@ from legbench.drives.limits import Guard, SafetyLimits
 from legbench.drives.master.bring_up import BringUp
 from legbench.drives.master.cycle import Cycle, Tick
 from legbench.drives.master.lock import ChannelLock
+from legbench.drives.master.parking import park
 from legbench.drives.master.port import Listener, Port
 from legbench.drives.master.read_only import may_pace, may_read
 from legbench.drives.master.sample import Sample, sample_of
@@ -65,6 +66,7 @@ class Link(Closing):
         state: how far it has come.
         fault: the first fault; what ended the link.
         skipped_total: ticks without SYNC since the start.
+        not_parked: what `close` failed to switch off, see `master.parking`.
         listening: read-only, and another master sends SYNC: this one sends nothing.
     """
 
@@ -107,16 +109,23 @@ class Link(Closing):
         self.state = LinkState.NEW
         self.fault: PlantFault | None = None
         self.skipped_total = 0
+        self.not_parked: list[str] = []
         self._supervisor = Supervisor(self.cycle, config, self._limits, self._port.timebase)
         self._start_up = StartUp(self._port, self.cycle, config, read_only=read_only)
         self._last = Tick(0, 0, 0, 0, False)
         self._expected: list[tuple[float, ...]] = []
         self._holds = self._closed = False
+        self._told: Listener | None = None
         self.listening = False
 
     def tell(self, listener: Listener) -> None:
-        """Show every frame to a listener from now on."""
-        self._port.listener = listener
+        """Show every frame to a listener from now on, or from when the drives are configured.
+
+        A log that holds their configuration would, played back, bring parked drives back to life.
+        """
+        self._told = listener
+        if self.state is not LinkState.NEW:
+            self._port.listener = listener
 
     # --- before anything moves ---------------------------------------------------------------
 
@@ -148,6 +157,8 @@ class Link(Closing):
             self._let_go()
             raise
         self.state = LinkState.CONFIGURED
+        if self._told is not None:
+            self._port.listener = self._told
 
     def _hold(self) -> None:
         self._lock.acquire()
@@ -299,6 +310,11 @@ class Link(Closing):
             raise
         return applied
 
+    def forget_wish(self) -> tuple[float, ...]:
+        """Measure the next step of the command from what was applied last; that [rad]."""
+        self._guard.start_at(self._guard.applied)
+        return self._guard.applied
+
     def move_to(self, motor_pos: Sequence[float], speed: float | None = None) -> Sample:
         """Go to a posture at a speed [rad/s], `start_speed` of the bus file by default.
 
@@ -392,7 +408,7 @@ class Link(Closing):
                 StopLadder(self.cycle).run()
 
     def close(self) -> None:
-        """Stop, leave the drives in pre-operational, release the channel; never raises.
+        """Stop, leave the drives parked in pre-operational, release the channel; never raises.
 
         Twice is once. A link that only looks leaves the drives of another master alone.
         """
@@ -404,8 +420,11 @@ class Link(Closing):
             self.stop()
         finally:
             try:
-                if not (self._read_only and (looked or self.cycle.led_by_another())):
+                led = self.cycle.led_by_another()
+                if not (self._read_only and (looked or led)):
                     self.bring_up.pre_operational()
+                if not (self._read_only or led):
+                    self.not_parked = park(self._port, self._config, self.cycle.other)
             except BusError as error:
                 self.cycle.bus_error = error
             finally:
