@@ -5,7 +5,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import FrameType
 from typing import Protocol
 
@@ -13,7 +13,7 @@ from legbench.clock import AbstractClock, VirtualClock
 from legbench.control import AbstractController
 from legbench.errors import PlantFault
 from legbench.plant.abstract import AbstractPlant
-from legbench.signals import Command, Observation
+from legbench.signals import Command, Floats, Observation
 
 Progress = Callable[[int, int], None]
 """Called now and then, and at the end, with cycles done and cycles in all."""
@@ -103,7 +103,9 @@ def run(
 ) -> Outcome:
     """Control a plant for a number of cycles.
 
-    The first fault ends the run and is returned as its cause; every row until then is kept. An
+    A run that has lasted its time then comes to rest in the controller's first posture
+    (`AbstractPlant.rest`), which adds no row. The first fault ends the run and is returned as its
+    cause; every row until then is kept. An
     exception of any kind closes the plant before anything else happens: drives come to rest
     while disks are still busy.
 
@@ -117,7 +119,8 @@ def run(
         observation = plant.reset()
         stop.raises = False
         controller.reset(observation)
-        return _cycle(plant, controller, observation, cycles, clock, sink, stop, progress)
+        outcome = _cycle(plant, controller, observation, cycles, clock, sink, stop, progress)
+        return _to_rest(plant, controller.start_motor_pos, outcome, stop)
     except BaseException as error:
         stop.raises = False
         plant.close()
@@ -167,3 +170,15 @@ def _cycle(
         ending = ("complete", None, None)
     status, cause, message = ending
     return Outcome(status=status, cause=cause, message=message, cycles=cycle, wall_time=wall_time)
+
+
+def _to_rest(plant: AbstractPlant, motor_pos: Floats, outcome: Outcome, stop: StopFlag) -> Outcome:
+    """End a run that has lasted its time at rest; ^C and faults end it at once, there as well."""
+    if outcome.status != "complete":
+        return outcome
+    try:
+        message = plant.rest(motor_pos, lambda: stop.is_set)
+    except PlantFault as error:
+        text = f"after its last row, on the way to rest: {error}"
+        return replace(outcome, status="fault", cause=error.cause, message=text)
+    return replace(outcome, status="interrupted" if stop.is_set else "complete", message=message)

@@ -27,6 +27,7 @@ from legbench.plant.abstract import AbstractPlant
 from legbench.plant.analytic import AnalyticPlant
 from legbench.plant.can import CanPlant
 from legbench.plant.emulated_leg import EmulatedLeg
+from legbench.plant.landing import End
 from legbench.plant.limited import LimitedPlant
 from legbench.plant.sim import SimPlant
 from legbench.plant.start import PERIOD, Start
@@ -70,6 +71,8 @@ class CanChoice:
     read_only: bool = False
     limits: Path | None = None
     """By default `limits.toml` beside the bus file."""
+    end: End = End.REST
+    """What follows when the time is over."""
     faults: tuple[Fault, ...] = ()
     """To inject into the emulated leg in this process, on its virtual time."""
 
@@ -133,7 +136,11 @@ class OpenPlant:
         if self.link is None:
             return {}
         cycle = self.link.cycle
-        return {
+        landing = self.plant.landing if isinstance(self.plant, CanPlant) else None
+        rest = {} if landing is None else {"rest": asdict(landing)}
+        if self.link.not_parked:
+            rest |= {"not parked": {"drives": self.link.not_parked}}
+        return rest | {
             "bus": {
                 "skipped_cycles": self.link.skipped_total,
                 "silent_cycles": cycle.silent_total,
@@ -228,7 +235,9 @@ def _open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
     except LegbenchError:
         session.close()
         raise
-    plant = CanPlant(session, link, leg.start, read_only=choice.read_only)
+    plant = CanPlant(
+        session, link, leg.start, read_only=choice.read_only, lands=choice.end is End.REST
+    )
     manifest = {
         "plant": "can",
         "bus": {
@@ -237,6 +246,7 @@ def _open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
             "channel": choice.channel or config.channel,
             "bitrate": choice.bitrate or config.bitrate,
             "read_only": choice.read_only,
+            "end": choice.end,
             "nodes": {
                 node.name: {"id": node.node_id, "identity": asdict(node.identity)}
                 for node in config.nodes
