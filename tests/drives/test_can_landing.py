@@ -234,7 +234,7 @@ def test_a_run_that_only_looks_commands_nothing_at_its_end(tmp_path: Path) -> No
 
 def test_the_way_is_as_long_as_it_may_be_and_ends_there() -> None:
     last: tuple[float, ...] = (0.0, 0.5)
-    ways = [last]
+    ways: list[tuple[float, ...]] = [last]
     while last != (0.0105, 0.49):
         last = towards((0.0105, 0.49), last, 0.001)
         ways.append(last)
