@@ -28,6 +28,7 @@ class Told:
         self.fault_at, self.disk_full_at = fault_at, disk_full_at
         self.cycle = 0
         self.late = 0.0
+        self.rest: Callable[[Floats, Callable[[], bool]], str | None] | None = None
 
     def seen(self, applied: float) -> Observation:
         zero = np.zeros(2)
@@ -65,6 +66,12 @@ class ToldPlant(AbstractPlant):
         if self.told.cycle == self.told.fault_at:
             raise PlantFault("broken spring", "the spring broke; buy another one")
         return self.told.seen(float(command.motor_pos[0]))
+
+    def rest(self, motor_pos: Floats, interrupted: Callable[[], bool]) -> str | None:
+        self.told.calls.append("plant.rest")
+        if self.told.rest is None:
+            return None
+        return self.told.rest(motor_pos, interrupted)
 
     def close(self) -> None:
         self.told.calls.append("plant.close")
@@ -107,6 +114,7 @@ def test_who_is_asked_when() -> None:
     assert told.calls == [
         *("plant.reset", "controller.reset", "clock.start"),
         *("clock.wait 0", *cycle, "clock.wait 1", *cycle, "clock.wait 2", *cycle),
+        "plant.rest",
     ]
     assert (outcome.status, outcome.cause, outcome.message) == ("complete", None, None)
     assert outcome.cycles == 3
@@ -308,6 +316,9 @@ class Unsafe(AbstractPlant):
     def step(self, command: Command) -> Observation:
         raise self._what
 
+    def rest(self, motor_pos: Floats, interrupted: Callable[[], bool]) -> None:
+        raise AssertionError("no run came to its end")
+
     def close(self) -> None:
         self.closed = True
 
@@ -335,6 +346,9 @@ def test_a_stop_on_the_way_to_the_start_ends_the_run_there() -> None:
         def step(self, command: Command) -> Observation:
             raise AssertionError("no cycle may begin")
 
+        def rest(self, motor_pos: Floats, interrupted: Callable[[], bool]) -> None:
+            raise AssertionError("no run came to its end")
+
         def close(self) -> None:
             self.closed = True
 
@@ -342,3 +356,55 @@ def test_a_stop_on_the_way_to_the_start_ends_the_run_there() -> None:
     outcome = run(plant, ToldController(Told()), 10, stop=stop)
     assert (outcome.status, outcome.cycles) == ("interrupted", 0)
     assert plant.closed
+
+
+def test_a_run_that_has_lasted_its_time_ends_at_the_first_posture_and_adds_no_row() -> None:
+    told = Told()
+    postures: list[list[float]] = []
+
+    def rest(motor_pos: Floats, interrupted: Callable[[], bool]) -> str:
+        assert not interrupted()
+        postures.append(motor_pos.tolist())
+        return "it swung"
+
+    told.rest = rest
+    outcome = run(ToldPlant(told), ToldController(told), 3, sink=told)
+    assert (outcome.status, outcome.cause, outcome.message) == ("complete", None, "it swung")
+    assert postures == [[0.0, 0.0]]
+    assert (outcome.cycles, len(told.rows)) == (3, 3)
+
+
+def test_a_fault_on_the_way_to_rest_is_the_runs_and_keeps_its_rows() -> None:
+    told = Told()
+
+    def rest(_motor_pos: Floats, _interrupted: Callable[[], bool]) -> None:
+        raise PlantFault("spring torque", "spring 1 carries 9 N m")
+
+    told.rest = rest
+    outcome = run(ToldPlant(told), ToldController(told), 3, sink=told)
+    assert (outcome.status, outcome.cause) == ("fault", "spring torque")
+    assert outcome.message == "after its last row, on the way to rest: spring 1 carries 9 N m"
+    assert (outcome.cycles, len(told.rows)) == (3, 3)
+
+
+def test_an_interrupt_on_the_way_to_rest_is_heard_there() -> None:
+    told, stop = Told(), StopFlag()
+
+    def rest(_motor_pos: Floats, interrupted: Callable[[], bool]) -> None:
+        assert not interrupted()
+        stop.set()
+        assert interrupted()
+
+    told.rest = rest
+    outcome = run(ToldPlant(told), ToldController(told), 3, sink=told, stop=stop)
+    assert (outcome.status, outcome.message) == ("interrupted", None)
+    assert len(told.rows) == 3
+
+
+@pytest.mark.parametrize("how", ["fault", "interrupt"])
+def test_a_run_that_is_cut_short_is_not_led_to_rest(how: str) -> None:
+    told, stop = Told(fault_at=2 if how == "fault" else None), StopFlag()
+    if how == "interrupt":
+        stop.set()
+    run(ToldPlant(told), ToldController(told), 3, sink=told, stop=stop)
+    assert "plant.rest" not in told.calls

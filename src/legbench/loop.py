@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 from legbench.clock import AbstractClock, VirtualClock
@@ -10,7 +10,7 @@ from legbench.control import AbstractController
 from legbench.errors import PlantFault
 from legbench.interrupts import StopFlag
 from legbench.plant.abstract import AbstractPlant
-from legbench.signals import Command, Observation
+from legbench.signals import Command, Floats, Observation
 
 Progress = Callable[[int, int], None]
 """Called now and then, and at the end, with cycles done and cycles in all."""
@@ -55,10 +55,11 @@ def run(
 ) -> Outcome:
     """Control a plant for a number of cycles.
 
-    The first fault ends the run and is returned as its cause; every row until then is kept. An
-    exception of any kind closes the plant before anything else happens: drives come to rest
-    while disks are still busy. A stop that comes before the first row ends the run there, with no
-    cycle; from the first row on it ends the run between two rows.
+    A run that has lasted its time then comes to rest in the controller's first posture
+    (`AbstractPlant.rest`), which adds no row. The first fault ends the run and is returned as its
+    cause; every row until then is kept. An exception of any kind closes the plant before anything
+    else happens: drives come to rest while disks are still busy. A stop that comes before the first
+    row ends the run there, with no cycle; from the first row on it ends the run between two rows.
 
     Raises:
         PlantFault: the plant did not get to its start.
@@ -71,7 +72,8 @@ def run(
         observation = plant.reset()
         controller.reset(observation)
         began, stop.raises = True, False
-        return _cycle(plant, controller, observation, cycles, clock, sink, stop, progress)
+        outcome = _cycle(plant, controller, observation, cycles, clock, sink, stop, progress)
+        return _to_rest(plant, controller.start_motor_pos, outcome, stop)
     except BaseException as error:
         stop.raises = False
         plant.close()
@@ -121,3 +123,15 @@ def _cycle(
         ending = ("complete", None, None)
     status, cause, message = ending
     return Outcome(status=status, cause=cause, message=message, cycles=cycle, wall_time=wall_time)
+
+
+def _to_rest(plant: AbstractPlant, motor_pos: Floats, outcome: Outcome, stop: StopFlag) -> Outcome:
+    """End a run that has lasted its time at rest; ^C and faults end it at once, there as well."""
+    if outcome.status != "complete":
+        return outcome
+    try:
+        message = plant.rest(motor_pos, lambda: stop.is_set)
+    except PlantFault as error:
+        text = f"after its last row, on the way to rest: {error}"
+        return replace(outcome, status="fault", cause=error.cause, message=text)
+    return replace(outcome, status="interrupted" if stop.is_set else "complete", message=message)

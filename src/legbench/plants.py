@@ -28,6 +28,7 @@ from legbench.plant.abstract import AbstractPlant
 from legbench.plant.analytic import AnalyticPlant
 from legbench.plant.can import CanPlant
 from legbench.plant.emulated_leg import EmulatedLeg
+from legbench.plant.landing import End
 from legbench.plant.limited import LimitedPlant
 from legbench.plant.sim import SimPlant
 from legbench.plant.start import PERIOD, Start
@@ -71,6 +72,8 @@ class CanChoice:
     read_only: bool = False
     limits: Path | None = None
     """By default `limits.toml` beside the bus file."""
+    end: End = End.REST
+    """What follows when the time is over."""
     faults: tuple[Fault, ...] = ()
     """To inject into the emulated leg in this process, on its virtual time."""
 
@@ -142,6 +145,11 @@ class OpenPlant:
         events: dict[str, dict[str, Any]] = {}
         if stopped is not None and stopped != StopReport():
             events["stop"] = asdict(stopped)
+        landing = self.plant.landing if isinstance(self.plant, CanPlant) else None
+        if landing is not None:
+            events["rest"] = asdict(landing)
+        if self.link.not_parked:
+            events["not parked"] = {"drives": self.link.not_parked}
         return events | {
             "bus": {
                 "skipped_cycles": self.link.skipped_total,
@@ -237,7 +245,9 @@ def _open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
     except BaseException:
         session.close()
         raise
-    plant = CanPlant(session, link, leg.start, read_only=choice.read_only)
+    plant = CanPlant(
+        session, link, leg.start, read_only=choice.read_only, lands=choice.end is End.REST
+    )
     manifest = {
         "plant": "can",
         "bus": {
@@ -246,6 +256,7 @@ def _open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
             "channel": choice.channel or config.channel,
             "bitrate": choice.bitrate or config.bitrate,
             "read_only": choice.read_only,
+            "end": choice.end,
             "nodes": {
                 node.name: {"id": node.node_id, "identity": asdict(node.identity)}
                 for node in config.nodes

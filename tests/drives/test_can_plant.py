@@ -17,13 +17,15 @@ from legbench.drives.link import LinkState
 from legbench.errors import ConfigError, PlantFault
 from legbench.experiment import record, start_of
 from legbench.loop import run
+from legbench.plant.landing import End
 from legbench.plant.limited import LimitedPlant
 from legbench.plant.sim import SimPlant
 from legbench.plants import CanChoice, SimChoice, joint_ranges, limits_for
 from legbench.recording.reader import load
 from legbench.signals import Command
 
-EMULATED = CanChoice(bus=BUS, interface="legbench")
+EMULATED = CanChoice(bus=BUS, interface="legbench", end=End.STOP)
+"""What follows the last row is told in test_can_landing."""
 
 
 def test_a_jump_over_frames_leaves_a_whole_recording(tmp_path: Path) -> None:

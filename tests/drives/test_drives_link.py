@@ -164,7 +164,7 @@ def test_the_same_run_gives_the_same_bytes(tmp_path: Path) -> None:
                     link.exchange()
         bus.shutdown()
         digests.append(hashlib.sha256(log.read_bytes()).hexdigest())
-        assert list(can.CanutilsLogReader(log))[-1].arbitration_id == 0x000
+        assert list(can.CanutilsLogReader(log))[-1].arbitration_id == 0x582
     assert digests[0] == digests[1]
 
 

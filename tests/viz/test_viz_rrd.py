@@ -201,15 +201,6 @@ def test_every_setup_is_drawn(kind: SetupKind, tmp_path: Path) -> None:
     assert len(shown["/scene/model/foot"]["t"]) == 30
 
 
-def test_a_run_without_model_has_all_but_the_scene(hop: Recording, tmp_path: Path) -> None:
-    bare = Recording(
-        path=tmp_path, manifest=hop.manifest, time=hop.time, columns=hop.columns, events=()
-    )
-    shown = viz_rrd.temporal(write_rrd(bare, tmp_path / "bare.rrd"))
-    assert not any(path.startswith("/scene") for path in shown)
-    assert "/leg/plane/segments" in shown
-
-
 def test_an_older_file_survives_a_failure(hop: Recording, tmp_path: Path) -> None:
     target = tmp_path / "view.rrd"
     target.write_bytes(b"older")
@@ -222,14 +213,11 @@ def test_an_older_file_survives_a_failure(hop: Recording, tmp_path: Path) -> Non
     )
     with pytest.raises(FormatError, match=r"setup\.kind is 'moon'"):
         write_rrd(broken, target)
-    (tmp_path / "leg.xml").write_text("<mujoco><worldbody><body/></worldbody>")
-    torn = Recording(
-        path=tmp_path, manifest=hop.manifest, time=hop.time, columns=hop.columns, events=()
-    )
-    with pytest.raises(RecordingError, match="MuJoCo refuses the model"):
-        write_rrd(torn, target)
+    astray = replace(broken, manifest={**hop.manifest, "linkage": {"crank_length": "far"}})
+    with pytest.raises(FormatError, match=r"linkage\.crank_length is far"):
+        write_rrd(astray, target)
     assert target.read_bytes() == b"older"
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["leg.xml", "view.rrd"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["view.rrd"]
 
 
 def test_a_run_without_rows_is_refused(hop: Recording, tmp_path: Path) -> None:

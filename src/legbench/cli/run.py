@@ -19,6 +19,7 @@ from legbench.interrupts import stop_on_interrupt
 from legbench.kinematics import ModalConvention
 from legbench.metrics import summarise
 from legbench.mjcf import Ground, Linkage, LinkageKind
+from legbench.plant.landing import End
 from legbench.plant.start import PERIOD
 from legbench.plants import EMULATED, AnalyticChoice, CanChoice, PlantChoice, SimChoice
 from legbench.recording.reader import load
@@ -61,6 +62,10 @@ class RunArguments:
     """can: of interfaces that set their own; else the bus file's [bit/s]."""
     read_only: bool = False
     """can: observe, change nothing in a drive; commands are recorded and go nowhere."""
+    end: Literal["rest", "stop"] | None = None
+    """can: what follows the last recorded row. rest, by default: the motors go to the posture of
+    the start, at start_speed of the bus file [rad/s], the leg comes to rest, for which it has 10 s,
+    then power goes. stop: quick stop at once, in mid-flight, too."""
     setpoint: SetpointMeaning = SetpointMeaning.LINK
     """Whether z2 is the link's equilibrium or the motor's position."""
     convention: ModalConvention = ModalConvention.ORTHONORMAL
@@ -107,10 +112,10 @@ def plant_of(chosen: RunArguments) -> PlantChoice:
     Raises:
         ConfigError: a flag of the bus for a plant that has none.
     """
-    given = (chosen.interface, chosen.channel, chosen.bitrate, chosen.read_only or None)
+    given = (chosen.interface, chosen.channel, chosen.bitrate, chosen.read_only or None, chosen.end)
     if chosen.plant != "can" and any(value is not None for value in given):
         raise ConfigError(
-            "interface, channel, bitrate and read-only are of a bus, and plant "
+            "interface, channel, bitrate, read-only and end are of a bus, and plant "
             f"{chosen.plant} has none; add --plant can"
         )
     if chosen.plant == "sim":
@@ -123,6 +128,7 @@ def plant_of(chosen: RunArguments) -> PlantChoice:
         channel=chosen.channel,
         bitrate=chosen.bitrate,
         read_only=chosen.read_only,
+        end=End(chosen.end or End.REST),
         limits=chosen.limits,
     )
 

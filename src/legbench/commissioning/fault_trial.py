@@ -30,6 +30,7 @@ from legbench.errors import ConfigError
 from legbench.experiment import Experiment, make_controller, start_of, targets_of
 from legbench.interrupts import StopFlag
 from legbench.loop import Outcome, run
+from legbench.plant.landing import End
 from legbench.plants import BUS_LOG, EMULATED, LIMITS_NAME, CanChoice, Leg, OpenPlant, open_plant
 from legbench.recording.reader import load
 from legbench.recording.writer import RunWriter
@@ -209,7 +210,7 @@ def try_fault(
         raise ConfigError(f"the trial '{trial.name}' needs a viewer to freeze: give start_view")
     config = load_bus(bus_file)
     limits = load_limits(bus_file.parent / LIMITS_NAME)
-    choice = CanChoice(bus=bus_file, interface=EMULATED, faults=trial.faults)
+    choice = CanChoice(bus=bus_file, interface=EMULATED, faults=trial.faults, end=End.STOP)
     chosen = Experiment(design=design, controller=JumpConfig())
     start = start_of(chosen)
     leg = Leg(design=design, options=chosen.options, start=start, servo=chosen.servo)

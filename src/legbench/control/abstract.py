@@ -11,7 +11,7 @@ class AbstractController(ABC):
     @property
     @abstractmethod
     def start_motor_pos(self) -> Floats:
-        """Motor positions (..., 2) [rad] that a run begins at rest with."""
+        """Motor positions (..., 2) [rad] that a run begins at rest with, and ends at on drives."""
 
     @abstractmethod
     def reset(self, observation: Observation) -> None:

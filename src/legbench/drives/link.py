@@ -26,6 +26,7 @@ from legbench.drives.limits import Guard, SafetyLimits
 from legbench.drives.master.bring_up import BringUp
 from legbench.drives.master.cycle import Cycle, Tick
 from legbench.drives.master.lock import ChannelLock
+from legbench.drives.master.parking import park
 from legbench.drives.master.port import Listener, Port
 from legbench.drives.master.read_only import may_pace, may_read
 from legbench.drives.master.sample import Sample, sample_of
@@ -71,6 +72,7 @@ class Link(Lead):
         fault: the first fault; what ended the link.
         stopped: how the stop of the drives has ended, none before it.
         skipped_total: ticks without SYNC since the start.
+        not_parked: what `close` failed to switch off, see `master.parking`.
         listening: read-only, and another master sends SYNC: this one sends nothing.
     """
 
@@ -114,16 +116,23 @@ class Link(Lead):
         self.fault: PlantFault | None = None
         self.skipped_total = 0
         self.stopped: StopReport | None = None
+        self.not_parked: list[str] = []
         self._supervisor = Supervisor(self.cycle, config, self._limits, self._port.timebase)
         self._start_up = StartUp(self._port, self.cycle, config, read_only=read_only)
         self._last = Tick(0, 0, 0, 0, False)
         self._expected: list[tuple[float, ...]] = []
         self._holds = self._closed = False
+        self._told: Listener | None = None
         self.listening = False
 
     def tell(self, listener: Listener) -> None:
-        """Show every frame to a listener from now on."""
-        self._port.listener = listener
+        """Show every frame to a listener from now on, or from when the drives are configured.
+
+        A log that holds their configuration would, played back, bring parked drives back to life.
+        """
+        self._told = listener
+        if self.state is not LinkState.NEW:
+            self._port.listener = listener
 
     # --- before anything moves ---------------------------------------------------------------
 
@@ -155,6 +164,8 @@ class Link(Lead):
             self._let_go()
             raise
         self.state = LinkState.CONFIGURED
+        if self._told is not None:
+            self._port.listener = self._told
 
     def _hold(self) -> None:
         self._lock.acquire()
@@ -306,6 +317,11 @@ class Link(Lead):
             raise
         return applied
 
+    def forget_wish(self) -> tuple[float, ...]:
+        """Measure the next step of the command from what was applied last; that [rad]."""
+        self._guard.start_at(self._guard.applied)
+        return self._guard.applied
+
     def move_to(self, motor_pos: Sequence[float], speed: float | None = None) -> Sample:
         """Go to a posture at a speed [rad/s], `start_speed` of the bus file by default.
 
@@ -408,7 +424,7 @@ class Link(Lead):
                 self.state = LinkState.STOPPED
 
     def close(self) -> None:
-        """Stop, leave the drives in pre-operational, release the channel; raises no error.
+        """Stop, leave the drives parked in pre-operational, release the channel; raises no error.
 
         Twice is once. A stop that is not verified is repeated, in the end over SDO. A link that
         only looks leaves the drives of another master alone.
@@ -418,11 +434,14 @@ class Link(Lead):
         with shielded() as shield:
             looked = self.listening or self.state is LinkState.CONFIGURED
             self.stop()
-            if not (self._read_only and (looked or self._led_by_another(shield))):
+            led = self._led_by_another(shield)
+            if not (self._read_only and (looked or led)):
                 order, nodes = self.bring_up.pre_operational, self._config.nodes
                 report = leave_operational(order, self._port, nodes, self.stopped, shield.hold)
                 if report is not None:
                     self._note(report)
+            if not (self._read_only or led or self.state is LinkState.STOPPING):
+                self._park(shield)
             self._let_go()
             self._closed = True
             if self.state is not LinkState.STOPPING:
@@ -433,6 +452,14 @@ class Link(Lead):
         self.stopped = report.after(self.stopped)
         if report.verified:
             self.state = LinkState.STOPPED
+
+    def _park(self, shield: Shield) -> None:
+        """Switch the drives' command frames off, so that no recorded log moves them."""
+        try:
+            self.not_parked = park(self._port, self._config, self.cycle.other)
+        except BaseException as error:  # Whatever a driver raises, the channel is still released.
+            self.not_parked = [f"the drives are not parked: {error!r}"]
+            shield.hold(error)
 
     def _led_by_another(self, shield: Shield) -> bool:
         try:

@@ -74,7 +74,11 @@ class Session(Closing):
         return granted
 
     def log_to(self, path: Path) -> None:
-        """Write every frame of all links from now on; raises BusError if there can be no file."""
+        """Write every frame of all links from now on, or from when their drives are configured.
+
+        Raises:
+            BusError: there can be no file.
+        """
         self.log = BusLog(path, str(getattr(self.bus, "channel", "can")))
         for link in self._links:
             link.tell(self.log)
@@ -107,10 +111,11 @@ class Session(Closing):
             limits,
             stiffness=stiffness,
             timebase=self.timebase,
-            listener=self.log,
             read_only=read_only,
             lock=self._lock,
         )
+        if self.log is not None:
+            link.tell(self.log)
         self._links.append(link)
         self.leads(link)
         return link

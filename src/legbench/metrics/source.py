@@ -92,6 +92,12 @@ def terms_of(manifest: Mapping[str, Any]) -> Terms:
     conventions = manifest.get("conventions", {})
     controller = manifest.get("controller", {})
     deflection = controller.get("dz2")
+    try:
+        deflection = math.nan if deflection is None else abs(float(deflection))
+    except (TypeError, ValueError, OverflowError):
+        raise FormatError(
+            f"manifest controller.dz2 is {deflection!r:.60}; it must be a number [rad]"
+        ) from None
     return Terms(
         design=design,
         setup=_choice(SetupKind, manifest.get("setup", {}).get("kind"), "setup.kind"),
@@ -106,5 +112,5 @@ def terms_of(manifest: Mapping[str, Any]) -> Terms:
             "conventions.rating_reference",
         ),
         controller=str(controller.get("kind", "")),
-        deflection=math.nan if deflection is None else abs(float(deflection)),
+        deflection=deflection,
     )

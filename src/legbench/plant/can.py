@@ -1,6 +1,7 @@
 """The leg on the bench, or an emulated one: two servo drives on a CAN bus."""
 
 import math
+from collections.abc import Callable, Sequence
 from typing import final
 
 import numpy as np
@@ -8,6 +9,7 @@ import numpy as np
 from legbench.drives.link import Link, LinkState, Sample
 from legbench.drives.session import Session
 from legbench.plant.abstract import AbstractPlant
+from legbench.plant.landing import PATIENCE, STILL_RANGE, Landing, land
 from legbench.plant.start import Start
 from legbench.signals import Command, Floats, Observation
 
@@ -37,6 +39,7 @@ class CanPlant(AbstractPlant):
         sample: what it showed last.
         late: of the last SYNC after its place on the grid [s].
         began: SYNC of observation 0, on the link's time base [s].
+        landing: how `rest` went.
     """
 
     def __init__(
@@ -47,6 +50,7 @@ class CanPlant(AbstractPlant):
         *,
         read_only: bool = False,
         speed: float | None = None,
+        lands: bool = True,
     ) -> None:
         """Wire the parts; nothing is sent.
 
@@ -55,13 +59,16 @@ class CanPlant(AbstractPlant):
             link: of that session.
             start: posture of the motors at which a run begins.
             read_only: never enable; commands are recorded and go nowhere.
-            speed: of the way to the start posture, `start_speed` of the bus file by default
-                [rad/s].
+            speed: of the way to the start posture and to rest, `start_speed` of the bus file by
+                default [rad/s].
+            lands: whether `rest` leads the leg to rest, instead of leaving it to `close`.
         """
         self.period = session.config.period
         self.link, self.late, self.began = link, 0.0, 0.0
         self.sample: Sample | None = None
         self._session, self._start = session, start
+        self.landing: Landing | None = None
+        self._lands = lands and not read_only
         self._read_only, self._speed = read_only, speed
         self._gain = 1.0 - math.exp(-2.0 * math.pi * VELOCITY_BANDWIDTH * self.period)
         self._links: Floats = np.zeros(2)
@@ -102,6 +109,35 @@ class CanPlant(AbstractPlant):
         sample = self._exchange(command.motor_pos)
         self._cycle += 1 + sample.skipped
         return self._observe(sample)
+
+    def rest(self, motor_pos: Floats, interrupted: Callable[[], bool]) -> str | None:
+        """Lead the motors to a posture as slowly as to the start, wait until the leg rests.
+
+        Limits and watchdogs act as in `step`. In read-only nothing is commanded.
+
+        Raises:
+            PlantFault: a limit or a watchdog; all drives have been stopped in that cycle.
+        """
+        if not self._lands or self.link.state is not LinkState.RUNNING:
+            return None
+        self.landing = landing = land(
+            self._lead,
+            motor_pos.tolist(),
+            self.link.forget_wish(),
+            speed=self._speed or self._session.config.start_speed,
+            period=self.period,
+            interrupted=interrupted,
+        )
+        if landing.rested or landing.interrupted:
+            return None
+        return (
+            f"the leg still swung by more than {STILL_RANGE:g} rad after {PATIENCE:g} s in its "
+            "rest posture; its power went then"
+        )
+
+    def _lead(self, motor_pos: Sequence[float]) -> tuple[Sequence[float], Sequence[float]]:
+        sample = self._exchange(np.array(motor_pos))
+        return sample.applied_pos, sample.link_pos
 
     def close(self) -> None:
         """Quick stop of both drives, pre-operational, bus closed; twice is once, never raises."""

@@ -36,6 +36,7 @@ def write_archive(run: Path, batches: WholeBatches, manifest: Mapping[str, Any])
     if batches.schema is not None:
         schema = batches.schema.with_metadata(schema.metadata)
     try:
+        draft.unlink(missing_ok=True)
         written = _write(draft, batches, schema)
         found = count_rows(draft)
         if found != written:

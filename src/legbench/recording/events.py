@@ -8,8 +8,11 @@ from legbench.errors import RecordingError
 from legbench.recording.files import reason, write_whole
 from legbench.recording.layout import EVENTS, TORN
 from legbench.recording.manifest import plain
+from legbench.recording.regular import read_regular
 
 Event = dict[str, Any]
+LARGEST = 1 << 28
+"""Bytes of an `events.jsonl`; events are rare, a usual one has less than a thousand."""
 
 
 def encode_event(time: float, name: str, detail: dict[str, Any]) -> bytes:
@@ -49,7 +52,7 @@ def drop_torn_events(run: Path) -> int:
 
 def _lines(run: Path) -> list[bytes]:
     try:
-        content = (run / EVENTS).read_bytes()
+        content = read_regular(run / EVENTS, LARGEST)
     except FileNotFoundError:
         return []
     except OSError as error:
@@ -60,6 +63,6 @@ def _lines(run: Path) -> list[bytes]:
 def _parse(line: bytes) -> Event | None:
     try:
         event = json.loads(line)
-    except ValueError:
+    except (ValueError, RecursionError):
         return None
     return event if isinstance(event, dict) else None

@@ -81,7 +81,10 @@ def write_whole(path: Path, content: bytes) -> None:
     """Write `content` as the file `path`, or leave `path` untouched; raises OSError."""
     draft = path.with_name(f".{path.name}.draft")
     try:
-        draft.write_bytes(content)
+        # Made anew: whatever lies there, such as a link, is not written through.
+        draft.unlink(missing_ok=True)
+        with draft.open("xb") as file:
+            file.write(content)
         put_in_place(draft, path)
     except BaseException:
         with suppress(OSError):

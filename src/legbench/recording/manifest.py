@@ -14,9 +14,14 @@ from legbench import __version__
 from legbench.errors import ConfigError, FormatError, RecordingError
 from legbench.recording.files import reason, write_whole
 from legbench.recording.layout import FORMAT, RUN, RUNNING, UNITS
+from legbench.recording.regular import read_regular
 
 Manifest = dict[str, Any]
 
+LARGEST = 1 << 22
+"""Bytes of a `run.json`; a usual one has 5000."""
+TABLES = ("design", "setup", "linkage", "ground", "controller", "conventions", "versions", "units")
+"""Entries that are tables, where a manifest has them."""
 OWN_KEYS = ("format", "legbench", "id", "created", "status", "cause", "units", "rows", "duration")
 """Keys that the recording fills in itself; `versions` is merged with the caller's."""
 
@@ -75,7 +80,7 @@ def read_manifest(run: Path) -> Manifest | None:
     """
     path = run / RUN
     try:
-        content = path.read_bytes()
+        content = read_regular(path, LARGEST)
     except FileNotFoundError:
         return None
     except OSError as error:
@@ -87,7 +92,7 @@ def parse_manifest(content: bytes, *, source: str) -> Manifest:
     """Return the manifest in `content`; raises as `read_manifest`."""
     try:
         manifest = json.loads(content)
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise RecordingError(
             f"{source} is damaged: {error}; move it away and the copy in the samples is used"
         ) from error
@@ -100,4 +105,7 @@ def parse_manifest(content: bytes, *, source: str) -> Manifest:
             f" ({manifest.get('legbench', 'unknown')}); this one ({__version__}) reads up to"
             f" {FORMAT}: upgrade"
         )
+    for name in TABLES:
+        if not isinstance(manifest.get(name, {}), dict):
+            raise FormatError(f"{source}: {name} is {manifest[name]!r:.60}; it must be a table")
     return manifest

@@ -13,9 +13,7 @@ from legbench.design.setup import SetupKind
 from legbench.kinematics import modal_to_joint
 from legbench.metrics.source import Terms, terms_of
 from legbench.metrics.summary import Summary
-
-MODEL = "leg.xml"
-"""The run's own MJCF, next to its manifest."""
+from legbench.viz.entries import number_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,8 +25,6 @@ class Facts:
     manifest: Mapping[str, Any]
     crank_length: float | None = None
     """Of the parallel bars [m]; none: the linkage has no bars."""
-    model: Path | None = None
-    """The run's MJCF, where there is one."""
 
     @property
     def design(self) -> LegDesign:
@@ -72,14 +68,12 @@ def facts_of(manifest: Mapping[str, Any], folder: Path) -> Facts:
     Raises:
         FormatError: a manifest without a leg, or with an unknown setup or convention.
     """
-    linkage = manifest.get("linkage", {})
-    bars = linkage.get("kind") == "bars"
+    bars = manifest.get("linkage", {}).get("kind") == "bars"
     return Facts(
         run_id=str(manifest.get("id", folder.name)),
         terms=terms_of(manifest),
         manifest=manifest,
-        crank_length=float(linkage.get("crank_length", 0.02)) if bars else None,
-        model=folder / MODEL if (folder / MODEL).is_file() else None,
+        crank_length=number_of(manifest, "linkage", "crank_length", 0.02) if bars else None,
     )
 
 

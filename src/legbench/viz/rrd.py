@@ -22,7 +22,7 @@ def write_rrd(recording: Recording, path: Path, against: Sequence[Recording] = (
 
     Raises:
         FormatError: a run's manifest cannot be drawn.
-        RecordingError: a run has no rows or a damaged model, or nothing can be written there.
+        RecordingError: a run has no rows, or nothing can be written there.
     """
     for run in (recording, *against):
         require_rows(run)

@@ -9,6 +9,7 @@ from legbench.viz._rerun import rr, rrb
 from legbench.viz.facts import Facts
 from legbench.viz.leg2d import FREQ, hip_of
 from legbench.viz.pose import Puppet
+from legbench.viz.run_model import model_of
 from legbench.viz.style import Colours
 from legbench.viz.trace import Thinner, Trace
 
@@ -28,21 +29,24 @@ Shape = rr.Boxes3D | rr.Capsules3D | rr.Cylinders3D | rr.Ellipsoids3D
 
 @final
 class Scene:
-    """Publishes the model's bodies; nothing at all for a run without a model."""
+    """Publishes the bodies of a run's model.
+
+    Raises:
+        FormatError: the manifest describes no model that can be drawn.
+    """
 
     def __init__(self, stream: rr.RecordingStream, facts: Facts) -> None:
         self._stream = stream
         self._facts = facts
         self._thinner = Thinner(FREQ)
-        self._puppet = None if facts.model is None else Puppet(facts.model)
-        if self._puppet is not None:
-            stream.log("/scene", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-            _draw_shapes(stream, self._puppet.model)
+        self._puppet = Puppet(model_of(facts.manifest))
+        stream.log("/scene", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        _draw_shapes(stream, self._puppet.model)
 
     def push(self, trace: Trace) -> None:
         """Add poses of some of these rows."""
         kept = self._thinner.pick(trace.time)
-        if self._puppet is None or len(kept) == 0:
+        if len(kept) == 0:
             return
         puppet = self._puppet
         hip = hip_of(trace.rows, self._facts)[kept]

@@ -15,6 +15,7 @@ from legbench.drives.config import BusConfig, Identity, NodeConfig, Parameter
 from legbench.drives.configuration import configuration
 from legbench.drives.errors import BusError, DriveError, SdoAbortError
 from legbench.drives.master.first_contact import first_contact
+from legbench.drives.master.parking import is_parked
 from legbench.drives.master.port import Port
 from legbench.drives.master.sdo_port import SdoPort
 from legbench.drives.master.sdo_stop import SdoStop
@@ -152,10 +153,15 @@ class BringUp:
     def refuse_differences(self) -> None:
         """For a master that may not configure; raises DriveError for the first drive that differs.
 
-        Process data that is mapped otherwise would be read as what it is not.
+        Process data that is mapped otherwise would be read as what it is not. Command frames
+        that are switched off, as after every run, change nothing for those who only look.
         """
         for node in self._bus.nodes:
-            different = self.differences(node)
+            different = [
+                (parameter, there)
+                for parameter, there in self.differences(node)
+                if not is_parked(node, parameter, there)
+            ]
             if different:
                 parameter, there = different[0]
                 raise DriveError(
