@@ -27,6 +27,7 @@ from legbench.errors import ConfigError, RecordingError
 from legbench.kinematics import ModalConvention
 from legbench.loop import Outcome, Progress, StopFlag, run
 from legbench.mjcf import BuildOptions, Ground, Linkage, Numerics, build_spec, to_xml, xml_hash
+from legbench.onlooker import Onlooker
 from legbench.plant.start import PERIOD, Start
 from legbench.plants import Leg, PlantChoice, SimChoice, open_plant
 from legbench.recording.writer import RunWriter
@@ -139,7 +140,8 @@ def record(
         clock: when cycles begin; by default as the plant paces itself.
         stop: ends the run when it is set.
         progress: told now and then how far the run is.
-        on_started: told the run folder before the first cycle.
+        on_started: told the run folder before the first cycle. Neither can end the run: the first
+            failure of each is an event of the run, and it is not called again.
 
     Raises:
         ConfigError: settings that the leg or the plant refuses; nothing is written.
@@ -155,6 +157,8 @@ def record(
         design=experiment.design, options=experiment.options, start=start, servo=experiment.servo
     )
     xml = to_xml(build_spec(experiment.design, experiment.options))
+    watching = Onlooker("progress", progress)
+    starting = Onlooker("on_started", on_started)
     opened = open_plant(experiment.plant, leg)
     with opened.plant:
         manifest = _manifest(experiment, start, xml) | opened.manifest
@@ -164,10 +168,9 @@ def record(
             try:
                 (writer.path / "leg.xml").write_text(xml, encoding="utf-8")
                 opened.start_log(writer.path)
-                if on_started is not None:
-                    on_started(writer.path)
             except OSError as error:
                 raise RecordingError(f"{writer.path}: {error}") from error
+            starting(writer.path)
             outcome = run(
                 opened.plant,
                 controller,
@@ -175,12 +178,15 @@ def record(
                 clock=clock or opened.clock,
                 sink=writer,
                 stop=stop,
-                progress=progress,
+                progress=watching,
             )
             opened.plant.close()
             for event, detail in opened.events().items():
-                writer.event(outcome.cycles * PERIOD, event, **detail)
-            writer.event(outcome.cycles * PERIOD, "end", status=outcome.status, cause=outcome.cause)
+                writer.event(outcome.time, event, **detail)
+            for each in (starting, watching):
+                if each.failure is not None:
+                    writer.event(outcome.time, "onlooker failed", who=each.name, error=each.failure)
+            writer.event(outcome.time, "end", status=outcome.status, cause=outcome.cause)
             writer.close(outcome.status, outcome.cause)
     return Finished(path=writer.path, outcome=outcome)
 

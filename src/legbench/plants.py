@@ -133,7 +133,9 @@ class OpenPlant:
         if self.link is None:
             return {}
         cycle = self.link.cycle
-        return {
+        deaf = self.link.listener_error
+        heard = {} if deaf is None else {"onlooker failed": {"who": "listener", "error": deaf}}
+        return heard | {
             "bus": {
                 "skipped_cycles": self.link.skipped_total,
                 "silent_cycles": cycle.silent_total,

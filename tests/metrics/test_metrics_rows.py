@@ -59,7 +59,7 @@ def test_extreme_between_uneven_rows_is_exact(summit: float, top: float, bend: f
 
 @pytest.mark.parametrize(("row", "zero"), [(2, 2.3), (3, 2.5), (4, 3.9), (5, 4.1)])
 def test_zero_between_uneven_rows_is_exact(row: int, zero: float) -> None:
-    falling = np.where(UNEVEN < zero, 1.7 * (zero - UNEVEN), 7.0)
+    falling = np.where(zero > UNEVEN, 1.7 * (zero - UNEVEN), 7.0)
     found = zeros_before(UNEVEN, falling, np.array([row]), otherwise=0.5)
     assert found[0] == pytest.approx(zero, abs=1e-12)
 

@@ -118,6 +118,11 @@ class Link(Closing):
         """Show every frame to a listener from now on."""
         self._port.listener = listener
 
+    @property
+    def listener_error(self) -> str | None:
+        """What a listener raised, in one line; it hears nothing more then."""
+        return self._port.listener_error
+
     # --- before anything moves ---------------------------------------------------------------
 
     def open(self) -> None:
