@@ -164,7 +164,7 @@ def record(
         manifest = _manifest(experiment, start, xml) | opened.manifest
         kind = experiment.controller.kind
         name = f"{kind}-{experiment.design.name}"
-        with RunWriter.create(out, manifest, name=name) as writer:
+        with RunWriter.create(out, manifest, name=name, realtime=opened.realtime) as writer:
             try:
                 (writer.path / "leg.xml").write_text(xml, encoding="utf-8")
                 opened.start_log(writer.path)

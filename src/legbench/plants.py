@@ -124,6 +124,11 @@ class OpenPlant:
             self.session.log_to(run / BUS_LOG)
 
     @property
+    def realtime(self) -> bool:
+        """Whether the machine's clock paces it: whoever holds up its loop holds up drives."""
+        return self.session is not None and not self.session.virtual
+
+    @property
     def began(self) -> float | None:
         """Time of row 0 on the bus's own time base, as in the bus log [s]."""
         return self.plant.began if isinstance(self.plant, CanPlant) else None
