@@ -4,11 +4,10 @@ import itertools
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import final
 
 import numpy as np
 import pytest
-from can_rig import BUS, MS, experiment, fine_bus, stage, staged
+from can_rig import BUS, MS, LateTime, experiment, fine_bus, stage, staged
 
 from legbench.control import BangBangConfig
 from legbench.drives.bus import LockstepBus
@@ -19,7 +18,6 @@ from legbench.drives.emulated.faults import FrameFault, FrameFaultKind
 from legbench.drives.emulated.network import Network
 from legbench.drives.limits import SafetyLimits
 from legbench.drives.session import Session
-from legbench.drives.timebase import NetworkTime
 from legbench.plant.can import VELOCITY_BANDWIDTH, CanPlant
 from legbench.signals import Command, Observation
 
@@ -29,21 +27,6 @@ FINE_NS = 10_000
 """The links turn on in steps of 10 us: a step is a hundredth of what a cycle shows."""
 SETTLED = 20
 """Cycles after which a low-pass of 200 Hz has forgotten its start."""
-
-
-@final
-class LateTime:
-    """Virtual time whose waits end late, by what `late_ns` says of one after the other."""
-
-    def __init__(self, network: Network) -> None:
-        self._time = NetworkTime(network)
-        self.late_ns: Iterator[int] = itertools.repeat(0)
-
-    def now_ns(self) -> int:
-        return self._time.now_ns()
-
-    def wait_until(self, at_ns: int) -> None:
-        self._time.wait_until(at_ns + next(self.late_ns))
 
 
 @dataclass

@@ -102,6 +102,7 @@ def test_a_run_that_ends_at_once_waits_for_its_process(tmp_path: Path) -> None:
 
 def test_what_was_handed_over_outlives_the_master(tmp_path: Path) -> None:
     """The process is frozen while rows come, so all of them are in the kernel's queue."""
+    pid = 0
     command = [sys.executable, recorded_rows.__file__, "paced", str(tmp_path), "process"]
     with subprocess.Popen(command, stdout=subprocess.PIPE) as master:
         assert master.stdout is not None
