@@ -2,7 +2,7 @@
 
 import math
 import platform
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from importlib.metadata import PackageNotFoundError, version
@@ -30,6 +30,7 @@ from legbench.interrupts import StopFlag, shielded
 from legbench.kinematics import ModalConvention
 from legbench.loop import Outcome, Progress, run
 from legbench.mjcf import BuildOptions, Ground, Linkage, Numerics, build_spec, to_xml, xml_hash
+from legbench.onlooker import Onlooker
 from legbench.plant.start import PERIOD, Start
 from legbench.plants import Leg, OpenPlant, PlantChoice, SimChoice, open_plant
 from legbench.recording.writer import RunWriter
@@ -142,7 +143,8 @@ def record(
         clock: when cycles begin; by default as the plant paces itself.
         stop: ends the run when it is set.
         progress: told now and then how far the run is.
-        on_started: told the run folder before the first cycle.
+        on_started: told the run folder before the first cycle. Neither can end the run: the first
+            failure of each is an event of the run, and it is not called again.
 
     A run whose drives could not be shown to be without power in the end is a fault, whatever it
     was until then. An interruption before the run folder is there leaves nothing behind; one
@@ -163,19 +165,20 @@ def record(
         design=experiment.design, options=experiment.options, start=start, servo=experiment.servo
     )
     xml = to_xml(build_spec(experiment.design, experiment.options))
+    watching = Onlooker("progress", progress)
+    starting = Onlooker("on_started", on_started)
     opened = open_plant(experiment.plant, leg)
     with opened.plant:
         manifest = _manifest(experiment, start, xml) | opened.manifest
         kind = experiment.controller.kind
         name = f"{kind}-{experiment.design.name}"
-        with _recording(out, manifest, name) as writer:
+        with _recording(out, manifest, name, realtime=opened.realtime) as writer:
             try:
                 (writer.path / "leg.xml").write_text(xml, encoding="utf-8")
                 opened.start_log(writer.path)
-                if on_started is not None:
-                    on_started(writer.path)
             except OSError as error:
                 raise RecordingError(f"{writer.path}: {error}") from error
+            starting(writer.path)
             try:
                 outcome = run(
                     opened.plant,
@@ -184,33 +187,43 @@ def record(
                     clock=clock or opened.clock,
                     sink=writer,
                     stop=stop,
-                    progress=progress,
+                    progress=watching,
                 )
             except BaseException as error:
                 opened.plant.close()
-                _tell_events(opened, writer)
+                _tell_events(opened, writer, (starting, watching), writer.rows * PERIOD)
                 add_trouble(error, opened.stopped)
                 raise
             opened.plant.close()
             outcome = _judged(outcome, opened.stopped)
-            _tell_events(opened, writer)
-            writer.event(outcome.cycles * PERIOD, "end", status=outcome.status, cause=outcome.cause)
+            _tell_events(opened, writer, (starting, watching), outcome.time)
+            writer.event(outcome.time, "end", status=outcome.status, cause=outcome.cause)
             writer.close(outcome.status, outcome.cause)
     return Finished(path=writer.path, outcome=outcome)
 
 
 @contextmanager
-def _recording(out: Path, manifest: dict[str, Any], name: str) -> Iterator[RunWriter]:
+def _recording(
+    out: Path, manifest: dict[str, Any], name: str, *, realtime: bool
+) -> Iterator[RunWriter]:
     """Write a new run; one that is interrupted while its folder is made is closed as usual."""
     with ExitStack() as stack:
         with shielded():
-            writer = stack.enter_context(RunWriter.create(out, manifest, name=name))
+            writer = stack.enter_context(
+                RunWriter.create(out, manifest, name=name, realtime=realtime)
+            )
         yield writer
 
 
-def _tell_events(opened: OpenPlant, writer: RunWriter) -> None:
+def _tell_events(
+    opened: OpenPlant, writer: RunWriter, onlookers: Sequence[Onlooker], time: float
+) -> None:
+    """Write what the plant and the onlookers have to tell of a run that ended at `time` [s]."""
     for event, detail in opened.events().items():
-        writer.event(writer.rows * PERIOD, event, **detail)
+        writer.event(time, event, **detail)
+    for each in onlookers:
+        if each.failure is not None:
+            writer.event(time, "onlooker failed", who=each.name, error=each.failure)
 
 
 def _judged(outcome: Outcome, stopped: StopReport | None) -> Outcome:

@@ -7,8 +7,11 @@ from typing import Protocol
 
 from legbench.clock import AbstractClock, VirtualClock
 from legbench.control import AbstractController
-from legbench.errors import PlantFault
+from legbench.control.check import CommandError, check_command
+from legbench.errors import LegbenchError, PlantFault
+from legbench.failures import defined_at, failed, own_lines
 from legbench.interrupts import StopFlag
+from legbench.onlooker import Onlooker
 from legbench.plant.abstract import AbstractPlant
 from legbench.signals import Command, Floats, Observation
 
@@ -41,6 +44,8 @@ class Outcome:
     cycles: int
     wall_time: float
     """[s]"""
+    time: float = 0.0
+    """Plant time of the last observation [s]."""
 
 
 def run(
@@ -56,10 +61,14 @@ def run(
     """Control a plant for a number of cycles.
 
     A run that has lasted its time then comes to rest in the controller's first posture
-    (`AbstractPlant.rest`), which adds no row. The first fault ends the run and is returned as its
-    cause; every row until then is kept. An exception of any kind closes the plant before anything
-    else happens: drives come to rest while disks are still busy. A stop that comes before the first
-    row ends the run there, with no cycle; from the first row on it ends the run between two rows.
+    (`AbstractPlant.rest`), which adds no row. A stop that comes before the first row ends the run
+    there, with no cycle; from the first row on it ends the run between two rows.
+
+    The first fault ends the run and is returned as its cause; every row until then is kept. What
+    the controller raises, or returns instead of a command, is a fault, too ("controller failed"),
+    and so is what the plant raises beside its faults ("plant failed"). Faults and exceptions of
+    any kind close the plant before anything else happens: drives come to rest while disks are
+    still busy. `progress` ends nothing, whatever it raises.
 
     Raises:
         PlantFault: the plant did not get to its start.
@@ -69,10 +78,10 @@ def run(
     began = False
     try:
         stop.raises = True
-        observation = plant.reset()
-        controller.reset(observation)
+        observation = _start(plant)
         began, stop.raises = True, False
-        outcome = _cycle(plant, controller, observation, cycles, clock, sink, stop, progress)
+        watched = progress if isinstance(progress, Onlooker) else Onlooker("progress", progress)
+        outcome = _cycle(plant, controller, observation, cycles, clock, sink, stop, watched)
         return _to_rest(plant, controller.start_motor_pos, outcome, stop)
     except BaseException as error:
         stop.raises = False
@@ -80,6 +89,17 @@ def run(
         if not began and isinstance(error, KeyboardInterrupt) and stop.is_set:
             return Outcome(status="interrupted", cause=None, message=None, cycles=0, wall_time=0.0)
         raise
+
+
+def _start(plant: AbstractPlant) -> Observation:
+    """Reset a plant; raises PlantFault also where it raises what no plant should."""
+    try:
+        return plant.reset()
+    except LegbenchError:
+        raise
+    except Exception as error:
+        plant.close()
+        raise failed("plant", "on its way to the start", error, own_lines(error)) from error
 
 
 def _cycle(
@@ -90,27 +110,34 @@ def _cycle(
     clock: AbstractClock,
     sink: RowSink | None,
     stop: StopFlag,
-    progress: Progress | None,
+    progress: Onlooker,
 ) -> Outcome:
     """The loop itself, from the first observation on."""
     began = time.perf_counter()
     previous = began
     cycle_us = 0.0
     cycle = 0
-    fault: PlantFault | None = None
+    fault = _reset(plant, controller, observation)
     clock.start()
-    while cycle < cycles and not stop.is_set:
+    while fault is None and cycle < cycles and not stop.is_set:
         late = clock.wait(cycle)
-        command = controller.step(observation)
+        try:
+            command = controller.step(observation)
+            check_command(command, observation)
+        except Exception as error:  # Whatever it is, the drives stop first.
+            plant.close()
+            fault = _controller_failed(controller, error, observation)
+            break
         if sink is not None:
             sink.append(command, observation, cycle_us, 1e6 * late)
         cycle += 1
         try:
             observation = plant.step(command)
-        except PlantFault as error:
-            fault = error
+        except Exception as error:
+            plant.close()
+            fault = _plant_failed(error, observation)
             break
-        if progress is not None and (cycle % PROGRESS_EVERY == 0 or cycle == cycles):
+        if cycle % PROGRESS_EVERY == 0 or cycle == cycles:
             progress(cycle, cycles)
         now = time.perf_counter()
         cycle_us, previous = 1e6 * (now - previous), now
@@ -122,7 +149,14 @@ def _cycle(
     else:
         ending = ("complete", None, None)
     status, cause, message = ending
-    return Outcome(status=status, cause=cause, message=message, cycles=cycle, wall_time=wall_time)
+    return Outcome(
+        status=status,
+        cause=cause,
+        message=message,
+        cycles=cycle,
+        wall_time=wall_time,
+        time=observation.time,
+    )
 
 
 def _to_rest(plant: AbstractPlant, motor_pos: Floats, outcome: Outcome, stop: StopFlag) -> Outcome:
@@ -135,3 +169,30 @@ def _to_rest(plant: AbstractPlant, motor_pos: Floats, outcome: Outcome, stop: St
         text = f"after its last row, on the way to rest: {error}"
         return replace(outcome, status="fault", cause=error.cause, message=text)
     return replace(outcome, status="interrupted" if stop.is_set else "complete", message=message)
+
+
+def _reset(
+    plant: AbstractPlant, controller: AbstractController, observation: Observation
+) -> PlantFault | None:
+    """Show a controller the leg at rest; the fault with which the run ends if it cannot take it."""
+    try:
+        controller.reset(observation)
+    except Exception as error:
+        plant.close()
+        return _controller_failed(controller, error, observation)
+    return None
+
+
+def _controller_failed(
+    controller: AbstractController, error: Exception, seen: Observation
+) -> PlantFault:
+    """Return the fault that shows a controller's own lines; where it was told, its `step`."""
+    told = isinstance(error, CommandError)
+    lines = defined_at(type(controller).step) if told else own_lines(error)
+    return failed("controller", f"at t = {seen.time:.3f} s", error, lines)
+
+
+def _plant_failed(error: Exception, seen: Observation) -> PlantFault:
+    if isinstance(error, PlantFault):
+        return error
+    return failed("plant", f"after t = {seen.time:.3f} s", error, own_lines(error))

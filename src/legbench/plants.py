@@ -128,6 +128,11 @@ class OpenPlant:
             self.session.log_to(run / BUS_LOG)
 
     @property
+    def realtime(self) -> bool:
+        """Whether the machine's clock paces it: whoever holds up its loop holds up drives."""
+        return self.session is not None and not self.session.virtual
+
+    @property
     def began(self) -> float | None:
         """Time of row 0 on the bus's own time base, as in the bus log [s]."""
         return self.plant.began if isinstance(self.plant, CanPlant) else None
@@ -143,6 +148,8 @@ class OpenPlant:
             return {}
         cycle, stopped = self.link.cycle, self.link.stopped
         events: dict[str, dict[str, Any]] = {}
+        if self.link.listener_error is not None:
+            events["onlooker failed"] = {"who": "listener", "error": self.link.listener_error}
         if stopped is not None and stopped != StopReport():
             events["stop"] = asdict(stopped)
         landing = self.plant.landing if isinstance(self.plant, CanPlant) else None

@@ -218,6 +218,8 @@ def test_a_listener_that_fails_hears_nothing_more_and_stops_nothing(tmp_path: Pa
 
         it.link.tell(full)
         it.run(20)
+        assert it.link.listener_error == "RuntimeError: no more room"
+        assert [watch.lost_total for watch in it.link.cycle.watches] == [0, 0]
         it.link.stop()
         assert it.states == [SO, SO]
 

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from tyro.conf import subcommand
 
-from legbench.cli import drives_moving, drives_reading, drives_serving
+from legbench.cli import drives_moving, drives_reading, drives_serving, drives_timing
 from legbench.cli.drives_reading import Bench
 from legbench.cli.parse import parse
 from legbench.interrupts import stop_on_interrupt
@@ -40,7 +40,7 @@ class DrivesArguments:
             subcommand("jog", description="move one motor a little, under all limits; IT MOVES"),
         ]
         | Annotated[
-            drives_reading.Jitter,
+            drives_timing.Jitter,
             subcommand("jitter", description="how punctual the cycle is; enables nothing"),
         ]
         | Annotated[

@@ -1,11 +1,8 @@
-"""`legbench drives scan|status|jitter|budget`: looking, never enabling."""
+"""`legbench drives scan|status|budget`: looking, never enabling."""
 
 from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Annotated
-
-from tyro.conf import arg
 
 from legbench.cli.output import note, print_json
 from legbench.design import LegDesign, load_design
@@ -112,53 +109,6 @@ class Status:
                 f"  motor {node.motor_pos:+.4f} rad ({node.motor_counts} counts), "
                 f"link {node.link_pos:+.4f} rad ({node.link_counts} counts)"
             )
-        return 0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Jitter:
-    """How punctual the cycle is; SYNC and process data flow, nothing is enabled."""
-
-    cycles: int = 5000
-    """How many."""
-    cpu: int | None = None
-    """Processor to stay on."""
-    plot: Annotated[Path | None, arg(metavar="FILE")] = None
-    """Draw both distributions: .png, .svg or .pdf."""
-
-    def run(self, bench: Bench) -> int:
-        """Measure and print a table, with what the system granted."""
-        from legbench.commissioning.jitter import measure
-
-        if self.cycles < 1:
-            raise ConfigError(f"cycles is {self.cycles}; it must be 1 or more")
-        with bench.session(leads=True, read_only=True) as session:
-            granted = session.be_punctual(self.cpu)
-            timing = measure(session, bench.leg().stiffness, self.cycles)
-        table = timing.table()
-        if self.plot is not None:
-            from legbench.viz.timing import draw_timing
-
-            draw_timing(timing.late_us, timing.exchange_us, self.plot)
-            note(f"wrote {self.plot}")
-        content = {
-            "cycles": self.cycles,
-            "time": "virtual" if granted is None else "wall",
-            "granted": None if granted is None else asdict(granted),
-            **table,
-            "skipped": timing.skipped,
-            "lost": timing.lost,
-        }
-        if bench.json:
-            print_json(content)
-            return 0
-        print(f"{self.cycles} cycles in {content['time']} time")
-        for name, words in ({} if granted is None else asdict(granted)).items():
-            print(f"  {name:<11} {words}")
-        print(f"{'[us]':<13}" + "".join(f"{word:>9}" for word in table["late_us"]))
-        for label, name in (("wake-up", "late_us"), ("exchange", "exchange_us")):
-            print(f"{label:<13}" + "".join(f"{value:9.0f}" for value in table[name].values()))
-        print(f"skipped {timing.skipped} ticks, lost process data in {timing.lost} cycles")
         return 0
 
 

@@ -134,6 +134,11 @@ class Link(Lead):
         if self.state is not LinkState.NEW:
             self._port.listener = listener
 
+    @property
+    def listener_error(self) -> str | None:
+        """What a listener raised, in one line; it hears nothing more then."""
+        return self._port.listener_error
+
     # --- before anything moves ---------------------------------------------------------------
 
     def open(self) -> None:
@@ -288,6 +293,29 @@ class Link(Lead):
             self.stop()
             raise
         return sample
+
+    def look(self) -> Sample:
+        """Wait for the next tick and show what came, however late and incomplete it is.
+
+        In read-only, for those who measure: nothing has power, and no limit ends it.
+
+        Raises:
+            PlantFault: another master leads the drives.
+            DriveError: the link is not read-only, or not started.
+        """
+        self._refuse_ended()
+        if not self._read_only:
+            raise DriveError("this link may lead drives; limits have to watch it: use exchange")
+        try:
+            self._settling_tick()
+            self._start_up.idle()
+        except PlantFault as error:
+            self._end(error)
+            raise
+        except BaseException:
+            self.stop()
+            raise
+        return self._sample()
 
     def command(self, motor_pos: Sequence[float]) -> tuple[float, ...]:
         """Send a command for the coming period; what of it was applied [rad].

@@ -1,6 +1,5 @@
 """The leg on the bench, or an emulated one: two servo drives on a CAN bus."""
 
-import math
 from collections.abc import Callable, Sequence
 from typing import final
 
@@ -11,6 +10,7 @@ from legbench.drives.session import Session
 from legbench.plant.abstract import AbstractPlant
 from legbench.plant.landing import PATIENCE, STILL_RANGE, Landing, land
 from legbench.plant.start import Start
+from legbench.plant.velocity import VelocityEstimate
 from legbench.signals import Command, Floats, Observation
 
 VELOCITY_BANDWIDTH = 200.0
@@ -29,10 +29,12 @@ class CanPlant(AbstractPlant):
 
     The link waits for its own grid: run it with a clock that does not (`VirtualClock`, or one
     that reports `late`). Link and motor angles are the encoders', spring torque is stiffness times
-    their difference. `joint_vel` is the encoders' difference over one period behind a first-order
-    low-pass of 200 Hz, 0.8 ms late. `applied_pos` is what the limits let through; in read-only,
-    where nothing is commanded, it is where the motors are. There is no truth. A command is seen
-    two observations later: one cycle more than in `SimPlant`.
+    their difference. `time` is that of the SYNC that the observation answers, since the one of
+    observation 0: a late SYNC has a late time, and a tick without SYNC leaves a gap. `joint_vel` is
+    the encoders' difference over the time between two SYNCs behind a first-order low-pass of
+    200 Hz, 0.8 ms late; a drive whose answer is missing keeps its velocity. `applied_pos` is what
+    the limits let through; in read-only, where nothing is commanded, it is where the motors are.
+    There is no truth. A command is seen two observations later: one cycle more than in `SimPlant`.
 
     Attributes:
         link: the cyclic link.
@@ -70,10 +72,9 @@ class CanPlant(AbstractPlant):
         self.landing: Landing | None = None
         self._lands = lands and not read_only
         self._read_only, self._speed = read_only, speed
-        self._gain = 1.0 - math.exp(-2.0 * math.pi * VELOCITY_BANDWIDTH * self.period)
-        self._links: Floats = np.zeros(2)
-        self._velocity: Floats = np.zeros(2)
-        self._cycle = 0
+        self._velocity = VelocityEstimate(VELOCITY_BANDWIDTH, self.period)
+        self._period_ns = session.config.period_ns
+        self._began_ns = 0
 
     def reset(self) -> Observation:
         """Start the drives where they stand, go slowly to the start posture, wait for rest.
@@ -88,8 +89,7 @@ class CanPlant(AbstractPlant):
         sample = self.link.exchange() if running else self.link.start()
         if not self._read_only:
             sample = self.link.move_to(self._start.motor_pos.tolist(), self._speed)
-        self._links = np.array(sample.link_pos)
-        self._velocity = np.zeros(2)
+        self._velocity.reset(sample.time_ns, sample.link_pos)
         still = 0
         for _ in range(STILL_PATIENCE):
             seen = self._observe(self._exchange(self._start.motor_pos))
@@ -97,7 +97,7 @@ class CanPlant(AbstractPlant):
             if still >= STILL_CYCLES:
                 break
         sample = self._exchange(self._start.motor_pos)
-        self._cycle, self.began = 0, 1e-9 * sample.time_ns
+        self._began_ns, self.began = sample.time_ns, 1e-9 * sample.time_ns
         return self._observe(sample)
 
     def step(self, command: Command) -> Observation:
@@ -106,9 +106,7 @@ class CanPlant(AbstractPlant):
         Raises:
             PlantFault: a limit or a watchdog; all drives have been stopped in that cycle.
         """
-        sample = self._exchange(command.motor_pos)
-        self._cycle += 1 + sample.skipped
-        return self._observe(sample)
+        return self._observe(self._exchange(command.motor_pos))
 
     def rest(self, motor_pos: Floats, interrupted: Callable[[], bool]) -> str | None:
         """Lead the motors to a posture as slowly as to the start, wait until the leg rests.
@@ -151,15 +149,17 @@ class CanPlant(AbstractPlant):
         return self.sample
 
     def _observe(self, sample: Sample) -> Observation:
-        links, motors = np.array(sample.link_pos), np.array(sample.motor_pos)
-        rate = (links - self._links) / (self.period * (1 + sample.skipped))
-        self._velocity = self._velocity + self._gain * (rate - self._velocity)
-        self._links = links
+        motors = np.array(sample.motor_pos)
         return Observation(
-            time=self._cycle * self.period,
+            time=self._since_start(sample.time_ns),
             motor_pos=motors,
-            joint_pos=links,
-            joint_vel=self._velocity,
+            joint_pos=np.array(sample.link_pos),
+            joint_vel=self._velocity.update(sample.time_ns, sample.link_pos, sample.fresh),
             spring_torque=np.array(sample.spring_torque),
             applied_pos=np.array(sample.applied_pos) if sample.applied_pos else motors,
         )
+
+    def _since_start(self, time_ns: int) -> float:
+        """Time since observation 0 [s]; on the grid the same number as in a simulation."""
+        cycles, beside_ns = divmod(time_ns - self._began_ns, self._period_ns)
+        return cycles * self.period + 1e-9 * beside_ns
