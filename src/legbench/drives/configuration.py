@@ -41,7 +41,8 @@ def configuration(bus: BusConfig, node: NodeConfig) -> Iterator[Parameter]:
     watched = bus.master_id << 16 | 3 * bus.master_heartbeat_ms
     yield _parameter(0x1005, 0, U32, SYNC_ID)  # bit 30 clear: the drive is no SYNC producer
     yield _parameter(0x1006, 0, U32, bus.period_us)
-    yield _parameter(0x1016, 1, U32, watched)
+    if node.heartbeat_consumer:
+        yield _parameter(0x1016, 1, U32, watched)
     yield _parameter(0x1017, 0, U16, bus.heartbeat_ms)
     yield _parameter(0x1029, 1, U8, 0)  # a communication error leads to pre-operational
     yield _parameter(0x6007, 0, I16, QUICK_STOP)

@@ -257,7 +257,7 @@ class BringUp:
             )
 
     def temperature(self, node: NodeConfig) -> int | None:
-        """What the drive's sensor shows [0.1 deg C]; none where the bus file names no object."""
+        """What the drive's sensor shows [counts]; none where the bus file names no object."""
         entry = node.temperature_object
         return None if entry is None else self.sdo(node).get_int(entry.index, entry.sub, entry.kind)
 
