@@ -73,6 +73,8 @@ def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20
     Raises:
         ConfigError: no time at all, the bus file does not bound a search, or it is too fast.
         BusError: the channel has a master.
+        PlantFault: somebody else leads these drives; before the homing has begun, nothing has been
+            sent since it was heard.
         DriveError: another drive, a refused step, or homing failed.
     """
     if not 0.0 < timeout < math.inf:
@@ -81,8 +83,10 @@ def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20
         _check_bounded(node)
     session.hold()
     up = session.bring_up()
+    up.listen()
     up.identify()
     up.unpower()
+    up.glance()
     up.pre_operational()
     up.configure(node)
     sdo = up.sdo(node)
@@ -91,6 +95,7 @@ def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20
     before = up.preload(node)
     _choose(sdo, node, method)
     master = _Master(session, sdo, node)
+    up.glance()
     try:
         master.start()
         master.enter_homing()
@@ -98,6 +103,8 @@ def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20
         master.command(START_HOMING)
         master.await_end(timeout)
     finally:
+        # This master leads now: whoever else speaks, the drive is stopped.
+        up.lookout.rest()
         try:
             master.stop()
         finally:

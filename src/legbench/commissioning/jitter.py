@@ -38,12 +38,13 @@ def measure(session: Session, stiffness: Sequence[float], cycles: int) -> Timing
     """Exchange frames in read-only for a number of cycles.
 
     Raises:
-        DriveError: another master sends SYNC, whose punctuality is not ours.
+        PlantFault: another master leads these drives, whose punctuality is not ours.
         BusError, DriveError, PlantFault: as `Link.start`, `Link.exchange`.
     """
     timebase = session.timebase
     late, exchange = np.zeros(cycles), np.zeros(cycles)
     lost = 0
+    session.bring_up().listen()
     with session.link(SafetyLimits(), stiffness, read_only=True) as link:
         link.start()
         if link.listening:

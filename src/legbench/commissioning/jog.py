@@ -57,7 +57,9 @@ def jog(
         raise ConfigError(f"a jog at {speed:g} rad/s; it may be up to {FASTEST:g} rad/s")
     _check_limits(limits)
     check_stopping(session.config, limits)
-    session.bring_up().identify()
+    up = session.bring_up()
+    up.listen()
+    up.identify()
     _check_range(session, limits, names.index(name), by)
     with session.link(limits, stiffness) as link:
         start = link.start().motor_pos

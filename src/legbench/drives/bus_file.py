@@ -19,6 +19,7 @@ from legbench.drives.config import (
 )
 from legbench.drives.errors import CodecError
 from legbench.drives.limits import SafetyLimits
+from legbench.drives.objects import name_of
 from legbench.drives.units import AxisUnits
 from legbench.errors import ConfigError
 from legbench.reading import UnreadableError, read_toml
@@ -119,7 +120,11 @@ def _node(table: object) -> NodeConfig:
     if "soft_limits" in given:
         given["soft_limits"] = _range("soft_limits", given["soft_limits"])
     parameters = _table("parameters", given.get("parameters", {}))
-    given["parameters"] = tuple(_parameter(*item) for item in parameters.items())
+    given["parameters"] = found = tuple(_parameter(*item) for item in parameters.items())
+    keys = [parameter.key for parameter in found]
+    for key in keys:
+        if keys.count(key) > 1:
+            raise ConfigError(f"{where} gives parameter {name_of(*key)} twice")
     done = ("identity", "motor", "link", "link_object", "temperature_object", "rpdos", "tpdos")
     return _build(NodeConfig, where, given, converted=(*done, "parameters", "soft_limits"))
 

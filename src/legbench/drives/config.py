@@ -5,12 +5,12 @@ from dataclasses import dataclass, field, replace
 
 from legbench.drives.bus_numbers import BUS_NUMBERS, LONG, WORD, check_bus_numbers
 from legbench.drives.cob_ids import check_cob_id, check_distinct
-from legbench.drives.codec.datatypes import FORMATS, DataType
+from legbench.drives.codec.datatypes import DataType
 from legbench.drives.codec.frame import LAST_NODE, RPDO_BASES, TPDO_BASES
 from legbench.drives.codec.pdo import Mapped, PdoMap
 from legbench.drives.errors import CodecError
 from legbench.drives.limits import Range
-from legbench.drives.objects import LINK_SHORT, PDO_COUNT, name_of
+from legbench.drives.objects import LINK_SHORT, PDO_COUNT
 from legbench.drives.parameters import Parameter, check_parameter
 from legbench.drives.units import AxisUnits
 from legbench.drives.upper_ends import BUS_WAIVERS, check_number, check_waivers
@@ -130,14 +130,7 @@ class NodeConfig:
             )
         for parameter in self.parameters:
             check_parameter(self.name, parameter)
-        keys = [parameter.key for parameter in self.parameters]
-        for key in keys:
-            if keys.count(key) > 1:
-                raise ConfigError(f"node '{self.name}' gives parameter {name_of(*key)} twice")
         check_number("temperature_scale", self.temperature_scale, 1e-4, 10.0, "deg C a count")
-        heat = self.temperature_object
-        if heat is not None and heat.kind not in FORMATS:
-            raise ConfigError(f"node '{self.name}': temperature_object {heat} holds no number")
         if self.soft_limits is not None:
             _ = self.soft_limits_counts
 

@@ -111,7 +111,7 @@ class Link(Closing):
         self._start_up = StartUp(self._port, self.cycle, config, read_only=read_only)
         self._last = Tick(0, 0, 0, 0, False)
         self._expected: list[tuple[float, ...]] = []
-        self._holds = self._closed = False
+        self._holds = self._closed = self._leads = False
         self.listening = False
 
     def tell(self, listener: Listener) -> None:
@@ -159,8 +159,10 @@ class Link(Closing):
             self._lock.release()
 
     def _prepare_to_move(self) -> None:
+        self.bring_up.listen()
         self.bring_up.identify()
         self.bring_up.unpower()
+        self.bring_up.glance()
         self.bring_up.pre_operational()
         for node in self._config.nodes:
             self.bring_up.configure(node)
@@ -179,8 +181,11 @@ class Link(Closing):
         now_ns = self._port.timebase.now_ns()
         self.listening = self.cycle.hears_sync(now_ns + LISTEN_NS)
         self._start_up.listening = self.listening
-        if not self.listening:
+        if self.listening:
+            self.bring_up.lookout.rest()
+        else:
             self._hold()
+            self.bring_up.listen()
         self.bring_up.identify()
         self.bring_up.refuse_differences()
         if self.listening:
@@ -211,6 +216,8 @@ class Link(Closing):
             raise DriveError(
                 f"a link that is {self.state.name.lower()} cannot start; make a new one"
             )
+        if not self._read_only and self.cycle.led_by_another():
+            self._supervisor.alone()  # It has come since `open`, and keeps the drives.
         self.state = LinkState.CYCLIC
         try:
             self._start_up.settle(self._settling_tick)
@@ -226,6 +233,7 @@ class Link(Closing):
 
     def _enable(self, *, clear_faults: bool) -> None:
         up = self._start_up
+        self._leads = True
         if clear_faults:
             words = "leave its fault, whose cause still stands"
             up.seek(Goal.FAULT_RESET, up.faulted(), self._watched_tick, words)
@@ -388,8 +396,13 @@ class Link(Closing):
         """Quick stop of all drives in this cycle, then no power; never raises."""
         if self.state in (LinkState.CYCLIC, LinkState.RUNNING):
             self.state = LinkState.STOPPED
-            if not self._read_only:
+            if not (self._read_only or self._yields):
                 StopLadder(self.cycle).run()
+
+    @property
+    def _yields(self) -> bool:
+        """Whether the drives are another master's: one was heard before this one led them."""
+        return not self._leads and self.cycle.led_by_another()
 
     def close(self) -> None:
         """Stop, leave the drives in pre-operational, release the channel; never raises.
@@ -404,7 +417,7 @@ class Link(Closing):
             self.stop()
         finally:
             try:
-                if not (self._read_only and (looked or self.cycle.led_by_another())):
+                if not (self._yields or (self._read_only and looked)):
                     self.bring_up.pre_operational()
             except BusError as error:
                 self.cycle.bus_error = error

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from legbench.errors import ConfigError
 
 LIMIT_ENDS: Mapping[str, tuple[float, float, str]] = {
-    "command_speed": (100.0, 1000.0, "rad/s"),
+    "command_speed": (200.0, 1000.0, "rad/s"),
     "command_step": (1.0, 6.3, "rad"),
     "spring_torque": (50.0, 1000.0, "N m"),
     "following_error": (0.5, 6.3, "rad"),
@@ -20,10 +20,10 @@ LIMIT_ENDS: Mapping[str, tuple[float, float, str]] = {
 }
 """Limit -> highest value, highest value where it is waived, unit.
 
-A speed of 100 rad/s crosses the whole range of a joint in 30 ms; a step or an error of the first
-value is as long as that range or half of it; springs of 3 to 5 N m/rad that carry 50 N m are wound
-by more than a turn; copper insulation of class E ends at 120 deg C; 50 cycles are half of the time
-in which drives stop that have lost their master. A waived limit still acts within seconds.
+No geared servo turns a joint at 200 rad/s, 1 900 rpm. A step of 1 rad or an error of 0.5 rad is
+half or a quarter of a joint's whole range. Springs of 3 to 5 N m/rad that carry 50 N m are wound by
+more than a turn. Insulation of class E ends at 120 deg C. 50 cycles are half of the time in which
+drives stop that have lost their master. A waived limit still acts within seconds.
 """
 WIDEST_ANGLE = 2.0 * math.pi
 """Furthest end of a range of angles; a joint of a leg makes no turn [rad]."""
