@@ -31,6 +31,7 @@ from legbench.plant.start import PERIOD, Start
 from legbench.plants import Leg, PlantChoice, SimChoice, open_plant
 from legbench.recording.writer import RunWriter
 from legbench.servo import ServoConfig
+from legbench.verdict import judged
 
 ControllerConfig = JumpConfig | BangBangConfig | PositionJumpConfig
 USUAL_SETUP = {
@@ -177,6 +178,7 @@ def record(
                 stop=stop,
                 progress=progress,
             )
+            outcome = judged(outcome, opened.link)
             opened.plant.close()
             for event, detail in opened.events().items():
                 writer.event(outcome.cycles * PERIOD, event, **detail)

@@ -10,6 +10,7 @@ from types import FrameType
 
 from legbench.cli.drives_reading import Bench
 from legbench.cli.output import note, print_json
+from legbench.cli.waived import tell_waived
 from legbench.drives.config import NodeConfig
 from legbench.drives.realtime import Granted
 from legbench.drives.session import Session
@@ -153,7 +154,9 @@ class Jog:
         from legbench.commissioning.jog import jog
 
         design = bench.leg()
-        limits = limits_for(bench.limits or bench.bus.parent / LIMITS_NAME, design)
+        path = bench.limits or bench.bus.parent / LIMITS_NAME
+        limits = limits_for(path, design)
+        tell_waived(None, path)
         with interrupted_by_signals(), bench.session(leads=True) as session:
             granted = session.be_punctual()
             jogged = jog(

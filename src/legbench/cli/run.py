@@ -9,6 +9,7 @@ from tyro.conf import subcommand
 from legbench.cli.output import note, print_json, progress
 from legbench.cli.parse import parse
 from legbench.cli.table import print_summary
+from legbench.cli.waived import tell_waived_of
 from legbench.clock import WallClock
 from legbench.control import BangBangConfig, JumpConfig, PositionJumpConfig, SetpointMeaning
 from legbench.design import load_design
@@ -161,6 +162,7 @@ def main(arguments: list[str]) -> int:
     """Run; 0 when it came to its end or was stopped by ^C, 1 when a fault ended it."""
     chosen = parse(RunArguments, "run", arguments)
     experiment = experiment_of(chosen)
+    tell_waived_of(experiment.plant)
     watched = chosen.view or chosen.serve
     watching = Watching(serve=chosen.serve)
     paced = watched or chosen.real_time

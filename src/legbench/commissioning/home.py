@@ -4,7 +4,6 @@ The drive is configured as for a run and goes to operational, so that its own wa
 when this master falls silent; it is always led out by quick stop.
 """
 
-import math
 from dataclasses import dataclass
 from typing import final
 
@@ -25,6 +24,7 @@ from legbench.drives.codec.nmt import NmtCommand, NmtState, heartbeat_frame, nmt
 from legbench.drives.config import NodeConfig
 from legbench.drives.errors import DriveError
 from legbench.drives.master.sdo_port import SdoPort
+from legbench.drives.master_watch import check_master_watch
 from legbench.drives.objects import name_of
 from legbench.drives.session import Session
 from legbench.errors import ConfigError
@@ -37,6 +37,8 @@ NEEDED = ((0x6065, 0), (0x6072, 0), (0x6085, 0))
 """Window, torque and ramp that a search is not made without, in the bus file."""
 FASTEST = 1.0
 """A search for a hard stop goes no faster (6099h:01) [rad/s]."""
+LONGEST = 600.0
+"""A search at the lowest sensible speed, 0.01 rad/s, has made a turn by then [s]."""
 PATIENCE = 200
 """Looks at a drive for one step."""
 OBEY_LOOKS = 10
@@ -71,16 +73,19 @@ def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20
         timeout: [s]
 
     Raises:
-        ConfigError: no time at all, the bus file does not bound a search, or it is too fast.
+        ConfigError: no time at all or more than 10 minutes, the bus file does not bound a search,
+            it is too fast, or a drive would go on without its master.
         BusError: the channel has a master.
         PlantFault: somebody else leads these drives; before the homing has begun, nothing has been
             sent since it was heard.
         DriveError: another drive, a refused step, or homing failed.
     """
-    if not 0.0 < timeout < math.inf:
-        raise ConfigError(f"timeout is {timeout:g} s; it must be positive")
+    if not 0.0 < timeout <= LONGEST:
+        raise ConfigError(f"timeout is {timeout:g} s; it must be positive, {LONGEST:g} s at most")
     if method not in IN_PLACE:
         _check_bounded(node)
+    # Led by SDO a drive gets no RPDO, whose deadline therefore never begins.
+    check_master_watch(session.config, speed=FASTEST, commands=False)
     session.hold()
     up = session.bring_up()
     up.listen()

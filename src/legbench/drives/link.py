@@ -33,6 +33,7 @@ from legbench.drives.master.sample import Sample, sample_of
 from legbench.drives.master.start_up import StartUp
 from legbench.drives.master.stop import StopLadder
 from legbench.drives.master.supervisor import Supervisor
+from legbench.drives.master_watch import check_master_watch
 from legbench.drives.open_bus import timebase_of
 from legbench.drives.timebase import Timebase
 from legbench.drives.wire import check_load
@@ -127,6 +128,7 @@ class Link(Closing):
         here.
 
         Raises:
+            ConfigError: a drive would go on for too long without its master.
             BusError: the channel has a master, or the interface does not work.
             DriveError: a drive is missing, is another one, or refuses its configuration; or, in
                 read-only, is not configured.
@@ -138,6 +140,7 @@ class Link(Closing):
             if self._read_only:
                 self._prepare_to_look()
             else:
+                check_master_watch(self._config, speed=self._limits.command_speed)
                 self._hold()
                 self._prepare_to_move()
             for node, poll in zip(self._config.nodes, self.cycle.polls, strict=True):
