@@ -223,7 +223,7 @@ def _open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
         raise ConfigError(f"{choice.bus}: period_us is {config.period_us}; runs need 1000")
     check_load(config.at(choice.bitrate))
     limits = limits_for(choice.limits or choice.bus.parent / LIMITS_NAME, leg.design)
-    check_together(config, limits, leads=not choice.read_only)
+    check_together(config, limits, stops=joint_ranges(leg.design), leads=not choice.read_only)
     if not choice.is_virtual(config):
         limits.require_complete()
     session = open_session(config, choice, leg, leads=not choice.read_only)

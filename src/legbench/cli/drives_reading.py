@@ -178,7 +178,7 @@ class Budget:
         from legbench.drives.checks import check_together
         from legbench.drives.master_watch import means_of
         from legbench.drives.wire import MAX_LOAD, bus_load, check_load, schedule
-        from legbench.plants import LIMITS_NAME, limits_for
+        from legbench.plants import LIMITS_NAME, joint_ranges, limits_for
 
         config = bench.config().at(bench.bitrate)
         limits = limits_for(bench.limits or bench.bus.parent / LIMITS_NAME, bench.leg())
@@ -214,5 +214,5 @@ class Budget:
                 texts = [f"{one.stop_ms:.0f} ms by {one.name}" for one in found]
                 print(f"without master, {name} stands after {' or '.join(texts) or 'no time'}")
         check_load(config)
-        check_together(config, limits)
+        check_together(config, limits, stops=joint_ranges(bench.leg()))
         return 0

@@ -5,6 +5,7 @@ torque, or a drive that is cool. So it is found before anything moves, from the 
 """
 
 import math
+from collections.abc import Sequence
 
 from legbench.drives.codec.datatypes import range_of
 from legbench.drives.config import BusConfig, NodeConfig
@@ -15,17 +16,25 @@ SLACK = 0.2
 """So far beyond its range a motor may stand or run on, see `stopping.LONGEST_WAY` [rad]."""
 
 
-def check_field_ranges(config: BusConfig, limits: SafetyLimits) -> None:
+def check_field_ranges(
+    config: BusConfig, limits: SafetyLimits, stops: Sequence[Range] | None = None
+) -> None:
     """Refuse objects that cannot hold what they are to show; a range that is not given is skipped.
+
+    Args:
+        config: the bus.
+        limits: of the leg.
+        stops: where the links can be at all, one range a joint; that of the limits by default
+            [rad].
 
     Raises:
         ConfigError: a motor's or a link's position, or a temperature limit, lies beyond its object.
     """
     for node, motor, joint in zip(
-        config.nodes, limits.motor_range, limits.joint_range, strict=True
+        config.nodes, limits.motor_range, stops or limits.joint_range, strict=True
     ):
         _check_motor(node, motor)
-        _check_link(node, motor, joint)
+        _check_link(node, joint)
         _check_temperature(node, limits.temperature)
 
 
@@ -45,20 +54,22 @@ def _check_motor(node: NodeConfig, motor: Range) -> None:
         )
 
 
-def _check_link(node: NodeConfig, motor: Range, joint: Range) -> None:
-    """The count of the link is found from its motor's, so it must not be half a lap from it."""
-    ends = (joint[1] - motor[0], motor[1] - joint[0])
-    if not all(map(math.isfinite, ends)):
+def _check_link(node: NodeConfig, joint: Range) -> None:
+    """No two positions of a joint show the same count.
+
+    The lap of a link is found from its motor's position. Where it is found wrongly, the link seems
+    to be a whole lap away: outside its range, where no drive is enabled.
+    """
+    if not all(map(math.isfinite, joint)):
         return
     units, entry = node.link, node.link_object
-    apart, half = max(ends), 0.5 * (1 << units.bits) * units.resolution
-    if apart >= half:
+    lap, width = (1 << units.bits) * units.resolution, joint[1] - joint[0]
+    if width >= lap:
         raise ConfigError(
-            f"link of '{node.name}': {entry} of {units.bits} bits repeats every {2.0 * half:.4g} "
-            f"rad at {abs(units.counts_per_rad):.6g} counts/rad, but the link may be {apart:.4g} "
-            f"rad from its motor (joint_range [{joint[0]:g}, {joint[1]:g}], motor_range "
-            f"[{motor[0]:g}, {motor[1]:g}] rad), the limit is half of that: map an object of 32 "
-            'bits, such as link_object = "60E4:01 i32", or fewer counts per turn'
+            f"link of '{node.name}': {entry} of {units.bits} bits repeats every {lap:.4g} rad at "
+            f"{abs(units.counts_per_rad):.6g} counts/rad, but its joint's range [{joint[0]:g}, "
+            f"{joint[1]:g}] rad is {width:.4g} rad wide: map an object of 32 bits, such as "
+            'link_object = "60E4:01 i32", or fewer counts per turn'
         )
 
 
