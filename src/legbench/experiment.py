@@ -4,7 +4,7 @@ import math
 import platform
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from legbench.control import (
 from legbench.design import LegDesign
 from legbench.design.setup import Setup, SetupKind
 from legbench.design.toml import design_to_mapping
-from legbench.drives.master.stop_report import CAUSE, StopReport, add_trouble
+from legbench.drives.master.stop_report import add_trouble
 from legbench.errors import ConfigError, RecordingError
 from legbench.interrupts import StopFlag, shielded
 from legbench.kinematics import ModalConvention
@@ -35,6 +35,7 @@ from legbench.plant.start import PERIOD, Start
 from legbench.plants import Leg, OpenPlant, PlantChoice, SimChoice, open_plant
 from legbench.recording.writer import RunWriter
 from legbench.servo import ServoConfig
+from legbench.verdict import answered, stopped_well
 
 ControllerConfig = JumpConfig | BangBangConfig | PositionJumpConfig
 USUAL_SETUP = {
@@ -194,8 +195,9 @@ def record(
                 _tell_events(opened, writer, (starting, watching), writer.rows * PERIOD)
                 add_trouble(error, opened.stopped)
                 raise
+            outcome = answered(outcome, opened.link)
             opened.plant.close()
-            outcome = _judged(outcome, opened.stopped)
+            outcome = stopped_well(outcome, opened.stopped)
             _tell_events(opened, writer, (starting, watching), outcome.time)
             writer.event(outcome.time, "end", status=outcome.status, cause=outcome.cause)
             writer.close(outcome.status, outcome.cause)
@@ -224,18 +226,6 @@ def _tell_events(
     for each in onlookers:
         if each.failure is not None:
             writer.event(time, "onlooker failed", who=each.name, error=each.failure)
-
-
-def _judged(outcome: Outcome, stopped: StopReport | None) -> Outcome:
-    """An outcome after the stop of the drives: without a verified stop no run has ended well.
-
-    The first cause stays the cause; what the stop has to tell is added to the message.
-    """
-    trouble = None if stopped is None else stopped.trouble
-    if trouble is None:
-        return outcome
-    message = trouble if outcome.message is None else f"{outcome.message}; {trouble}"
-    return replace(outcome, status="fault", cause=outcome.cause or CAUSE, message=message)
 
 
 def _manifest(experiment: Experiment, start: Start, xml: str) -> dict[str, Any]:

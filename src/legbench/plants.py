@@ -9,6 +9,7 @@ from legbench.clock import AbstractClock, VirtualClock
 from legbench.design import LegDesign
 from legbench.drives.bus import LockstepBus
 from legbench.drives.bus_file import load_bus, load_limits
+from legbench.drives.checks import check_together
 from legbench.drives.config import BusConfig
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.build import emulate
@@ -20,7 +21,7 @@ from legbench.drives.master.lock import ChannelLock
 from legbench.drives.master.stop_report import StopReport
 from legbench.drives.open_bus import adapter_of, open_bus
 from legbench.drives.session import Session
-from legbench.drives.stopping import check_stopping
+from legbench.drives.waivers import describe_waivers
 from legbench.drives.wire import check_load
 from legbench.errors import ConfigError
 from legbench.mjcf import BuildOptions
@@ -121,6 +122,8 @@ class OpenPlant:
     """What a run has to say of it."""
     session: Session | None = None
     link: Link | None = None
+    waived: tuple[str, ...] = ()
+    """Protections that a run on it does without, a line each."""
 
     def start_log(self, run: Path) -> None:
         """Record raw frames into a run folder from now on, if there are any."""
@@ -144,10 +147,11 @@ class OpenPlant:
 
     def events(self) -> dict[str, dict[str, Any]]:
         """What a run on it has to tell in the end, by name."""
+        told = {"waived": {"protections": list(self.waived)}} if self.waived else {}
         if self.link is None:
-            return {}
+            return told
         cycle, stopped = self.link.cycle, self.link.stopped
-        events: dict[str, dict[str, Any]] = {}
+        events: dict[str, dict[str, Any]] = dict(told)
         if self.link.listener_error is not None:
             events["onlooker failed"] = {"who": "listener", "error": self.link.listener_error}
         if stopped is not None and stopped != StopReport():
@@ -221,11 +225,13 @@ def _alone(
 ) -> OpenPlant:
     """A plant that is nothing but computed, in virtual time."""
     manifest = {"plant": choice.kind, **told}
+    waived: tuple[str, ...] = ()
     if choice.limits is not None:
         limits = limits_for(choice.limits, leg.design)
         plant = LimitedPlant(plant, limits, delay_cycles=leg.servo.delay_cycles)
         manifest["limits"] = asdict(limits)
-    return OpenPlant(plant=plant, clock=VirtualClock(), manifest=manifest)
+        waived = describe_waivers(None, limits)
+    return OpenPlant(plant=plant, clock=VirtualClock(), manifest=manifest, waived=waived)
 
 
 def _open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
@@ -241,7 +247,7 @@ def _open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
         raise ConfigError(f"{choice.bus}: period_us is {config.period_us}; runs need 1000")
     check_load(config.at(choice.bitrate))
     limits = limits_for(choice.limits or choice.bus.parent / LIMITS_NAME, leg.design)
-    check_stopping(config, limits)
+    check_together(config, limits, stops=joint_ranges(leg.design), leads=not choice.read_only)
     if not choice.is_virtual(config):
         limits.require_complete()
     session = open_session(config, choice, leg, leads=not choice.read_only)
@@ -264,6 +270,7 @@ def _open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
             "bitrate": choice.bitrate or config.bitrate,
             "read_only": choice.read_only,
             "end": choice.end,
+            "waived": list(config.waive),
             "nodes": {
                 node.name: {"id": node.node_id, "identity": asdict(node.identity)}
                 for node in config.nodes
@@ -273,7 +280,12 @@ def _open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
         "realtime": None if granted is None else asdict(granted),
     }
     return OpenPlant(
-        plant=plant, clock=CanClock(plant), manifest=manifest, session=session, link=link
+        plant=plant,
+        clock=CanClock(plant),
+        manifest=manifest,
+        session=session,
+        link=link,
+        waived=describe_waivers(config, limits),
     )
 
 

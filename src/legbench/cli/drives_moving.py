@@ -5,6 +5,7 @@ from pathlib import Path
 
 from legbench.cli.drives_reading import Bench
 from legbench.cli.output import note, print_json
+from legbench.cli.waived import tell_waived
 from legbench.drives.config import NodeConfig
 from legbench.drives.realtime import Granted
 from legbench.drives.session import Session
@@ -123,7 +124,9 @@ class Jog:
         from legbench.commissioning.jog import jog
 
         design = bench.leg()
-        limits = limits_for(bench.limits or bench.bus.parent / LIMITS_NAME, design)
+        path = bench.limits or bench.bus.parent / LIMITS_NAME
+        limits = limits_for(path, design)
+        tell_waived(None, path)
         with bench.session(leads=True) as session:
             granted = session.be_punctual()
             jogged = jog(

@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from legbench.cli.output import note, print_json
+from legbench.cli.waived import tell_waived
 from legbench.design import LegDesign, load_design
 from legbench.drives.bus_file import load_bus
 from legbench.drives.config import BusConfig
@@ -49,6 +50,8 @@ class Bench:
 
     def session(self, *, leads: bool, read_only: bool = False) -> AbstractContextManager[Session]:
         """The bus, open, its channel locked by whoever leads; raises ConfigError, BusError."""
+        if leads:
+            tell_waived(self.bus, None)
         choice = replace(self.choice, read_only=read_only)
         return open_session(self.config(), choice, leads=leads)
 
@@ -114,13 +117,24 @@ class Status:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Budget:
-    """What the schedule of the bus file takes of the wire at worst; opens no bus."""
+    """What the schedule of the bus file takes of the wire at worst; opens no bus.
+
+    It also says how soon every drive stands when its master is gone, and checks bus and limits
+    files against each other.
+    """
 
     def run(self, bench: Bench) -> int:
-        """Print every frame; raises ConfigError above 80 %."""
+        """Print every frame; raises ConfigError above 80 %, or where the files do not fit."""
+        from legbench.drives.checks import check_together
+        from legbench.drives.master_watch import means_of
         from legbench.drives.wire import MAX_LOAD, bus_load, check_load, schedule
+        from legbench.plants import LIMITS_NAME, joint_ranges, limits_for
 
         config = bench.config().at(bench.bitrate)
+        limits = limits_for(bench.limits or bench.bus.parent / LIMITS_NAME, bench.leg())
+        means = {
+            node.name: means_of(config, node, speed=limits.command_speed) for node in config.nodes
+        }
         entries, load = schedule(config), bus_load(config)
         if bench.json:
             print_json(
@@ -129,6 +143,10 @@ class Budget:
                     "load": load,
                     "limit": MAX_LOAD,
                     "frames": [asdict(entry) for entry in entries],
+                    "master_watch": {
+                        name: [asdict(one) | {"stop_ms": one.stop_ms} for one in found]
+                        for name, found in means.items()
+                    },
                 }
             )
         else:
@@ -142,5 +160,9 @@ class Budget:
                 f"{'worst load':<24} {100 * load:.1f} % of {config.bitrate} bit/s, the limit is "
                 f"{100 * MAX_LOAD:.0f} %"
             )
+            for name, found in means.items():
+                texts = [f"{one.stop_ms:.0f} ms by {one.name}" for one in found]
+                print(f"without master, {name} stands after {' or '.join(texts) or 'no time'}")
         check_load(config)
+        check_together(config, limits, stops=joint_ranges(bench.leg()))
         return 0

@@ -9,6 +9,7 @@ from tyro.conf import subcommand
 from legbench.cli.output import note, print_json, progress, report_error
 from legbench.cli.parse import parse
 from legbench.cli.table import print_summary
+from legbench.cli.waived import tell_waived_of
 from legbench.clock import WallClock
 from legbench.control import BangBangConfig, JumpConfig, PositionJumpConfig, SetpointMeaning
 from legbench.design import load_design
@@ -172,6 +173,7 @@ def main(arguments: list[str]) -> int:
     """
     chosen = parse(RunArguments, "run", arguments)
     experiment = experiment_of(chosen)
+    tell_waived_of(experiment.plant)
     watched = chosen.view or chosen.serve
     watching = Watching(serve=chosen.serve)
     paced = watched or chosen.real_time

@@ -4,7 +4,6 @@ The drive is configured as for a run and goes to operational, so that its own wa
 when this master falls silent; it is always led out by quick stop.
 """
 
-import math
 from dataclasses import dataclass
 from typing import final
 
@@ -26,6 +25,7 @@ from legbench.drives.master.bring_up import BringUp
 from legbench.drives.master.sdo_port import SdoPort
 from legbench.drives.master.sdo_stop import SdoStop, leave_operational
 from legbench.drives.master.stop_report import Lead
+from legbench.drives.master_watch import check_master_watch
 from legbench.drives.objects import name_of
 from legbench.drives.session import Session
 from legbench.errors import ConfigError
@@ -39,6 +39,8 @@ NEEDED = ((0x6065, 0), (0x6072, 0), (0x6085, 0))
 """Window, torque and ramp that a search is not made without, in the bus file."""
 FASTEST = 1.0
 """A search for a hard stop goes no faster (6099h:01) [rad/s]."""
+LONGEST = 600.0
+"""A search at the lowest sensible speed, 0.01 rad/s, has made a turn by then [s]."""
 PATIENCE = 200
 """Looks at a drive for one step."""
 LOOK_NS = 5_000_000
@@ -71,19 +73,26 @@ def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20
         timeout: [s]
 
     Raises:
-        ConfigError: no time at all, the bus file does not bound a search, or it is too fast.
+        ConfigError: no time at all or more than 10 minutes, the bus file does not bound a search,
+            it is too fast, or a drive would go on without its master.
         BusError: the channel has a master.
+        PlantFault: somebody else leads these drives; before the homing has begun, nothing has been
+            sent since it was heard.
         DriveError: another drive, a refused step, or homing failed.
         StopError: the drive keeps its power, or does not answer.
     """
-    if not 0.0 < timeout < math.inf:
-        raise ConfigError(f"timeout is {timeout:g} s; it must be positive")
+    if not 0.0 < timeout <= LONGEST:
+        raise ConfigError(f"timeout is {timeout:g} s; it must be positive, {LONGEST:g} s at most")
     if method not in IN_PLACE:
         _check_bounded(node)
+    # Led by SDO a drive gets no RPDO, whose deadline therefore never begins.
+    check_master_watch(session.config, speed=FASTEST, commands=False)
     session.hold()
     up = session.bring_up()
+    up.listen()
     up.identify()
     up.unpower()
+    up.glance()
     up.pre_operational()
     up.configure(node)
     sdo = up.sdo(node)
@@ -93,12 +102,14 @@ def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20
     _choose(sdo, node, method)
     master = _Master(session, up, node)
     session.leads(master)
+    up.glance()
     with master:
         master.start()
         master.enter_homing()
         master.enable()
         master.command(START_HOMING)
         master.await_end(timeout)
+    up.lookout.rest()
     sdo.put(0x6060, 0, I8, Mode.CYCLIC_SYNCHRONOUS_POSITION)
     after = sdo.get_int(0x6064, 0, I32)
     return Homed(node=node.name, method=method, before_counts=before, after_counts=after)

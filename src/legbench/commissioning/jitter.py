@@ -67,11 +67,11 @@ def measure(
         writer: takes a row a cycle, as in a run; none measures without recording.
 
     Raises:
-        DriveError: another master sends SYNC, whose punctuality is not ours.
+        PlantFault: another master leads the drives, whose punctuality is not ours.
         BusError, DriveError: as `Link.start`.
-        PlantFault: another master has begun to lead the drives.
         RecordingError: the recording failed.
     """
+    session.bring_up().listen()
     with session.link(SafetyLimits(), stiffness, read_only=True) as link:
         began_ns = link.start().time_ns
         if link.listening:

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from legbench.commissioning.status import read_counts
+from legbench.drives.checks import check_together
 from legbench.drives.limits import START_TOLERANCE, SafetyLimits
 from legbench.drives.session import Session
-from legbench.drives.stopping import check_stopping
 from legbench.errors import ConfigError
 
 FARTHEST = 0.3
@@ -45,7 +45,8 @@ def jog(
 
     Raises:
         ConfigError: no such node, too far or too fast for a jog, limits that leave something out,
-            ramps on which a motor runs on too far, or a motor that stands outside its range.
+            ramps on which a motor runs on too far, an object that cannot hold its range, a drive
+            that would go on without its master, or a motor that stands outside its range.
         BusError, DriveError, PlantFault: as `Link.start`, `Link.move_to`.
     """
     names = [node.name for node in session.config.nodes]
@@ -56,8 +57,10 @@ def jog(
     if not 0.0 < speed <= FASTEST:
         raise ConfigError(f"a jog at {speed:g} rad/s; it may be up to {FASTEST:g} rad/s")
     _check_limits(limits)
-    check_stopping(session.config, limits)
-    session.bring_up().identify()
+    check_together(session.config, limits)
+    up = session.bring_up()
+    up.listen()
+    up.identify()
     _check_range(session, limits, names.index(name), by)
     with session.link(limits, stiffness) as link:
         start = link.start().motor_pos

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import final
 
+from legbench.drives.upper_ends import LIMIT_ENDS, WIDEST_ANGLE, check_limit, check_waivers
 from legbench.errors import ConfigError, PlantFault
 
 Range = tuple[float, float]
@@ -44,10 +45,19 @@ class SafetyLimits:
     """Consecutive missed ticks that end the run."""
     lost_frames: int = 3
     """Consecutive cycles without a drive's process data that end the run."""
+    waive: tuple[str, ...] = ()
+    """Limits that may exceed their usual upper end, by name; every run says so."""
 
     def __post_init__(self) -> None:
         for name, ranges in (("motor", self.motor_range), ("joint", self.joint_range)):
+            if len(ranges) != 2:
+                raise ConfigError(f"{name}_range has {len(ranges)} pairs; a leg has 2 axes")
             for low, high in ranges:
+                if any(WIDEST_ANGLE < abs(end) < math.inf for end in (low, high)):
+                    raise ConfigError(
+                        f"{name}_range is [{low:g}, {high:g}] rad; no end lies beyond "
+                        f"{WIDEST_ANGLE:.2f} rad, one turn"
+                    )
                 if not low < high:
                     raise ConfigError(
                         f"{name}_range is [{low:g}, {high:g}] rad; low must be below high"
@@ -64,6 +74,8 @@ class SafetyLimits:
         ):
             if not value > 0:
                 raise ConfigError(f"{name} is {value:g} {unit}; it must be positive")
+            check_limit(name, value, self.waive)
+        check_waivers(self.waive, tuple(LIMIT_ENDS), "limits")
 
     def require_complete(self) -> None:
         """Refuse to lead real drives without the limits that nothing else stands in for.

@@ -35,6 +35,7 @@ from legbench.drives.master.start_up import StartUp
 from legbench.drives.master.stop import StopLadder
 from legbench.drives.master.stop_report import Lead, StopReport
 from legbench.drives.master.supervisor import Supervisor
+from legbench.drives.master_watch import check_master_watch
 from legbench.drives.open_bus import timebase_of
 from legbench.drives.timebase import Timebase
 from legbench.drives.wire import check_load
@@ -121,7 +122,7 @@ class Link(Lead):
         self._start_up = StartUp(self._port, self.cycle, config, read_only=read_only)
         self._last = Tick(0, 0, 0, 0, False)
         self._expected: list[tuple[float, ...]] = []
-        self._holds = self._closed = False
+        self._holds = self._closed = self._leads = False
         self._told: Listener | None = None
         self.listening = False
 
@@ -148,6 +149,7 @@ class Link(Lead):
         here.
 
         Raises:
+            ConfigError: a drive would go on for too long without its master.
             BusError: the channel has a master, or the interface does not work.
             DriveError: a drive is missing, is another one, or refuses its configuration; or, in
                 read-only, is not configured.
@@ -159,6 +161,7 @@ class Link(Lead):
             if self._read_only:
                 self._prepare_to_look()
             else:
+                check_master_watch(self._config, speed=self._limits.command_speed)
                 self._hold()
                 self._prepare_to_move()
             for node, poll in zip(self._config.nodes, self.cycle.polls, strict=True):
@@ -182,8 +185,10 @@ class Link(Lead):
             self._lock.release()
 
     def _prepare_to_move(self) -> None:
+        self.bring_up.listen()
         self.bring_up.identify()
         self.bring_up.unpower()
+        self.bring_up.glance()
         self.bring_up.pre_operational()
         for node in self._config.nodes:
             self.bring_up.configure(node)
@@ -202,8 +207,11 @@ class Link(Lead):
         now_ns = self._port.timebase.now_ns()
         self.listening = self.cycle.hears_sync(now_ns + LISTEN_NS)
         self._start_up.listening = self.listening
-        if not self.listening:
+        if self.listening:
+            self.bring_up.lookout.rest()
+        else:
             self._hold()
+            self.bring_up.listen()
         self.bring_up.identify()
         self.bring_up.refuse_differences()
         if self.listening:
@@ -234,6 +242,8 @@ class Link(Lead):
             raise DriveError(
                 f"a link that is {self.state.name.lower()} cannot start; make a new one"
             )
+        if not self._read_only and self.cycle.led_by_another():
+            self._supervisor.alone()  # It has come since `open`, and keeps the drives.
         self.state = LinkState.CYCLIC
         try:
             self._start_up.settle(self._settling_tick)
@@ -249,6 +259,7 @@ class Link(Lead):
 
     def _enable(self, *, clear_faults: bool) -> None:
         up = self._start_up
+        self._leads = True
         if clear_faults:
             words = "leave its fault, whose cause still stands"
             up.seek(Goal.FAULT_RESET, up.faulted(), self._watched_tick, words)
@@ -440,16 +451,16 @@ class Link(Lead):
 
         Raises no error; `stopped` tells how it has ended. No signal gets in between: a ^C that
         comes meanwhile is raised at the end. While the stop is not verified, calling it again
-        repeats it.
+        repeats it. Drives that another master took before this one led them are left to it.
         """
         if self.state not in (LinkState.CYCLIC, LinkState.RUNNING, LinkState.STOPPING):
             return
         with shielded() as shield:
             self.state = LinkState.STOPPING
-            if not self._read_only:
-                self._note(StopLadder(self.cycle, shield.hold).run())
-            else:
+            if self._read_only or (not self._leads and self._led_by_another(shield)):
                 self.state = LinkState.STOPPED
+            else:
+                self._note(StopLadder(self.cycle, shield.hold).run())
 
     def close(self) -> None:
         """Stop, leave the drives parked in pre-operational, release the channel; raises no error.
@@ -463,7 +474,7 @@ class Link(Lead):
             looked = self.listening or self.state is LinkState.CONFIGURED
             self.stop()
             led = self._led_by_another(shield)
-            if not (self._read_only and (looked or led)):
+            if not ((led and not self._leads) or (self._read_only and looked)):
                 order, nodes = self.bring_up.pre_operational, self._config.nodes
                 report = leave_operational(order, self._port, nodes, self.stopped, shield.hold)
                 if report is not None:
@@ -490,8 +501,9 @@ class Link(Lead):
             shield.hold(error)
 
     def _led_by_another(self, shield: Shield) -> bool:
+        """Whether another master has been heard; where that cannot be told, by what is known."""
         try:
             return self.cycle.led_by_another()
-        except BaseException as error:  # Whatever a driver raises, the bus is left alone then.
+        except BaseException as error:  # Whatever a driver raises, the stop goes on.
             shield.hold(error)
-            return True
+            return self._read_only or self.cycle.stranger is not None

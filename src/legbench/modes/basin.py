@@ -25,6 +25,7 @@ from legbench.errors import ConfigError
 from legbench.interrupts import ignore_interrupts
 from legbench.modes.drive import AbstractDrive, JumpLaw, Passive
 from legbench.modes.hop import NAMES, UNITS, Apex, Ending, return_map
+from legbench.reading import parse_json
 from legbench.signals import Floats, Ints
 
 Progress = Callable[[int, int], None]
@@ -176,7 +177,7 @@ def _read(path: Path, question: Question) -> dict[int, list[int]]:
     rows: dict[int, list[int]] = {}
     for line in lines[1:]:
         try:
-            entry = json.loads(line)
+            entry = parse_json(line)
             index, fates = int(entry["row"]), [int(fate) for fate in entry["fates"]]
         except (ValueError, KeyError, TypeError):
             continue

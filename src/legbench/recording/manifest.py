@@ -12,14 +12,12 @@ import numpy as np
 
 from legbench import __version__
 from legbench.errors import ConfigError, FormatError, RecordingError
-from legbench.recording.files import reason, write_whole
+from legbench.reading import LARGEST_JSON, UnreadableError, parse_json, read_file
+from legbench.recording.files import write_whole
 from legbench.recording.layout import FORMAT, RUN, RUNNING, UNITS
-from legbench.recording.regular import read_regular
 
 Manifest = dict[str, Any]
 
-LARGEST = 1 << 22
-"""Bytes of a `run.json`; a usual one has 5000."""
 TABLES = ("design", "setup", "linkage", "ground", "controller", "conventions", "versions", "units")
 """Entries that are tables, where a manifest has them."""
 OWN_KEYS = ("format", "legbench", "id", "created", "status", "cause", "units", "rows", "duration")
@@ -80,19 +78,19 @@ def read_manifest(run: Path) -> Manifest | None:
     """
     path = run / RUN
     try:
-        content = read_regular(path, LARGEST)
+        content = read_file(path, LARGEST_JSON)
     except FileNotFoundError:
         return None
-    except OSError as error:
-        raise RecordingError(f"{path} cannot be read: {reason(error)}") from error
+    except UnreadableError as error:
+        raise RecordingError(f"{path}: {error}") from error
     return parse_manifest(content, source=str(path))
 
 
 def parse_manifest(content: bytes, *, source: str) -> Manifest:
     """Return the manifest in `content`; raises as `read_manifest`."""
     try:
-        manifest = json.loads(content)
-    except (ValueError, RecursionError) as error:
+        manifest = parse_json(content)
+    except UnreadableError as error:
         raise RecordingError(
             f"{source} is damaged: {error}; move it away and the copy in the samples is used"
         ) from error

@@ -15,6 +15,7 @@ from legbench.drives.config import BusConfig, Identity, NodeConfig, Parameter
 from legbench.drives.configuration import configuration
 from legbench.drives.errors import BusError, DriveError, SdoAbortError
 from legbench.drives.master.first_contact import first_contact
+from legbench.drives.master.lookout import Lookout
 from legbench.drives.master.parking import is_parked
 from legbench.drives.master.port import Port
 from legbench.drives.master.sdo_port import SdoPort
@@ -42,17 +43,46 @@ class BringUp:
     """Talks to the drives by SDO, before and between cyclic operation."""
 
     def __init__(self, port: Port, bus: BusConfig, on_other: Callable[[can.Message], None]) -> None:
-        self._port, self._bus = port, bus
+        self._port, self._bus, self._on_other = port, bus, on_other
+        self.lookout = Lookout(port, bus)
         self._sdo = {
             node.node_id: SdoPort(
                 port,
                 node.node_id,
                 timeout_ms=bus.sdo_timeout_ms,
                 retries=bus.sdo_retries,
-                on_other=on_other,
+                on_other=self._hear,
+                before_write=self.glance,
             )
             for node in bus.nodes
         }
+
+    def listen(self) -> None:
+        """Listen before anything but questions is sent, then ask the drives whom they watch.
+
+        From here until `lookout.rest` another master ends the bring-up with the next frame that is
+        heard of it, before the next object is written.
+
+        Raises:
+            PlantFault: somebody else leads these drives, or asks them.
+            BusError: the bus has failed, or nobody can be talked to.
+        """
+        with self.contact():
+            self.lookout.listen()
+            if not self.lookout.beats:
+                return
+            for node in self._bus.nodes:
+                if node.heartbeat_consumer:
+                    self.lookout.watched(node, self.sdo(node).get_int(0x1016, 1, U32))
+
+    def glance(self) -> None:
+        """Hear what has come by now; raises PlantFault if another master has spoken."""
+        for message in self.lookout.glance():
+            self._on_other(message)
+
+    def _hear(self, message: can.Message) -> None:
+        self._on_other(message)
+        self.lookout.hear(message)
 
     def sdo(self, node: NodeConfig) -> SdoPort:
         """Access to the objects of a node."""
@@ -269,7 +299,7 @@ class BringUp:
             )
 
     def temperature(self, node: NodeConfig) -> int | None:
-        """What the drive's sensor shows [0.1 deg C]; none where the bus file names no object."""
+        """What the drive's sensor shows [counts]; none where the bus file names no object."""
         entry = node.temperature_object
         return None if entry is None else self.sdo(node).get_int(entry.index, entry.sub, entry.kind)
 
