@@ -6,6 +6,7 @@ import json
 import shutil
 import signal
 import sys
+import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -177,11 +178,15 @@ class Witness:
     targets: dict[int, bytes] = field(default_factory=dict)
     moved: Counter[int] = field(default_factory=Counter)
     faults: list[str] = field(default_factory=list)
+    led: bool = False
+    over: bool = False
+    """The drives had their power before the interruption, and none any more."""
 
     def strike(self) -> None:
         """The interruption comes now."""
         if self.network is not None:
             self.at_ns = self.network.now_ns
+            self.over = self.led and not any(self.powered)
             self.angles = tuple(drive.axis.motion.angle for drive in self.network.drives)
 
     def sent(self, message: can.Message) -> None:
@@ -212,6 +217,7 @@ class Witness:
             if any(powered) and since_ns > WITHIN_NS:
                 self.faults.append("power after 50 ms")
         self.powered = powered
+        self.led = self.led or any(powered)
 
     def conclude(self, *, row: bool) -> None:
         """The command has ended; `row` tells that a row may have been finished first."""
@@ -268,7 +274,13 @@ class Theatre:
         before = {number: signal.getsignal(number) for number in STOP_SIGNALS}
         error = io.StringIO()
         status: int | None = None
-        with self._patched(command, witness, injector), contextlib.redirect_stderr(error):
+        with (
+            self._patched(command, witness, injector),
+            contextlib.redirect_stderr(error),
+            warnings.catch_warnings(),
+        ):
+            # A file that was opened, and interrupted before its `with` began.
+            warnings.simplefilter("ignore", ResourceWarning)
             for number in STOP_SIGNALS:
                 # Outside of a command that handles them, all three raise KeyboardInterrupt.
                 signal.signal(number, signal.default_int_handler)
@@ -284,6 +296,8 @@ class Theatre:
                 now = [signal.getsignal(number) for number in STOP_SIGNALS]
                 for number, handler in before.items():
                     signal.signal(number, handler)
+        if witness.over and injector.phase == "start-up":
+            injector.phase = "stop"
         if injector.struck:
             row = command == "run" and injector.phase == "run"
             witness.conclude(row=row)

@@ -177,9 +177,10 @@ class RunWriter:
         fault = _fault_in(error)
         if fault is not None:
             self.close(FAULT, fault.cause)
-        elif isinstance(error, KeyboardInterrupt):
+        elif isinstance(error, KeyboardInterrupt | GeneratorExit):
+            # The second where a generator that writes a run is given up for an interruption.
             error.add_note(f"{self.path} holds {self.rows} rows")
-            self.close(INTERRUPTED, "KeyboardInterrupt")
+            self.close(INTERRUPTED, type(error).__name__)
         else:
             self.close(FAULT, type(error).__name__)
 
