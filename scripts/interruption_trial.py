@@ -22,7 +22,8 @@ from legbench import plants
 from legbench.cli import drives, main, run
 from legbench.cli.drives import DrivesArguments
 from legbench.cli.drives_moving import Configure, Home, Jog, Zero
-from legbench.cli.drives_reading import Bench, Jitter
+from legbench.cli.drives_reading import Bench
+from legbench.cli.drives_timing import Jitter
 from legbench.cli.run import RunArguments
 from legbench.control import BangBangConfig
 from legbench.drives.bus import LockstepBus

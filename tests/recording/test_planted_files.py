@@ -61,9 +61,7 @@ def test_a_file_that_is_too_large_is_not_read(
 def test_json_that_is_too_deep_is_damage(tmp_path: Path) -> None:
     deep = "[" * 100_000
     (tmp_path / "run.json").write_text(deep)
-    with pytest.raises(
-        RecordingError, match="tables or lists lie deeper than 32"
-    ):
+    with pytest.raises(RecordingError, match="tables or lists lie deeper than 32"):
         read_manifest(tmp_path)
     (tmp_path / "events.jsonl").write_text(json.dumps({"name": "end"}) + "\n" + deep + "\n")
     assert read_events(tmp_path) == ([{"name": "end"}], 1)

@@ -479,7 +479,7 @@ class Link(Lead):
                 report = leave_operational(order, self._port, nodes, self.stopped, shield.hold)
                 if report is not None:
                     self._note(report)
-            if not (self._read_only or led or self.state is LinkState.STOPPING):
+            if not (self._read_only or led):
                 self._park(shield)
             self._let_go()
             self._closed = True
@@ -495,7 +495,8 @@ class Link(Lead):
     def _park(self, shield: Shield) -> None:
         """Switch the drives' command frames off, so that no recorded log moves them."""
         try:
-            self.not_parked = park(self._port, self._config, self.cycle.other)
+            powered = () if self.stopped is None else self.stopped.powered
+            self.not_parked = park(self._port, self._config, self.cycle.other, powered)
         except BaseException as error:  # Whatever a driver raises, the channel is still released.
             self.not_parked = [f"the drives are not parked: {error!r}"]
             shield.hold(error)

@@ -5,7 +5,7 @@ configuration obeys all of them. One whose command frames are switched off does 
 or not, until it is configured again or has been without its logic supply.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
 import can
 
@@ -47,20 +47,29 @@ def is_parked(node: NodeConfig, parameter: Parameter, there: int) -> bool:
     )
 
 
-def park(port: Port, bus: BusConfig, on_other: Callable[[can.Message], None]) -> list[str]:
+def park(
+    port: Port,
+    bus: BusConfig,
+    on_other: Callable[[can.Message], None],
+    powered: Collection[str] = (),
+) -> list[str]:
     """Park all drives, reading every object back; what went wrong, one line a drive.
 
-    The drives are without power by now: no stop waits for this, nothing is tried twice, and
-    nothing is raised.
+    No stop waits for this, nothing is tried twice, and nothing is raised. A drive that has kept its
+    power is left out: the deadline of its command frames may be what stops it.
 
     Args:
         port: of the bus.
         bus: whose drives.
         on_other: gets the frames that are no answers.
+        powered: names of drives that have kept their power.
     """
     failed: list[str] = []
     for node in bus.nodes:
         who = f"drive '{node.name}' (node {node.node_id})"
+        if node.name in powered:
+            failed.append(f"{who} is not parked, because it has kept its power")
+            continue
         sdo = SdoPort(
             port, node.node_id, timeout_ms=bus.sdo_timeout_ms, retries=1, on_other=on_other
         )
