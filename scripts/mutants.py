@@ -341,12 +341,12 @@ def main() -> int:
         importlib.import_module(name)
     files = _files(chosen.files)
     sources = _digest(PACKAGE.rglob("*.py"))
-    suites = {file: None for path in files for file in _tests_of(path)}
-    traced = {file: _trace(file, sources) for file in suites}
+    suites = {path: _tests_of(path) for path in files}
+    traced = {file: _trace(file, sources) for suite in suites.values() for file in suite}
     short = False
     with ProcessPoolExecutor(chosen.jobs, get_context("fork")) as pool:
         for path in files:
-            tests = [test for file in _tests_of(path) for test in traced[file]]
+            tests = [test for file in suites[path] for test in traced[file]]
             faults = _faults(path, tests, chosen.seed, chosen.per_file)
             noticed = list(pool.map(_noticed, faults))
             bound = STRICT_BOUND if path.name in STRICT else BOUND

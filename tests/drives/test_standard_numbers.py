@@ -391,8 +391,39 @@ def test_an_emergency_has_eight_bytes_code_register_vendor() -> None:
     assert emcy.emcy_frame(told) == frame.Frame(0x085, bytes.fromhex("118621") + b"abcde")
     for length in (7, 9):
         assert emcy.decode_emcy(5, bytes(length)) is None
-    meanings = {0xFEFF: "error", 0xFF00: "vendor error", 0xFF10: "set points missing"}
-    for code, words in meanings.items():
+    bare = emcy.Emergency(node_id=127, code=0x1000, register=1)
+    assert emcy.emcy_frame(bare) == frame.Frame(0x0FF, bytes.fromhex("0010010000000000"))
+
+
+EMERGENCIES = {
+    # CiA 301, table 26; CiA 402-2, 603Fh; FFxxh are the emulated drive's own.
+    0x0000: "error reset",
+    0x1000: "generic error",
+    0x2310: "over-current",
+    0x3210: "over-voltage",
+    0x3220: "under-voltage",
+    0x4310: "drive over-temperature",
+    0x5441: "safe torque off",
+    0x6320: "parameter error",
+    0x7305: "encoder",
+    0x8110: "CAN overrun",
+    0x8120: "CAN error passive",
+    0x8130: "heartbeat lost",
+    0x8140: "recovered from bus-off",
+    0x8210: "PDO too short",
+    0x8220: "PDO too long",
+    0x8240: "SYNC of unexpected length",
+    0x8250: "RPDO timeout",
+    0x8611: "following error",
+    0x8612: "reference limit",
+    0xFF10: "set points missing",
+    0xFF11: "SYNC missing",
+}
+
+
+def test_every_error_code_has_its_words_and_others_are_told_apart_by_their_maker() -> None:
+    for code in range(1 << 16):
+        words = EMERGENCIES.get(code, "vendor error" if code >= 0xFF00 else "error")
         assert emcy.Emergency(node_id=5, code=code, register=0).meaning == words
 
 
