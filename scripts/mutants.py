@@ -76,8 +76,8 @@ class Passed:
 
     name: str
     seconds: float
-    entered: frozenset[tuple[str, int]]
-    """Functions of the package that it entered: module and first line."""
+    entered: frozenset[tuple[str, str]]
+    """Functions of the package that it entered: module and qualified name."""
 
 
 class _Planted(importlib.abc.MetaPathFinder, importlib.abc.Loader):
@@ -141,12 +141,12 @@ class _Trace:
             self.passed.append(test)
 
 
-def _place(code: CodeType) -> tuple[str, int] | None:
-    """Module and first line of a function of the package."""
+def _place(code: CodeType) -> tuple[str, str] | None:
+    """Module and qualified name of a function of the package."""
     path = Path(code.co_filename)
     if not path.is_relative_to(PACKAGE):
         return None
-    return (path.relative_to(PACKAGE).as_posix(), code.co_firstlineno)
+    return (path.relative_to(PACKAGE).as_posix(), code.co_qualname)
 
 
 def _child(work: Callable[[Path], int], seconds: float) -> int | None:
@@ -202,10 +202,10 @@ def _digest(paths: Iterable[Path]) -> str:
     return total.hexdigest()[:32]
 
 
-def _trace(file: Path, sources: str) -> list[Passed]:
-    """The passing tests of a file and what they enter; remembered until a text changes."""
+def _trace(file: Path) -> list[Passed]:
+    """The passing tests of a file and what they enter; remembered until a test changes."""
     helpers = [path for path in file.parent.glob("*.py") if not path.name.startswith("test_")]
-    kept = CACHE / f"{file.stem}-{sources}-{_digest([file, *helpers])}.json"
+    kept = CACHE / f"{file.stem}-{_digest([file, *helpers])}.json"
     if not kept.exists():
 
         def work(folder: Path) -> int:
@@ -223,7 +223,7 @@ def _trace(file: Path, sources: str) -> list[Passed]:
         Passed(
             name=test["name"],
             seconds=test["seconds"],
-            entered=frozenset((module, line) for module, line in test["entered"]),
+            entered=frozenset((module, name) for module, name in test["entered"]),
         )
         for test in json.loads(kept.read_text())
     ]
@@ -231,8 +231,7 @@ def _trace(file: Path, sources: str) -> list[Passed]:
 
 def _chosen(tests: Sequence[Passed], module: str, mutation: Mutation) -> list[Passed]:
     """Those of the tests that a fault may reach, fastest first, as many as the budget allows."""
-    at_import = mutation.function_line is None
-    reached = [t for t in tests if at_import or (module, mutation.function_line) in t.entered]
+    reached = [t for t in tests if mutation.at_import or (module, mutation.scope) in t.entered]
     reached.sort(key=lambda test: test.seconds)
     spent = itertools.accumulate(test.seconds for test in reached)
     return [test for test, so_far in zip(reached, spent, strict=True) if so_far <= BUDGET]
@@ -340,11 +339,11 @@ def main() -> int:
     for name in HEAVY:
         importlib.import_module(name)
     files = _files(chosen.files)
-    sources = _digest(PACKAGE.rglob("*.py"))
     suites = {path: _tests_of(path) for path in files}
-    traced = {file: _trace(file, sources) for suite in suites.values() for file in suite}
+    needed = sorted({file for suite in suites.values() for file in suite})
     short = False
     with ProcessPoolExecutor(chosen.jobs, get_context("fork")) as pool:
+        traced = dict(zip(needed, pool.map(_trace, needed), strict=True))
         for path in files:
             tests = [test for file in suites[path] for test in traced[file]]
             faults = _faults(path, tests, chosen.seed, chosen.per_file)

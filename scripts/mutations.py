@@ -52,8 +52,8 @@ class Mutation:
     text: str
     scope: str
     """Qualified name of the innermost function or class; empty at module level."""
-    function_line: int | None
-    """First line of the innermost function, decorators included; none at import time."""
+    at_import: bool
+    """Whether it runs when the module is imported, not when a function is called."""
 
     def apply(self, source: str) -> str:
         """The changed source."""
@@ -78,8 +78,8 @@ class _Finder:
         lengths = [len(line) for line in source.splitlines(keepends=True)]
         self._starts = [sum(lengths[:number]) for number in range(len(lengths))]
         self._lines = source.splitlines(keepends=True)
-        self._scope: tuple[str, ...] = ()
-        self._function: int | None = None
+        self._scope = ""
+        self._at_import = True
 
     def _at(self, line: int, column: int) -> int:
         """Offset of a place, whose column counts bytes of UTF-8."""
@@ -98,8 +98,8 @@ class _Finder:
             start=start,
             end=end,
             text=text,
-            scope=".".join(self._scope),
-            function_line=self._function,
+            scope=self._scope,
+            at_import=self._at_import,
         )
 
     def _replace(self, node: ast.expr | ast.stmt, text: str) -> Mutation:
@@ -117,11 +117,11 @@ class _Finder:
         """All edits in a node and below it."""
         if isinstance(node, ast.JoinedStr | ast.Raise | ast.Assert | ast.Import | ast.ImportFrom):
             return
-        scope, function = self._scope, self._function
+        scope, at_import = self._scope, self._at_import
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
-            self._scope = (*scope, node.name)
-            if isinstance(node, ast.FunctionDef):
-                self._function = min([node.lineno, *(d.lineno for d in node.decorator_list)])
+            inside = "" if not scope else "." if at_import else ".<locals>."
+            self._scope = f"{scope}{inside}{node.name}"
+            self._at_import = at_import and isinstance(node, ast.ClassDef)
         yield from self._own(node)
         for name, value in ast.iter_fields(node):
             if name in ("annotation", "returns", "decorator_list", "args", "bases") and isinstance(
@@ -132,15 +132,15 @@ class _Finder:
             for child in value if isinstance(value, list) else [value]:
                 if isinstance(child, ast.AST):
                     yield from self.walk(child)
-        self._scope, self._function = scope, function
+        self._scope, self._at_import = scope, at_import
 
     def _defaults(self, value: object) -> Iterator[Mutation]:
         if isinstance(value, ast.arguments):
-            inner, self._function = self._function, None
+            inner, self._at_import = self._at_import, True
             for default in (*value.defaults, *value.kw_defaults):
                 if default is not None:
                     yield from self.walk(default)
-            self._function = inner
+            self._at_import = inner
 
     def _own(self, node: ast.AST) -> Iterator[Mutation]:
         match node:
