@@ -1,5 +1,6 @@
 """The CiA 402 half of an emulated drive: controlword, modes, motion, statusword; pure."""
 
+from collections import deque
 from typing import final
 
 from legbench.drives.cia402 import DriveState, Mode, StatusBit
@@ -40,6 +41,8 @@ class Axis:
         self._torque = 0
         self._mode_due_ns: int | None = None
         self._waiting_word: int | None = None
+        self._now_ns = 0
+        self._late_words: deque[tuple[int, int]] = deque()
         self._out: list[Frame] = []
         self.publish()
 
@@ -49,6 +52,7 @@ class Axis:
         self.power.stopping = None
         self.alarms = Alarms(self._node.node_id, self._values)
         self._waiting_word = self._mode_due_ns = None
+        self._late_words.clear()
         self.motion.hold(0)
 
     def take(self) -> list[Frame]:
@@ -79,11 +83,12 @@ class Axis:
 
     def _command(self, controlword: int, now_ns: int) -> None:
         was_enabled = self.power.state is _ENABLED
-        if self.power.command(controlword, cause_gone=not self.alarms.standing):
+        obeyed = controlword not in self._behaviour.ignores
+        if obeyed and self.power.command(controlword, cause_gone=not self.alarms.standing):
             self._say(self.alarms.reset())
         if self.power.state is _ENABLED and not was_enabled:
             self.motion.hold(now_ns)
-        if self.power.state is _ENABLED and self._values[0x6061, 0] == Mode.HOMING:
+        if obeyed and self.power.state is _ENABLED and self._values[0x6061, 0] == Mode.HOMING:
             self._homing.command(controlword)
         self._status()
 
@@ -110,6 +115,7 @@ class Axis:
 
     def tick(self, now_ns: int, step_ns: int) -> float:
         """Move for `step_ns` until now; true motor position [rad]."""
+        self._now_ns = now_ns
         if self._waiting_word is not None:
             word, self._waiting_word = self._waiting_word, None
             self._command(word, now_ns)
@@ -182,7 +188,18 @@ class Axis:
                 HomingState.FAILED: StatusBit.TARGET_REACHED | StatusBit.FOLLOWING_ERROR,
                 HomingState.IDLE: StatusBit.TARGET_REACHED,
             }.get(self._homing.state, 0)
-        self._values[0x6041, 0] = int(word)
+        self._show(int(word))
+
+    def _show(self, word: int) -> None:
+        """Publish a statusword, once its time has come."""
+        lag_ns = 1000 * self._behaviour.status_lag_us
+        if lag_ns:
+            late = self._late_words
+            late.append((self._now_ns + lag_ns, word))
+            while late and late[0][0] <= self._now_ns:
+                self._values[0x6041, 0] = late.popleft()[1]
+        else:
+            self._values[0x6041, 0] = word
 
     def _say(self, frame: Frame | None) -> None:
         if frame is not None:
