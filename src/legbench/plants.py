@@ -1,5 +1,6 @@
 """Which plant a run is made on, and what has to be opened and told for it: the one place."""
 
+import math
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar, final
@@ -34,6 +35,10 @@ from legbench.servo import ServoConfig
 
 EMULATED = "legbench"
 """Interface of the emulated leg in this process, in virtual time."""
+KNEE_WIND = 0.1
+"""Motors may ask for so much beyond a knee stop, which loads each spring by half of it [rad]."""
+SINGULAR_SHARE = 0.2
+"""Of the way from a singular pose of the bars to the knee stop, links keep this share [-]."""
 LIMITS_NAME = "limits.toml"
 """Beside the bus file, unless another file is chosen."""
 BUS_LOG = "bus.log"
@@ -173,14 +178,18 @@ def limits_for(path: Path, design: LegDesign) -> SafetyLimits:
         ConfigError: the file makes no sense, or is looser than the design.
     """
     limits, joint = load_limits(path), joint_ranges(design)
+    motor_knee, joint_knee = knee_ranges(design)
     open_range = (UNLIMITED, UNLIMITED)
-    limits = replace(
-        limits,
-        motor_range=joint if limits.motor_range == open_range else limits.motor_range,
-        joint_range=joint if limits.joint_range == open_range else limits.joint_range,
-    )
+    own_motor, own_joint = limits.motor_knee_range, limits.joint_knee_range
     try:
-        limits.check_within(motor=joint, joint=joint)
+        limits = replace(
+            limits,
+            motor_range=joint if limits.motor_range == open_range else limits.motor_range,
+            joint_range=joint if limits.joint_range == open_range else limits.joint_range,
+            motor_knee_range=motor_knee if own_motor == UNLIMITED else own_motor,
+            joint_knee_range=joint_knee if own_joint == UNLIMITED else own_joint,
+        )
+        limits.check_within(motor=joint, joint=joint, motor_knee=motor_knee, joint_knee=joint_knee)
     except ConfigError as error:
         raise ConfigError(f"{path}: {error}") from None
     return limits
@@ -190,6 +199,18 @@ def joint_ranges(design: LegDesign) -> tuple[Range, Range]:
     """What the stops of a design leave to q1 and q2, and so to the motors [rad]."""
     hip, knee = design.limits.hip, design.limits.knee
     return hip, (hip[0] + knee[0], hip[1] + knee[1])
+
+
+def knee_ranges(design: LegDesign) -> tuple[Range, Range]:
+    """Return what the knee stops of a design leave to q2 - q1 of the motors and of the links [rad].
+
+    Motors may wind the springs against a stop by a little, as a push does that straightens the
+    leg. The stops give way: a jump of the optimal leg goes 0.18 rad into them. Links must stay
+    away from the singular poses 0 and pi by a share of what lies between these and the stops.
+    """
+    low, high = design.limits.knee
+    links = (SINGULAR_SHARE * low, math.pi - SINGULAR_SHARE * (math.pi - high))
+    return (low - KNEE_WIND, high + KNEE_WIND), links
 
 
 def _alone(

@@ -4,7 +4,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from legbench.drives.limits import Guard, SafetyLimits
+from legbench.drives.guard import Guard
+from legbench.drives.limits import SafetyLimits
 from legbench.errors import ConfigError, PlantFault
 
 PERIOD = 1e-3
@@ -17,6 +18,9 @@ LIMITS = SafetyLimits(
     spring_torque=8.0,
     following_error=0.1,
     following_cycles=3,
+    joint_speed=100.0,
+    standing=0.05,
+    sway=0.1,
     temperature=80.0,
 )
 ANYTHING = st.floats(allow_nan=True, allow_infinity=True)

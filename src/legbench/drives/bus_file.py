@@ -67,7 +67,11 @@ def limits_from_mapping(content: Mapping[str, Any]) -> SafetyLimits:
     for name in ("motor_range", "joint_range"):
         if name in given:
             given[name] = tuple(_range(name, pair) for pair in _list(name, given[name]))
-    return _build(SafetyLimits, "limits", given, converted=("motor_range", "joint_range"))
+    for name in ("motor_knee_range", "joint_knee_range"):
+        if name in given:
+            given[name] = _range(name, given[name])
+    ranges = ("motor_range", "joint_range", "motor_knee_range", "joint_knee_range")
+    return _build(SafetyLimits, "limits", given, converted=ranges)
 
 
 def bus_from_mapping(content: Mapping[str, Any]) -> BusConfig:

@@ -23,7 +23,8 @@ from legbench.drives.cia402 import Goal
 from legbench.drives.codec.nmt import NmtState
 from legbench.drives.config import BusConfig, check_start_speed
 from legbench.drives.errors import BusError, DriveError
-from legbench.drives.limits import Guard, SafetyLimits
+from legbench.drives.guard import Guard
+from legbench.drives.limits import SafetyLimits
 from legbench.drives.master.bring_up import BringUp
 from legbench.drives.master.cycle import Cycle, Tick
 from legbench.drives.master.lock import ChannelLock
@@ -34,6 +35,7 @@ from legbench.drives.master.start_up import StartUp
 from legbench.drives.master.stop import StopLadder
 from legbench.drives.master.supervisor import Supervisor
 from legbench.drives.open_bus import timebase_of
+from legbench.drives.shortfall import Shortfall
 from legbench.drives.timebase import Timebase
 from legbench.drives.wire import check_load
 from legbench.errors import PlantFault
@@ -299,6 +301,11 @@ class Link(Closing):
             raise
         return applied
 
+    @property
+    def shortfall(self) -> Shortfall:
+        """Which wishes were let through otherwise than wished."""
+        return self._guard.shortfall
+
     def move_to(self, motor_pos: Sequence[float], speed: float | None = None) -> Sample:
         """Go to a posture at a speed [rad/s], `start_speed` of the bus file by default.
 
@@ -368,6 +375,8 @@ class Link(Closing):
             spring_torque=sample.spring_torque,
             expected_pos=self._expected[0] if self._expected else None,
             temperature=sample.temperature,
+            fresh=sample.fresh,
+            elapsed=1 + sample.skipped,
         )
 
     def _end(self, error: PlantFault) -> None:

@@ -6,7 +6,9 @@ from typing import final
 
 import numpy as np
 
-from legbench.drives.limits import Guard, SafetyLimits
+from legbench.drives.guard import Guard
+from legbench.drives.limits import SafetyLimits
+from legbench.drives.shortfall import Shortfall
 from legbench.plant.abstract import AbstractPlant
 from legbench.signals import Command, Observation
 
@@ -52,6 +54,11 @@ class LimitedPlant(AbstractPlant):
             expected_pos=self._expected.popleft(),
         )
         return seen
+
+    @property
+    def shortfall(self) -> Shortfall:
+        """Which commands were let through otherwise than wished."""
+        return self._guard.shortfall
 
     def close(self) -> None:
         """Close the plant within."""
