@@ -20,6 +20,7 @@ from legbench.drives.link import Link
 from legbench.drives.master.lock import ChannelLock
 from legbench.drives.open_bus import adapter_of, open_bus
 from legbench.drives.session import Session
+from legbench.drives.shortfall import Shortfall
 from legbench.drives.stopping import check_stopping
 from legbench.drives.wire import check_load
 from legbench.errors import ConfigError, LegbenchError
@@ -122,6 +123,8 @@ class OpenPlant:
     """What a run has to say of it."""
     session: Session | None = None
     link: Link | None = None
+    shortfall: Shortfall | None = None
+    """Which commands its limits changed; None without limits."""
 
     def start_log(self, run: Path) -> None:
         """Record raw frames into a run folder from now on, if there are any."""
@@ -135,10 +138,16 @@ class OpenPlant:
 
     def events(self) -> dict[str, dict[str, Any]]:
         """What a run on it has to tell in the end, by name."""
+        told = {} if self.shortfall is None else self.shortfall.told()
+        limited = {"limited": told} if told else {}
         if self.link is None:
-            return {}
-        cycle = self.link.cycle
+            return limited
+        cycle, log = self.link.cycle, None if self.session is None else self.session.log
+        torn = None if log is None else log.error
         return {
+            **limited,
+            **({} if torn is None else {"bus log not written": {"error": torn}}),
+            **cycle.notices.events,
             "bus": {
                 "skipped_cycles": self.link.skipped_total,
                 "silent_cycles": cycle.silent_total,
@@ -148,7 +157,7 @@ class OpenPlant:
                 "emergencies": [str(text) for watch in cycle.watches for text in watch.history],
                 "state": self.link.state.name.lower(),
                 "began": self.began,
-            }
+            },
         }
 
 
@@ -217,12 +226,33 @@ def _alone(
     choice: SimChoice | AnalyticChoice, leg: Leg, plant: AbstractPlant, told: dict[str, Any]
 ) -> OpenPlant:
     """A plant that is nothing but computed, in virtual time."""
-    manifest = {"plant": choice.kind, **told}
+    manifest, shortfall = {"plant": choice.kind, **told}, None
     if choice.limits is not None:
         limits = limits_for(choice.limits, leg.design)
+        _check_servo(leg.servo, limits)
         plant = LimitedPlant(plant, limits, delay_cycles=leg.servo.delay_cycles)
-        manifest["limits"] = asdict(limits)
-    return OpenPlant(plant=plant, clock=VirtualClock(), manifest=manifest)
+        manifest["limits"], shortfall = asdict(limits), plant.shortfall
+    return OpenPlant(plant=plant, clock=VirtualClock(), manifest=manifest, shortfall=shortfall)
+
+
+def _check_servo(servo: ServoConfig, limits: SafetyLimits) -> None:
+    """Refuse a simulated servo that the limits would take for a jammed motor.
+
+    Raises:
+        ConfigError: it is slower than they take for healthy.
+    """
+    if math.isinf(limits.following_error):
+        return
+    if servo.bandwidth is not None and servo.bandwidth < limits.servo_bandwidth:
+        raise ConfigError(
+            f"servo bandwidth is {servo.bandwidth:g} Hz, the limits take {limits.servo_bandwidth:g}"
+            " Hz for the slowest healthy one: lower servo_bandwidth in the limits file"
+        )
+    if servo.slew_rate is not None and servo.slew_rate < limits.command_speed:
+        raise ConfigError(
+            f"servo slew_rate is {servo.slew_rate:g} rad/s, the limits let commands through at "
+            f"{limits.command_speed:g} rad/s: lower command_speed in the limits file"
+        )
 
 
 def _open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
@@ -267,7 +297,12 @@ def _open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
         "realtime": None if granted is None else asdict(granted),
     }
     return OpenPlant(
-        plant=plant, clock=CanClock(plant), manifest=manifest, session=session, link=link
+        plant=plant,
+        clock=CanClock(plant),
+        manifest=manifest,
+        session=session,
+        link=link,
+        shortfall=link.shortfall,
     )
 
 

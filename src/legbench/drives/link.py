@@ -263,6 +263,7 @@ class Link(Closing):
                 return self._sample()
             self._watched_tick()
             self._supervisor.states()
+            self.cycle.notices.statuswords(self.cycle.axes, self._last.time_ns)
             sample = self._sample()
             self._check(sample)
         except PlantFault as error:
