@@ -214,7 +214,7 @@ class Guard:
                 zip(self._motors, motor_pos, expected_pos, strict=True), start=1
             )
         ]
-        doubts.append(self._links.see(motor_pos, joint_pos, fresh, elapsed))
+        doubts.append(self._links.see(motor_pos, joint_pos, expected_pos, fresh, elapsed))
         for doubt in doubts:
             if doubt is not None:
                 raise PlantFault(doubt.cause, doubt.message)

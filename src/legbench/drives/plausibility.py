@@ -18,8 +18,14 @@ SWAY_CYCLES = 4
 """So long the sway lasts before it counts; process data that come late repeat for up to three."""
 MEMORY = 1.0
 """Time constant in which the sway's reference follows what lasts, such as an offset [s]."""
-SWAY_GAIN = 3.0
-"""Sway that a motion of the motors along the polar mode may cause, relative to that motion [-]."""
+SWAY_DELAY = 0.25
+"""A sway this old is what the leg does; a younger one may be a fault's [s]."""
+SWAY_MEMORY = 5.0
+"""Time constant in which a sway is forgotten: a dozen hops, each of which may swing it on [s]."""
+SWAY_GROWTH = 2.0
+"""A leg that sways may sway so much more, relative to what it did [-]."""
+POLAR_GAIN = 10.0
+"""What a command along the polar mode may cause there, relative to it, in resonance [-]."""
 
 
 class Doubt(NamedTuple):
@@ -94,17 +100,20 @@ class MotorWatch:
 class LinkWatch:
     """Compares both link encoders with each other and with the motors.
 
-    Three things do not happen to a leg whose encoders live: a link faster than `joint_speed`; a
-    link that stands while the leg swings, since the links are coupled by their masses; and springs
-    that sway along the polar mode, q1 + q2, though nobody moves the motors along it. The reference
-    of the sway follows what lasts, and its bound widens with the motors' own motion along that
-    mode: a leg that is led along it is not watched for sway.
+    A link faster than `joint_speed` is none. On the radial mode, q1 = -q2, along which all
+    controllers lead the leg, two more things do not happen: one link stands while the other one
+    swings; and the springs sway along the polar mode, q1 + q2. Both bounds widen with the sway of
+    the seconds before, since a hop in place sways more from hop to hop, and with what is commanded
+    along the polar mode, such as a jog of one motor: a leg that is led along it is not watched in
+    this way. The references follow what lasts, such as an offset or the weight.
     """
 
     def __init__(self, bounds: Bounds) -> None:
         self._bounds = bounds
         self._step_max = bounds.joint_speed * bounds.period
         self._forget = bounds.period / MEMORY
+        self._fade = 1.0 - bounds.period / SWAY_MEMORY
+        self._delay = round(SWAY_DELAY / bounds.period)
         self._watches_standing = math.isfinite(bounds.standing)
         self._restart()
 
@@ -112,7 +121,8 @@ class LinkWatch:
         self._last: list[float] = []
         self._silent = [0, 0]
         self._sway_age = 0
-        self._sway_rest = self._motor_rest = self._motor_peak = 0.0
+        self._sway_rest = self._led_rest = self._led = self._swayed = 0.0
+        self._young = deque[float]()
         self._links = (_window(), _window())
         self._springs = (_window(), _window())
 
@@ -124,6 +134,7 @@ class LinkWatch:
         self,
         motor_pos: Sequence[float],
         joint_pos: Sequence[float],
+        commands: Sequence[float],
         fresh: Sequence[bool],
         elapsed: int,
     ) -> Doubt | None:
@@ -131,6 +142,7 @@ class LinkWatch:
 
         Args:
             motor_pos: motors [rad].
+            commands: what they should follow [rad].
             joint_pos: links [rad].
             fresh: which drives have told something new.
             elapsed: periods since the readings before.
@@ -138,7 +150,10 @@ class LinkWatch:
         if not self._last:
             self._last = list(joint_pos)
             self._sway_rest = sum(joint_pos) - sum(motor_pos)
-            self._motor_rest = sum(motor_pos)
+            self._led_rest = sum(commands)
+        polar, forget = sum(commands), self._forget
+        self._led_rest += forget * (polar - self._led_rest)
+        self._led = max(self._led * (1.0 - forget), abs(polar - self._led_rest))
         doubt = self._speed(joint_pos, fresh, elapsed)
         doubt = self._sway(motor_pos, joint_pos) or doubt
         return self._standing(motor_pos, joint_pos, fresh) or doubt
@@ -163,14 +178,13 @@ class LinkWatch:
         return doubt
 
     def _sway(self, motor_pos: Sequence[float], joint_pos: Sequence[float]) -> Doubt | None:
-        motors = sum(motor_pos)
-        deflection = sum(joint_pos) - motors
-        forget = self._forget
-        self._sway_rest += forget * (deflection - self._sway_rest)
-        self._motor_rest += forget * (motors - self._motor_rest)
-        self._motor_peak = max(self._motor_peak * (1.0 - forget), abs(motors - self._motor_rest))
+        deflection = sum(joint_pos) - sum(motor_pos)
+        self._sway_rest += self._forget * (deflection - self._sway_rest)
         sway = abs(deflection - self._sway_rest)
-        limit = self._bounds.sway + SWAY_GAIN * self._motor_peak
+        self._young.append(sway)
+        if len(self._young) > self._delay:
+            self._swayed = max(self._swayed * self._fade, self._young.popleft())
+        limit = self._bounds.sway + self._widening
         self._sway_age = self._sway_age + 1 if sway > limit else 0
         if self._sway_age < SWAY_CYCLES:
             return None
@@ -180,6 +194,11 @@ class LinkWatch:
             f"them; the limit is {limit:.3f} rad: look at the link encoders, or raise sway for a "
             "leg that is pushed from outside",
         )
+
+    @property
+    def _widening(self) -> float:
+        """What the leg may do along the polar mode, from what it did and was led to do [rad]."""
+        return SWAY_GROWTH * self._swayed + POLAR_GAIN * self._led
 
     def _standing(
         self, motor_pos: Sequence[float], joint_pos: Sequence[float], fresh: Sequence[bool]
@@ -191,18 +210,19 @@ class LinkWatch:
             self._springs[place].append(joint_pos[place] - motor_pos[place])
         if len(self._links[0]) < STANDING_CYCLES:
             return None
+        limit = self._bounds.standing + self._widening
         for place in (0, 1):
             shown = self._links[place]
             if abs(shown[-1] - shown[0]) > STANDING_BAND or _range(shown) > STANDING_BAND:
                 continue
             # A link that its motor merely carries along pulls at nothing: the spring must work.
             moved = min(_range(self._links[1 - place]), _range(self._springs[1 - place]))
-            if moved > self._bounds.standing:
+            if moved > limit:
                 return Doubt(
                     "joint encoder",
                     f"joint {place + 1} stands at {joint_pos[place]:.3f} rad for "
                     f"{STANDING_CYCLES} cycles, in which the other one moved by {moved:.3f} rad; "
-                    f"the limit is {self._bounds.standing:g} rad: its encoder is dead, or the "
+                    f"the limit is {limit:.3f} rad: its encoder is dead, or the "
                     "link is blocked",
                 )
         return None
