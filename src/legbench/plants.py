@@ -36,6 +36,8 @@ from legbench.servo import ServoConfig
 
 EMULATED = "legbench"
 """Interface of the emulated leg in this process, in virtual time."""
+IDLE_POS = (-0.3, 0.3)
+"""Motors of emulated drives that nothing hangs on: a knee that every leg can have [rad]."""
 KNEE_WIND = 0.1
 """Motors may ask for so much beyond a knee stop, which loads each spring by half of it [rad]."""
 SINGULAR_SHARE = 0.2
@@ -345,7 +347,9 @@ def _emulated(config: BusConfig, choice: CanChoice, leg: Leg | None) -> Network:
     For those who only look its drives have kept their configuration: nobody may write it.
     """
     if leg is None:
-        return emulate(config, configured=choice.read_only)
+        idle = [Behaviour(start_pos=start) for start in IDLE_POS]
+        fits = len(config.nodes) == len(idle)
+        return emulate(config, idle if fits else None, configured=choice.read_only)
     motors = [float(value) for value in leg.start.motor_pos]
     return emulate(
         config,

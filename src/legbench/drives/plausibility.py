@@ -22,7 +22,7 @@ SWAY_DELAY = 0.25
 """A sway this old is what the leg does; a younger one may be a fault's [s]."""
 SWAY_MEMORY = 5.0
 """Time constant in which a sway is forgotten: a dozen hops, each of which may swing it on [s]."""
-SWAY_GROWTH = 2.0
+SWAY_GROWTH = 1.5
 """A leg that sways may sway so much more, relative to what it did [-]."""
 POLAR_GAIN = 10.0
 """What a command along the polar mode may cause there, relative to it, in resonance [-]."""
