@@ -208,13 +208,13 @@ class Guard:
         fresh: Sequence[bool],
         elapsed: int,
     ) -> None:
-        doubts = [
-            watch.see(axis, value, expected)
-            for axis, (watch, value, expected) in enumerate(
-                zip(self._motors, motor_pos, expected_pos, strict=True), start=1
-            )
-        ]
-        doubts.append(self._links.see(motor_pos, joint_pos, expected_pos, fresh, elapsed))
-        for doubt in doubts:
-            if doubt is not None:
-                raise PlantFault(doubt.cause, doubt.message)
+        found = None
+        for axis, watch in enumerate(self._motors):
+            found = watch.see(axis + 1, motor_pos[axis], expected_pos[axis]) or found
+        doubt = self._links.see(motor_pos, joint_pos, expected_pos, fresh, elapsed)
+        if found is None and doubt is not None:
+            # A motor that is not where it should be makes the springs sway, too: it is the cause.
+            suspects = [watch.suspicion for watch in self._motors if watch.suspicion is not None]
+            found = suspects[0] if suspects else doubt
+        if found is not None:
+            raise PlantFault(found.cause, found.message)

@@ -59,8 +59,8 @@ class SafetyLimits:
     """Motion of one link during which the other one cannot stand still; beyond it the run ends
     [rad]."""
     sway: float = math.inf
-    """Sum of both springs' deflections, along q1 + q2, without the motors' doing; beyond it the
-    run ends [rad]."""
+    """Motion of q1 + q2 that nobody has commanded, besides what the leg did in the seconds before;
+    beyond it the run ends [rad]."""
     temperature: float = math.inf
     """Of a drive that reports it; beyond it the run ends [deg C]."""
     overrun_cycles: int = 3

@@ -52,7 +52,7 @@ class Bounds:
     standing: float
     """Motion of the other link during which no link stands still [rad]."""
     sway: float
-    """Sum of both springs' deflections that comes without the motors' doing [rad]."""
+    """Motion of q1 + q2 that nobody has commanded [rad]."""
 
 
 @final
@@ -62,6 +62,9 @@ class MotorWatch:
     A first-order loop of any bandwidth between `servo_bandwidth` and infinity, led by the same
     commands, is always found between two bounds: from the far one the slowest loop comes, at the
     near one an ideal loop is already. The bounds close upon a command that rests.
+
+    Attributes:
+        suspicion: what is wrong in this cycle, though it may not have lasted yet.
     """
 
     def __init__(self, bounds: Bounds) -> None:
@@ -69,6 +72,7 @@ class MotorWatch:
         self._gain = 1.0 - math.exp(-2.0 * math.pi * bounds.servo_bandwidth * bounds.period)
         self._low = self._high = 0.0
         self._age = 0
+        self.suspicion: Doubt | None = None
 
     def start_at(self, position: float) -> None:
         """Begin with a motor that stands at `position` [rad]."""
@@ -83,17 +87,16 @@ class MotorWatch:
         excess = max(low - position, position - high)
         limit = self._bounds.following_error
         if excess <= limit:
-            self._age = 0
+            self._age, self.suspicion = 0, None
             return None
         self._age += 1
-        if self._age <= self._bounds.following_cycles:
-            return None
-        return Doubt(
+        self.suspicion = Doubt(
             "following error",
             f"motor {motor} shows {position:.3f} rad and is {excess:.3f} rad away from where its "
             f"commands lead any drive, for {self._age} cycles; the limit is {limit:g} rad: it is "
             "jammed, its encoder is dead, or its position loop is slower than servo_bandwidth",
         )
+        return self.suspicion if self._age > self._bounds.following_cycles else None
 
 
 @final
@@ -102,7 +105,7 @@ class LinkWatch:
 
     A link faster than `joint_speed` is none. On the radial mode, q1 = -q2, along which all
     controllers lead the leg, two more things do not happen: one link stands while the other one
-    swings; and the springs sway along the polar mode, q1 + q2. Both bounds widen with the sway of
+    swings; and the links sway along the polar mode, q1 + q2. Both bounds widen with the sway of
     the seconds before, since a hop in place sways more from hop to hop, and with what is commanded
     along the polar mode, such as a jog of one motor: a leg that is led along it is not watched in
     this way. The references follow what lasts, such as an offset or the weight.
@@ -149,13 +152,13 @@ class LinkWatch:
         """
         if not self._last:
             self._last = list(joint_pos)
-            self._sway_rest = sum(joint_pos) - sum(motor_pos)
+            self._sway_rest = sum(joint_pos)
             self._led_rest = sum(commands)
         polar, forget = sum(commands), self._forget
         self._led_rest += forget * (polar - self._led_rest)
         self._led = max(self._led * (1.0 - forget), abs(polar - self._led_rest))
         doubt = self._speed(joint_pos, fresh, elapsed)
-        doubt = self._sway(motor_pos, joint_pos) or doubt
+        doubt = self._sway(joint_pos) or doubt
         return self._standing(motor_pos, joint_pos, fresh) or doubt
 
     def _speed(
@@ -177,10 +180,10 @@ class LinkWatch:
                 )
         return doubt
 
-    def _sway(self, motor_pos: Sequence[float], joint_pos: Sequence[float]) -> Doubt | None:
-        deflection = sum(joint_pos) - sum(motor_pos)
-        self._sway_rest += self._forget * (deflection - self._sway_rest)
-        sway = abs(deflection - self._sway_rest)
+    def _sway(self, joint_pos: Sequence[float]) -> Doubt | None:
+        polar = sum(joint_pos)
+        self._sway_rest += self._forget * (polar - self._sway_rest)
+        sway = abs(polar - self._sway_rest)
         self._young.append(sway)
         if len(self._young) > self._delay:
             self._swayed = max(self._swayed * self._fade, self._young.popleft())
@@ -190,7 +193,7 @@ class LinkWatch:
             return None
         return Doubt(
             "sway",
-            f"the springs sway by {sway:.3f} rad along q1 + q2, where the motors have not led "
+            f"the links sway by {sway:.3f} rad along q1 + q2, where the motors have not led "
             f"them; the limit is {limit:.3f} rad: look at the link encoders, or raise sway for a "
             "leg that is pushed from outside",
         )
