@@ -65,8 +65,8 @@ def test_motors_led_into_the_knee_stop_both_give_way() -> None:
     guard = Guard(KNEED, PERIOD)
     guard.start_at((-0.3, 0.3))
     for _ in range(200):
-        applied = guard.command((0.79, -0.79))
-    assert applied == pytest.approx((-0.1, 0.1), abs=1e-12)
+        guard.command((0.79, -0.79))
+    assert guard.applied == pytest.approx((-0.1, 0.1), abs=1e-12)
     assert guard.reachable((0.79, -0.79)) == pytest.approx((-0.1, 0.1))
 
 
@@ -85,10 +85,10 @@ def test_from_beyond_the_knee_the_way_leads_back_and_no_farther() -> None:
 @pytest.mark.parametrize("links", [(0.0, 0.09), (-1.1, 1.1)])
 def test_a_knee_beyond_its_range_ends_the_run(links: tuple[float, float]) -> None:
     guard = Guard(KNEED, PERIOD)
-    seen = {"motor_pos": (-0.3, 0.3), "spring_torque": (0.0, 0.0)}
-    guard.check(joint_pos=(0.0, 0.11), **seen)
+    motors, torques = (-0.3, 0.3), (0.0, 0.0)
+    guard.check(joint_pos=(0.0, 0.11), motor_pos=motors, spring_torque=torques)
     with pytest.raises(PlantFault, match=r"q2 - q1 is at .* the limits are \[0\.1, 2\.1\] rad"):
-        guard.check(joint_pos=links, **seen)
+        guard.check(joint_pos=links, motor_pos=motors, spring_torque=torques)
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,5 @@
 import math
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -99,7 +100,11 @@ def test_limits_that_real_drives_need_are_named_when_they_are_missing() -> None:
         SafetyLimits(command_speed=1.0, following_error=0.1).require_complete()
 
 
-GOOD = {"motor_pos": (0.0, 1.0), "joint_pos": (0.0, 1.0), "spring_torque": (0.0, 0.0)}
+GOOD: dict[str, Any] = {
+    "motor_pos": (0.0, 1.0),
+    "joint_pos": (0.0, 1.0),
+    "spring_torque": (0.0, 0.0),
+}
 
 
 @pytest.mark.parametrize(

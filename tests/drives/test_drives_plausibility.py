@@ -24,7 +24,7 @@ BOUNDS = Bounds(
     standing=0.02,
     sway=0.05,
 )
-BOTH = (True, True)
+BOTH: tuple[bool, bool] = (True, True)
 
 
 def servo_gain(bandwidth: float) -> float:
@@ -148,7 +148,7 @@ def test_a_step_of_a_link_encoder_is_found_at_once(dead: int) -> None:
 
 def test_a_reading_that_comes_after_two_lost_cycles_is_no_step() -> None:
     readings = [swing(cycle, 1.4) for cycle in range(300)]  # up to 26 rad/s
-    fresh = [BOTH] * 300
+    fresh: list[tuple[bool, bool]] = [BOTH] * 300
     for cycle in (201, 202):
         readings[cycle], fresh[cycle] = readings[200], (False, False)
     assert max(abs(readings[203][0] - readings[202][0]), 0.0) > 0.06

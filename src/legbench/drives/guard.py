@@ -61,16 +61,17 @@ class Guard:
         wanted = tuple(
             [min(max(value, low), high) for value, (low, high) in zip(asked, boxes, strict=True)]
         )
-        if self._knee is not None:
-            low, high = min(self._knee[0], knee_of(last)), max(self._knee[1], knee_of(last))
-            wanted = project(wanted, (low, high), boxes)
+        knee = self._knee
+        if knee is not None:
+            knee = (min(knee[0], knee_of(last)), max(knee[1], knee_of(last)))
+            wanted = project(wanted, knee, boxes)
         applied = tuple(
             [
                 min(max(value, before - step), before + step)
                 for value, before in zip(wanted, last, strict=True)
             ]
         )
-        if self._knee is not None and not low <= knee_of(applied) <= high:
+        if knee is not None and not knee[0] <= knee_of(applied) <= knee[1]:
             applied = along(last, wanted, step)
         if applied != asked:
             self.shortfall.count(asked, wanted, applied)
