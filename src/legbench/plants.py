@@ -1,5 +1,6 @@
 """Which plant a run is made on, and what has to be opened and told for it: the one place."""
 
+import math
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar, final
@@ -21,6 +22,7 @@ from legbench.drives.master.lock import ChannelLock
 from legbench.drives.master.stop_report import StopReport
 from legbench.drives.open_bus import adapter_of, open_bus
 from legbench.drives.session import Session
+from legbench.drives.shortfall import Shortfall
 from legbench.drives.waivers import describe_waivers
 from legbench.drives.wire import check_load
 from legbench.errors import ConfigError
@@ -37,6 +39,12 @@ from legbench.servo import ServoConfig
 
 EMULATED = "legbench"
 """Interface of the emulated leg in this process, in virtual time."""
+IDLE_POS = (-0.3, 0.3)
+"""Motors of emulated drives that nothing hangs on: a knee that every leg can have [rad]."""
+KNEE_WIND = 0.1
+"""Motors may ask for so much beyond a knee stop, which loads each spring by half of it [rad]."""
+SINGULAR_SHARE = 0.2
+"""Of the way from a singular pose of the bars to the knee stop, links keep this share [-]."""
 LIMITS_NAME = "limits.toml"
 """Beside the bus file, unless another file is chosen."""
 BUS_LOG = "bus.log"
@@ -124,6 +132,8 @@ class OpenPlant:
     link: Link | None = None
     waived: tuple[str, ...] = ()
     """Protections that a run on it does without, a line each."""
+    shortfall: Shortfall | None = None
+    """Which commands its limits changed; None without limits."""
 
     def start_log(self, run: Path) -> None:
         """Record raw frames into a run folder from now on, if there are any."""
@@ -147,11 +157,17 @@ class OpenPlant:
 
     def events(self) -> dict[str, dict[str, Any]]:
         """What a run on it has to tell in the end, by name."""
-        told = {"waived": {"protections": list(self.waived)}} if self.waived else {}
+        events: dict[str, dict[str, Any]] = {}
+        if self.waived:
+            events["waived"] = {"protections": list(self.waived)}
+        if self.shortfall is not None and (told := self.shortfall.told()):
+            events["limited"] = told
         if self.link is None:
-            return told
+            return events
         cycle, stopped = self.link.cycle, self.link.stopped
-        events: dict[str, dict[str, Any]] = dict(told)
+        log = None if self.session is None else self.session.log
+        if log is not None and log.error is not None:
+            events["bus log not written"] = {"error": log.error}
         if self.link.listener_error is not None:
             events["onlooker failed"] = {"who": "listener", "error": self.link.listener_error}
         if stopped is not None and stopped != StopReport():
@@ -162,6 +178,7 @@ class OpenPlant:
         if self.link.not_parked:
             events["not parked"] = {"drives": self.link.not_parked}
         return events | {
+            **cycle.notices.events,
             "bus": {
                 "skipped_cycles": self.link.skipped_total,
                 "silent_cycles": cycle.silent_total,
@@ -171,7 +188,7 @@ class OpenPlant:
                 "emergencies": [str(text) for watch in cycle.watches for text in watch.history],
                 "state": self.link.state.name.lower(),
                 "began": self.began,
-            }
+            },
         }
 
 
@@ -201,14 +218,18 @@ def limits_for(path: Path, design: LegDesign) -> SafetyLimits:
         ConfigError: the file makes no sense, or is looser than the design.
     """
     limits, joint = load_limits(path), joint_ranges(design)
+    motor_knee, joint_knee = knee_ranges(design)
     open_range = (UNLIMITED, UNLIMITED)
-    limits = replace(
-        limits,
-        motor_range=joint if limits.motor_range == open_range else limits.motor_range,
-        joint_range=joint if limits.joint_range == open_range else limits.joint_range,
-    )
+    own_motor, own_joint = limits.motor_knee_range, limits.joint_knee_range
     try:
-        limits.check_within(motor=joint, joint=joint)
+        limits = replace(
+            limits,
+            motor_range=joint if limits.motor_range == open_range else limits.motor_range,
+            joint_range=joint if limits.joint_range == open_range else limits.joint_range,
+            motor_knee_range=motor_knee if own_motor == UNLIMITED else own_motor,
+            joint_knee_range=joint_knee if own_joint == UNLIMITED else own_joint,
+        )
+        limits.check_within(motor=joint, joint=joint, motor_knee=motor_knee, joint_knee=joint_knee)
     except ConfigError as error:
         raise ConfigError(f"{path}: {error}") from None
     return limits
@@ -220,18 +241,53 @@ def joint_ranges(design: LegDesign) -> tuple[Range, Range]:
     return hip, (hip[0] + knee[0], hip[1] + knee[1])
 
 
+def knee_ranges(design: LegDesign) -> tuple[Range, Range]:
+    """Return what the knee stops of a design leave to q2 - q1 of the motors and of the links [rad].
+
+    Motors may wind the springs against a stop by a little, as a push does that straightens the
+    leg. The stops give way: a jump of the optimal leg goes 0.18 rad into them. Links must stay
+    away from the singular poses 0 and pi by a share of what lies between these and the stops.
+    """
+    low, high = design.limits.knee
+    links = (SINGULAR_SHARE * low, math.pi - SINGULAR_SHARE * (math.pi - high))
+    return (low - KNEE_WIND, high + KNEE_WIND), links
+
+
 def _alone(
     choice: SimChoice | AnalyticChoice, leg: Leg, plant: AbstractPlant, told: dict[str, Any]
 ) -> OpenPlant:
     """A plant that is nothing but computed, in virtual time."""
-    manifest = {"plant": choice.kind, **told}
+    manifest, shortfall = {"plant": choice.kind, **told}, None
     waived: tuple[str, ...] = ()
     if choice.limits is not None:
         limits = limits_for(choice.limits, leg.design)
+        _check_servo(leg.servo, limits)
         plant = LimitedPlant(plant, limits, delay_cycles=leg.servo.delay_cycles)
-        manifest["limits"] = asdict(limits)
+        manifest["limits"], shortfall = asdict(limits), plant.shortfall
         waived = describe_waivers(None, limits)
-    return OpenPlant(plant=plant, clock=VirtualClock(), manifest=manifest, waived=waived)
+    return OpenPlant(
+        plant=plant, clock=VirtualClock(), manifest=manifest, waived=waived, shortfall=shortfall
+    )
+
+
+def _check_servo(servo: ServoConfig, limits: SafetyLimits) -> None:
+    """Refuse a simulated servo that the limits would take for a jammed motor.
+
+    Raises:
+        ConfigError: it is slower than they take for healthy.
+    """
+    if math.isinf(limits.following_error):
+        return
+    if servo.bandwidth is not None and servo.bandwidth < limits.servo_bandwidth:
+        raise ConfigError(
+            f"servo bandwidth is {servo.bandwidth:g} Hz, the limits take {limits.servo_bandwidth:g}"
+            " Hz for the slowest healthy one: lower servo_bandwidth in the limits file"
+        )
+    if servo.slew_rate is not None and servo.slew_rate < limits.command_speed:
+        raise ConfigError(
+            f"servo slew_rate is {servo.slew_rate:g} rad/s, the limits let commands through at "
+            f"{limits.command_speed:g} rad/s: lower command_speed in the limits file"
+        )
 
 
 def _open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
@@ -286,6 +342,7 @@ def _open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
         session=session,
         link=link,
         waived=describe_waivers(config, limits),
+        shortfall=link.shortfall,
     )
 
 
@@ -328,7 +385,9 @@ def _emulated(config: BusConfig, choice: CanChoice, leg: Leg | None) -> Network:
     For those who only look its drives have kept their configuration: nobody may write it.
     """
     if leg is None:
-        return emulate(config, configured=choice.read_only)
+        idle = [Behaviour(start_pos=start) for start in IDLE_POS]
+        fits = len(config.nodes) == len(idle)
+        return emulate(config, idle if fits else None, configured=choice.read_only)
     motors = [float(value) for value in leg.start.motor_pos]
     return emulate(
         config,

@@ -17,6 +17,7 @@ from legbench.drives.emulated.network import Network
 from legbench.drives.master.lock import ChannelLock
 from legbench.drives.realtime import Granted
 from legbench.drives.session import Session
+from legbench.plants import IDLE_POS
 from legbench.recording.reader import load
 
 HARDWARE = Path(__file__).parents[2] / "hardware"
@@ -87,8 +88,11 @@ def test_zero_writes_offsets_and_keeps_the_comments(
     done = called(capfd, "drives", "zero", "--posture", "-0.4", "0.4", *where)
     assert done.status == 0, done.err
     nodes = load_bus(path).nodes
-    assert abs(nodes[0].motor.to_rad(0) + 0.4) < nodes[0].motor.resolution
-    assert abs(nodes[1].link.to_rad(0) - 0.4) < nodes[1].link.resolution
+    before = load_bus(BUS).nodes
+    motor = before[0].motor.to_counts(IDLE_POS[0])
+    assert abs(nodes[0].motor.to_rad(motor) + 0.4) < nodes[0].motor.resolution
+    link = before[1].link.to_counts(IDLE_POS[1])
+    assert abs(nodes[1].link.to_rad(link) - 0.4) < nodes[1].link.resolution
     assert path.read_text().count("#") == BUS.read_text().count("#")
 
 

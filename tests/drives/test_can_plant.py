@@ -37,7 +37,7 @@ def test_a_jump_over_frames_leaves_a_whole_recording(tmp_path: Path) -> None:
     assert run_folder.manifest["plant"] == "can"
     assert run_folder.manifest["bus"]["interface"] == "legbench"
     assert run_folder.manifest["limits"]["spring_torque"] == load_limits(LIMITS).spring_torque
-    assert {event["name"] for event in run_folder.events} == {"bus", "end"}
+    assert {event["name"] for event in run_folder.events} == {"bus", "end", "limited"}
     log = (finished.path / "bus.log").read_text(encoding="ascii").splitlines()
     assert sum(line.endswith("080#") for line in log) > 1000
 

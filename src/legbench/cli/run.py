@@ -8,7 +8,7 @@ from tyro.conf import subcommand
 
 from legbench.cli.output import note, print_json, progress, report_error
 from legbench.cli.parse import parse
-from legbench.cli.table import print_summary
+from legbench.cli.table import limited, print_summary
 from legbench.cli.waived import tell_waived_of
 from legbench.clock import WallClock
 from legbench.control import BangBangConfig, JumpConfig, PositionJumpConfig, SetpointMeaning
@@ -194,6 +194,11 @@ def main(arguments: list[str]) -> int:
     if finished.outcome.message is not None:
         note(f"legbench: {finished.outcome.message}")
     summary = summarise(load(finished.path))
+    if summary.limited_cycles:
+        note(
+            f"legbench: the limits changed the command in {limited(summary)}: the leg ran "
+            "something else than it was asked to; the event 'limited' in events.jsonl says more"
+        )
     if chosen.json:
         print_json(summary.to_json())
     else:

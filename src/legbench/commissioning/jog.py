@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from legbench.commissioning.status import read_counts
 from legbench.drives.checks import check_together
+from legbench.drives.knee import knee_of
 from legbench.drives.limits import START_TOLERANCE, SafetyLimits
 from legbench.drives.session import Session
 from legbench.errors import ConfigError
@@ -89,11 +90,13 @@ def _check_limits(limits: SafetyLimits) -> None:
 
 
 def _check_range(session: Session, limits: SafetyLimits, place: int, by: float) -> None:
-    """Every motor stands in its range, and the jogged one stays there."""
+    """Every motor and the knee stand in their ranges, and stay there over the jog."""
+    shown = []
     for axis, (node, (low, high)) in enumerate(
         zip(session.config.nodes, limits.motor_range, strict=True)
     ):
         here = node.motor.to_rad(read_counts(session, node)[0])
+        shown.append(here)
         if not low - START_TOLERANCE <= here <= high + START_TOLERANCE:
             raise ConfigError(
                 f"'{node.name}' stands at {here:.3f} rad, the limits are [{low:g}, {high:g}] rad; "
@@ -104,3 +107,16 @@ def _check_range(session: Session, limits: SafetyLimits, place: int, by: float) 
                 f"the jog would take '{node.name}' from {here:.3f} to {here + by:.3f} rad, the "
                 f"limits are [{low:g}, {high:g}] rad"
             )
+    before = knee_of(shown)
+    shown[place] += by
+    after, (low, high) = knee_of(shown), limits.motor_knee_range
+    if not low - START_TOLERANCE <= before <= high + START_TOLERANCE:
+        raise ConfigError(
+            f"the motors stand with q2 - q1 at {before:.3f} rad, the limits are [{low:g}, "
+            f"{high:g}] rad; all motors are enabled for a jog: move them back by hand"
+        )
+    if not low <= after <= high:
+        raise ConfigError(
+            f"the jog would take q2 - q1, the knee, from {before:.3f} to {after:.3f} rad, the "
+            f"limits are [{low:g}, {high:g}] rad"
+        )

@@ -77,8 +77,11 @@ def limits_from_mapping(content: Mapping[str, Any]) -> SafetyLimits:
                     "one for each axis"
                 )
             given[name] = tuple(_range(name, pair) for pair in pairs)
+    for name in ("motor_knee_range", "joint_knee_range"):
+        if name in given:
+            given[name] = _range(name, given[name])
     _waive(given)
-    done = ("motor_range", "joint_range", "waive")
+    done = ("motor_range", "joint_range", "motor_knee_range", "joint_knee_range", "waive")
     return _build(SafetyLimits, "limits", given, converted=done)
 
 

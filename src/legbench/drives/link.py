@@ -22,7 +22,8 @@ from legbench.drives.cia402 import Goal
 from legbench.drives.codec.nmt import NmtState
 from legbench.drives.config import BusConfig, check_start_speed
 from legbench.drives.errors import DriveError
-from legbench.drives.limits import Guard, SafetyLimits
+from legbench.drives.guard import Guard
+from legbench.drives.limits import SafetyLimits
 from legbench.drives.master.bring_up import BringUp
 from legbench.drives.master.cycle import Cycle, Tick
 from legbench.drives.master.lock import ChannelLock
@@ -37,6 +38,7 @@ from legbench.drives.master.stop_report import Lead, StopReport
 from legbench.drives.master.supervisor import Supervisor
 from legbench.drives.master_watch import check_master_watch
 from legbench.drives.open_bus import timebase_of
+from legbench.drives.shortfall import Shortfall
 from legbench.drives.timebase import Timebase
 from legbench.drives.wire import check_load
 from legbench.errors import PlantFault
@@ -295,6 +297,7 @@ class Link(Lead):
                 return self._sample()
             self._watched_tick()
             self._supervisor.states()
+            self.cycle.notices.statuswords(self.cycle.axes, self._last.time_ns)
             sample = self._sample()
             self._check(sample)
         except PlantFault as error:
@@ -358,8 +361,13 @@ class Link(Lead):
 
     def forget_wish(self) -> tuple[float, ...]:
         """Measure the next step of the command from what was applied last; that [rad]."""
-        self._guard.start_at(self._guard.applied)
+        self._guard.forget_wish()
         return self._guard.applied
+
+    @property
+    def shortfall(self) -> Shortfall:
+        """Which wishes were let through otherwise than wished."""
+        return self._guard.shortfall
 
     def move_to(self, motor_pos: Sequence[float], speed: float | None = None) -> Sample:
         """Go to a posture at a speed [rad/s], `start_speed` of the bus file by default.
@@ -430,6 +438,8 @@ class Link(Lead):
             spring_torque=sample.spring_torque,
             expected_pos=self._expected[0] if self._expected else None,
             temperature=sample.temperature,
+            fresh=sample.fresh,
+            elapsed=1 + sample.skipped,
         )
 
     def _end(self, error: PlantFault) -> None:

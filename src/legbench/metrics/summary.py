@@ -10,6 +10,7 @@ from legbench.design.setup import SetupKind
 from legbench.metrics.budget import energy_budget
 from legbench.metrics.energy import energy_flows, energy_residual, loop_gap_max
 from legbench.metrics.jump import JumpFigures, jump_figures
+from legbench.metrics.limited import limited_commands
 from legbench.metrics.periods import first_action
 from legbench.metrics.phases import Gait, find_gait
 from legbench.metrics.ratings import rate_run
@@ -33,6 +34,10 @@ class Summary:
     """How the run ended, as its manifest says."""
     cause: str | None
     """Why it ended early."""
+    limited_cycles: int
+    """Cycles in which the limits changed the command."""
+    limited_max: list[float]
+    """Largest change of each motor's command by the limits [rad]."""
     duration: float
     """First to last row [s]."""
     real_time_factor: float
@@ -121,6 +126,7 @@ def summarise(recording: Recorded) -> Summary:
         cause=recording.manifest.get("cause"),
         rating_reference=terms.reference.value,
         loop_gap_max=loop_gap_max(recording),
+        **limited_commands(recording),
         **_clock(recording),
         **rate_run(recording, terms, gait),
         **_jumping(recording, terms, figures),

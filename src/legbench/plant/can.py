@@ -97,6 +97,7 @@ class CanPlant(AbstractPlant):
             if still >= STILL_CYCLES:
                 break
         sample = self._exchange(self._start.motor_pos)
+        self.link.shortfall.restart()
         self._began_ns, self.began = sample.time_ns, 1e-9 * sample.time_ns
         return self._observe(sample)
 

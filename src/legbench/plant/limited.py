@@ -7,7 +7,9 @@ from typing import final
 
 import numpy as np
 
-from legbench.drives.limits import Guard, SafetyLimits
+from legbench.drives.guard import Guard
+from legbench.drives.limits import SafetyLimits
+from legbench.drives.shortfall import Shortfall
 from legbench.plant.abstract import AbstractPlant
 from legbench.signals import Command, Floats, Observation
 
@@ -57,6 +59,11 @@ class LimitedPlant(AbstractPlant):
     def rest(self, motor_pos: Floats, interrupted: Callable[[], bool]) -> str | None:
         """Pass it on to the plant within."""
         return self._plant.rest(motor_pos, interrupted)
+
+    @property
+    def shortfall(self) -> Shortfall:
+        """Which commands were let through otherwise than wished."""
+        return self._guard.shortfall
 
     def close(self) -> None:
         """Close the plant within."""

@@ -12,6 +12,7 @@ from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.homing import Homing, HomingState
 from legbench.drives.emulated.motion import Motion
 from legbench.drives.emulated.power import HALT, PowerStage
+from legbench.drives.emulated.sensors import Sensors
 from legbench.drives.objects import LINK_SHORT, Key
 from legbench.drives.units import wrap
 
@@ -29,6 +30,8 @@ class Axis:
         power: the state machine.
         motion: the motor.
         alarms: what is wrong.
+        sensors: what the encoders make of the positions.
+        warning: bit 7 of the statusword is set.
     """
 
     def __init__(self, node: NodeConfig, behaviour: Behaviour, values: dict[Key, int]) -> None:
@@ -36,6 +39,8 @@ class Axis:
         self.power = PowerStage(values)
         self.motion = Motion(node.motor, behaviour, values)
         self.alarms = Alarms(node.node_id, values)
+        self.sensors = Sensors(node)
+        self.warning = False
         self._homing = Homing(values, node.motor.counts_per_rev)
         self._link_counts = node.link.to_counts(behaviour.start_pos)
         self._torque = 0
@@ -122,6 +127,7 @@ class Axis:
         if self._mode_due_ns is not None and now_ns >= self._mode_due_ns:
             self._values[0x6061, 0], self._mode_due_ns = self._values[0x6060, 0], None
             self.motion.hold(now_ns)
+        self.sensors.tick(step_ns)
         before = self.motion.actual
         self._move(now_ns, step_ns)
         self._values[0x606C, 0] = round((self.motion.actual - before) * 1e9 / step_ns)
@@ -162,17 +168,20 @@ class Axis:
     def publish(self) -> None:
         """Bring the actual values of the object dictionary up to date."""
         values, motion = self._values, self.motion
-        actual = round(motion.actual)
+        actual = self.sensors.motor.show(round(motion.actual))
+        link = self.sensors.link.show(self._link_counts)
         values[0x6064, 0] = wrap(actual)
         values[0x6062, 0] = wrap(round(motion.demand))
         values[0x60F4, 0] = wrap(round(motion.demand) - actual)
-        values[0x60E4, 1] = wrap(self._link_counts)
-        values[LINK_SHORT, 0] = wrap(self._link_counts, 16)
+        values[0x60E4, 1] = wrap(link)
+        values[LINK_SHORT, 0] = wrap(link, 16)
         values[0x6077, 0] = min(max(self._torque, -32768), 32767)
         self._status()
 
     def _status(self) -> None:
         word = self.power.low_byte | _STATUS
+        if self.warning:
+            word |= StatusBit.WARNING
         mode = self._values[0x6061, 0]
         if mode == Mode.CYCLIC_SYNCHRONOUS_POSITION:
             if self.power.state is _ENABLED and self.power.stopping is None:

@@ -87,6 +87,10 @@ class AxisLink:
         """COB-IDs that have not come in this cycle."""
         return tuple(cob for cob, (bit, _, _) in self._tpdos.items() if bit & self._missing)
 
+    def received(self, cob_id: int) -> bool:
+        """Whether one of its TPDOs has come in this cycle."""
+        return not self._tpdos[cob_id][0] & self._missing
+
     def begin_cycle(self) -> None:
         """SYNC goes out: everything is expected again."""
         self._missing = self._all
