@@ -1,5 +1,5 @@
 .DEFAULT_GOAL := help
-.PHONY: help setup jump test test-engine test-socketcan check bench models clean
+.PHONY: help setup jump test test-engine test-socketcan check bench mutants models clean
 
 PYTHON ?= python3.11
 BIN := .venv/bin
@@ -43,6 +43,9 @@ bench: $(STAMP) ## performance targets as ratios against a baseline in the same 
 	$(BIN)/python scripts/bench_design.py
 	$(BIN)/python scripts/bench_modes.py
 	$(BIN)/python scripts/bench_drives.py
+
+mutants: $(STAMP) ## which of 40 small faults a file the tests notice; hours, or FILES='src/...'
+	$(BIN)/python scripts/mutants/main.py $(FILES)
 
 models: $(STAMP) ## rewrite the golden MJCF files of models/
 	@set -e; for design in models/*.toml; do \

@@ -11,7 +11,7 @@ from legbench.control import JumpConfig
 from legbench.design import load_design
 from legbench.errors import LegbenchError
 from legbench.experiment import Experiment, record
-from legbench.loop import stop_on_interrupt
+from legbench.interrupts import stop_on_interrupt
 from legbench.metrics import Summary, summarise
 from legbench.recording.reader import load
 from legbench.viz.live.rrd import write_rrd

@@ -49,8 +49,10 @@ def test_no_file_knows_the_machine_that_it_was_written_on() -> None:
     assert found == []
 
 
-KEEP_STOPPING = ("stop.py", "port.py", "link.py", "can.py", "session.py")
+KEEP_STOPPING = ("stop.py", "sdo_stop.py", "port.py", "link.py", "can.py", "session.py")
 """On the way to rest one failure must not prevent the next step, whatever a driver raises."""
+GUESTS = ("loop.py", "onlooker.py")
+"""Controllers, plants and onlookers of others may raise anything; it is told as their failure."""
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.stem)
@@ -60,7 +62,7 @@ def test_no_error_is_caught_blindly(path: Path) -> None:
             assert node.type is not None, f"{path.name}:{node.lineno}: bare except"
             names = {name.id for name in ast.walk(node.type) if isinstance(name, ast.Name)}
             again = any(isinstance(inner, ast.Raise) for inner in ast.walk(node))
-            if not again and path.name not in KEEP_STOPPING:
+            if not again and path.name not in KEEP_STOPPING + GUESTS:
                 assert not names & {"Exception", "BaseException"}, f"{path.name}:{node.lineno}"
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
             assert node.func.id not in ("hasattr", "eval", "exec"), f"{path.name}:{node.lineno}"

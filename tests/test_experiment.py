@@ -12,15 +12,16 @@ import numpy as np
 import pytest
 
 from legbench.clock import AbstractClock
-from legbench.control import BangBangConfig, JumpConfig, PositionJumpConfig
+from legbench.control import BangBangConfig, Jump, JumpConfig, PositionJumpConfig
 from legbench.design import LegDesign
 from legbench.design.setup import Setup, SetupKind
 from legbench.errors import ConfigError, RecordingError
 from legbench.experiment import Experiment, record, start_of
-from legbench.loop import StopFlag
+from legbench.interrupts import StopFlag
 from legbench.mjcf import Linkage, LinkageKind
 from legbench.recording.reader import load
 from legbench.servo import ServoConfig
+from legbench.signals import Observation
 
 CONTROLLERS = (JumpConfig(), BangBangConfig(), PositionJumpConfig())
 
@@ -133,24 +134,86 @@ def test_a_stopped_run_is_whole(tmp_path: Path, prototype: LegDesign) -> None:
 
 
 def test_an_error_on_the_way_closes_the_run(tmp_path: Path, prototype: LegDesign) -> None:
-    def burst(run: Path) -> None:
-        raise ZeroDivisionError(run)
+    class Stopped(AbstractClock):
+        def start(self) -> None:
+            """Nothing."""
+
+        def wait(self, cycle: int) -> float:
+            raise ZeroDivisionError(cycle)
 
     before = threading.active_count()
     with pytest.raises(ZeroDivisionError):
-        record(short(prototype), tmp_path, on_started=burst)
+        record(short(prototype), tmp_path, clock=Stopped())
     (run,) = tmp_path.iterdir()
     found = load(run).description
     assert (found.status, found.cause) == ("fault", "ZeroDivisionError")
     assert threading.active_count() <= before
 
 
-def test_an_operating_system_error_names_the_run(tmp_path: Path, prototype: LegDesign) -> None:
-    def refuse(run: Path) -> None:
-        raise PermissionError(13, "no", str(run))
+def test_an_operating_system_error_names_the_run(
+    tmp_path: Path, prototype: LegDesign, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(path: Path, *_content: object, **_options: object) -> None:
+        raise PermissionError(13, "no", str(path))
 
+    monkeypatch.setattr(Path, "write_text", refuse)
     with pytest.raises(RecordingError, match=str(tmp_path)):
-        record(short(prototype), tmp_path, on_started=refuse)
+        record(short(prototype), tmp_path)
+
+
+def test_onlookers_that_fail_are_events_of_a_run_that_goes_on(
+    tmp_path: Path, prototype: LegDesign
+) -> None:
+    def burst(run: Path) -> None:
+        raise ZeroDivisionError("no view")
+
+    def gone(done: int, total: int) -> None:
+        raise BrokenPipeError(32, "nobody reads")
+
+    chosen = short(prototype, duration=0.6)
+    finished = record(chosen, tmp_path, on_started=burst, progress=gone)
+    assert finished.outcome.status == "complete"
+    recording = load(finished.path)
+    assert recording.complete
+    assert len(recording.time) == 600
+    assert [event for event in recording.events if event["name"] == "onlooker failed"] == [
+        {
+            "time": pytest.approx(0.6),
+            "name": "onlooker failed",
+            "who": "on_started",
+            "error": "ZeroDivisionError: no view",
+        },
+        {
+            "time": pytest.approx(0.6),
+            "name": "onlooker failed",
+            "who": "progress",
+            "error": "BrokenPipeError: [Errno 32] nobody reads",
+        },
+    ]
+
+
+@pytest.mark.parametrize("where", ["reset", "step"])
+def test_a_controller_that_fails_leaves_a_whole_recording_of_a_fault(
+    tmp_path: Path, prototype: LegDesign, monkeypatch: pytest.MonkeyPatch, where: str
+) -> None:
+    usual, calls = getattr(Jump, where), []
+
+    def fail(jump: Jump, observation: Observation) -> object:
+        calls.append(where)
+        if where == "reset" or len(calls) > 77:
+            raise IndexError("off the table")
+        return usual(jump, observation)
+
+    monkeypatch.setattr(Jump, where, fail)
+    finished = record(short(prototype), tmp_path)
+    recording = load(finished.path)
+    manifest = recording.manifest
+    assert (manifest["status"], manifest["cause"]) == ("fault", "controller failed")
+    assert recording.torn is None
+    assert len(recording.time) == finished.outcome.cycles == (0 if where == "reset" else 77)
+    assert "IndexError: off the table" in str(finished.outcome.message)
+    assert "in fail: raise IndexError" in str(finished.outcome.message)
+    assert recording.events[-1]["name"] == "end"
 
 
 @pytest.mark.parametrize("duration", [0.0, -1.0, 0.0005, float("nan"), float("inf")])

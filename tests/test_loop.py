@@ -1,4 +1,5 @@
 import os
+import re
 import signal
 import threading
 from collections.abc import Callable
@@ -10,7 +11,8 @@ import pytest
 from legbench.clock import AbstractClock, VirtualClock, WallClock
 from legbench.control import AbstractController
 from legbench.errors import PlantFault, RecordingError
-from legbench.loop import PROGRESS_EVERY, StopFlag, run, stop_on_interrupt
+from legbench.interrupts import StopFlag, stop_on_interrupt
+from legbench.loop import PROGRESS_EVERY, run
 from legbench.plant.abstract import AbstractPlant
 from legbench.signals import Command, Floats, Observation, Phase
 
@@ -27,6 +29,7 @@ class Told:
         self.fault_at, self.disk_full_at = fault_at, disk_full_at
         self.cycle = 0
         self.late = 0.0
+        self.rest: Callable[[Floats, Callable[[], bool]], str | None] | None = None
 
     def seen(self, applied: float) -> Observation:
         zero = np.zeros(2)
@@ -64,6 +67,12 @@ class ToldPlant(AbstractPlant):
         if self.told.cycle == self.told.fault_at:
             raise PlantFault("broken spring", "the spring broke; buy another one")
         return self.told.seen(float(command.motor_pos[0]))
+
+    def rest(self, motor_pos: Floats, interrupted: Callable[[], bool]) -> str | None:
+        self.told.calls.append("plant.rest")
+        if self.told.rest is None:
+            return None
+        return self.told.rest(motor_pos, interrupted)
 
     def close(self) -> None:
         self.told.calls.append("plant.close")
@@ -106,6 +115,7 @@ def test_who_is_asked_when() -> None:
     assert told.calls == [
         *("plant.reset", "controller.reset", "clock.start"),
         *("clock.wait 0", *cycle, "clock.wait 1", *cycle, "clock.wait 2", *cycle),
+        "plant.rest",
     ]
     assert (outcome.status, outcome.cause, outcome.message) == ("complete", None, None)
     assert outcome.cycles == 3
@@ -307,17 +317,40 @@ class Unsafe(AbstractPlant):
     def step(self, command: Command) -> Observation:
         raise self._what
 
+    def rest(self, motor_pos: Floats, interrupted: Callable[[], bool]) -> None:
+        raise AssertionError("no run came to its end")
+
     def close(self) -> None:
         self.closed = True
 
 
 @pytest.mark.parametrize("at_reset", [True, False])
-@pytest.mark.parametrize("what", [ValueError("driver"), SystemExit(3)])
-def test_whatever_goes_wrong_closes_the_plant_first(what: BaseException, at_reset: bool) -> None:
-    plant = Unsafe(what, at_reset=at_reset)
-    with pytest.raises(type(what)):
+def test_whatever_goes_wrong_closes_the_plant_first(at_reset: bool) -> None:
+    plant = Unsafe(SystemExit(3), at_reset=at_reset)
+    with pytest.raises(SystemExit):
         run(plant, ToldController(Told()), 10)
     assert plant.closed
+
+
+def test_a_plant_that_raises_what_it_should_not_is_a_fault_that_shows_where() -> None:
+    plant = Unsafe(ValueError("driver"), at_reset=False)
+    outcome = run(plant, ToldController(Told()), 10)
+    assert plant.closed
+    assert (outcome.status, outcome.cause, outcome.cycles) == ("fault", "plant failed", 1)
+    assert outcome.message is not None
+    first, second = outcome.message.splitlines()
+    assert first == "the plant failed after t = 0.000 s: ValueError: driver"
+    assert re.fullmatch(r"  .*test_loop\.py:\d+ in step: raise self\._what", second)
+
+
+def test_a_plant_that_cannot_be_reset_is_closed_and_named() -> None:
+    plant = Unsafe(ValueError("driver"), at_reset=True)
+    with pytest.raises(
+        PlantFault, match="failed on its way to the start: ValueError: driver"
+    ) as it:
+        run(plant, ToldController(Told()), 10)
+    assert plant.closed
+    assert it.value.cause == "plant failed"
 
 
 def test_a_stop_on_the_way_to_the_start_ends_the_run_there() -> None:
@@ -334,6 +367,9 @@ def test_a_stop_on_the_way_to_the_start_ends_the_run_there() -> None:
         def step(self, command: Command) -> Observation:
             raise AssertionError("no cycle may begin")
 
+        def rest(self, motor_pos: Floats, interrupted: Callable[[], bool]) -> None:
+            raise AssertionError("no run came to its end")
+
         def close(self) -> None:
             self.closed = True
 
@@ -341,3 +377,169 @@ def test_a_stop_on_the_way_to_the_start_ends_the_run_there() -> None:
     outcome = run(plant, ToldController(Told()), 10, stop=stop)
     assert (outcome.status, outcome.cycles) == ("interrupted", 0)
     assert plant.closed
+
+
+def test_a_run_that_has_lasted_its_time_ends_at_the_first_posture_and_adds_no_row() -> None:
+    told = Told()
+    postures: list[list[float]] = []
+
+    def rest(motor_pos: Floats, interrupted: Callable[[], bool]) -> str:
+        assert not interrupted()
+        postures.append(motor_pos.tolist())
+        return "it swung"
+
+    told.rest = rest
+    outcome = run(ToldPlant(told), ToldController(told), 3, sink=told)
+    assert (outcome.status, outcome.cause, outcome.message) == ("complete", None, "it swung")
+    assert postures == [[0.0, 0.0]]
+    assert (outcome.cycles, len(told.rows)) == (3, 3)
+
+
+def test_a_fault_on_the_way_to_rest_is_the_runs_and_keeps_its_rows() -> None:
+    told = Told()
+
+    def rest(_motor_pos: Floats, _interrupted: Callable[[], bool]) -> None:
+        raise PlantFault("spring torque", "spring 1 carries 9 N m")
+
+    told.rest = rest
+    outcome = run(ToldPlant(told), ToldController(told), 3, sink=told)
+    assert (outcome.status, outcome.cause) == ("fault", "spring torque")
+    assert outcome.message == "after its last row, on the way to rest: spring 1 carries 9 N m"
+    assert (outcome.cycles, len(told.rows)) == (3, 3)
+
+
+def test_an_interrupt_on_the_way_to_rest_is_heard_there() -> None:
+    told, stop = Told(), StopFlag()
+
+    def rest(_motor_pos: Floats, interrupted: Callable[[], bool]) -> None:
+        assert not interrupted()
+        stop.set()
+        assert interrupted()
+
+    told.rest = rest
+    outcome = run(ToldPlant(told), ToldController(told), 3, sink=told, stop=stop)
+    assert (outcome.status, outcome.message) == ("interrupted", None)
+    assert len(told.rows) == 3
+
+
+@pytest.mark.parametrize("how", ["fault", "interrupt"])
+def test_a_run_that_is_cut_short_is_not_led_to_rest(how: str) -> None:
+    told, stop = Told(fault_at=2 if how == "fault" else None), StopFlag()
+    if how == "interrupt":
+        stop.set()
+    run(ToldPlant(told), ToldController(told), 3, sink=told, stop=stop)
+    assert "plant.rest" not in told.calls
+
+
+# --- only the plant, the controller and the user end a run -----------------------------------
+
+
+class Wrong(AbstractController):
+    """Fails in `reset`, or in cycle 3: raises, or returns what is no command."""
+
+    def __init__(self, answer: object, *, at_reset: bool = False) -> None:
+        self._answer, self._at_reset, self._cycle = answer, at_reset, 0
+
+    @property
+    def start_motor_pos(self) -> Floats:
+        return np.zeros(2)
+
+    def reset(self, observation: Observation) -> None:
+        if self._at_reset:
+            self._fail()
+
+    def step(self, observation: Observation) -> Command:
+        self._cycle += 1
+        if self._cycle < 4:
+            return Command.holding(np.zeros(2))
+        if isinstance(self._answer, BaseException):
+            self._fail()
+        return self._answer  # pyright: ignore[reportReturnType]
+
+    def _fail(self) -> None:
+        assert isinstance(self._answer, BaseException)
+        raise self._answer
+
+
+@pytest.mark.parametrize("error", [ZeroDivisionError("by zero"), RecordingError("x"), KeyError(1)])
+def test_a_controller_that_raises_ends_the_run_as_a_fault_with_its_own_lines(
+    error: Exception,
+) -> None:
+    told = Told()
+    outcome = run(ToldPlant(told), Wrong(error), 10, sink=told)
+    assert (outcome.status, outcome.cause, outcome.cycles) == ("fault", "controller failed", 3)
+    assert outcome.time == pytest.approx(3 * PERIOD)
+    assert [row[0] for row in told.rows] == [k * PERIOD for k in range(3)]
+    assert told.calls[-1] == "plant.close"
+    assert outcome.message is not None
+    first, *lines = outcome.message.splitlines()
+    assert first.startswith("the controller failed at t = 0.003 s: ")
+    assert first.endswith(f"{type(error).__name__}: {error}")
+    assert [re.sub(r".*test_loop\.py:\d+ ", "", line) for line in lines] == [
+        "in step: self._fail()",
+        "in _fail: raise self._answer",
+    ]
+
+
+def test_a_controller_that_raises_at_its_reset_is_a_fault_before_the_first_row() -> None:
+    told = Told()
+    outcome = run(ToldPlant(told), Wrong(ValueError("no"), at_reset=True), 10, sink=told)
+    assert (outcome.status, outcome.cause, outcome.cycles) == ("fault", "controller failed", 0)
+    assert told.rows == []
+    assert told.calls == ["plant.reset", "plant.close"]
+    assert "in reset: self._fail()" in str(outcome.message)
+
+
+def command(motor_pos: object, phase: object = 0) -> Command:
+    return Command(motor_pos=motor_pos, phase=phase)  # pyright: ignore[reportArgumentType]
+
+
+@pytest.mark.parametrize(
+    ("answer", "words"),
+    [
+        (None, "step returned None, not a Command"),
+        ((0.0, 0.0), r"step returned \(0.0, 0.0\), not a Command"),
+        (command([0.0, 0.0]), r"motor_pos is \[0.0, 0.0\], not an array of float64"),
+        (command(np.zeros(2, dtype=np.float32)), "not an array of float64"),
+        (command(np.zeros(3)), r"motor_pos has shape \(3,\), not \(2,\) as was seen"),
+        (command(np.zeros((1, 2))), r"motor_pos has shape \(1, 2\), not \(2,\)"),
+        (
+            command(np.array([0.1, np.nan])),
+            r"motor_pos is array\(\[0.1, nan\]\); it must be finite",
+        ),
+        (command(np.array([-np.inf, 0.0])), "it must be finite"),
+        (command(np.zeros(2), 1.5), "phase is 1.5, not an integer"),
+        (command(np.zeros(2), None), "phase is None, not an integer"),
+        (command(np.zeros(2), np.zeros(2, dtype=int)), r"phase has shape \(2,\), not \(\)"),
+        (command(np.zeros(2), 300), "phase is 300; it must be 0 to 127"),
+        (command(np.zeros(2), -1), "phase is -1; it must be 0 to 127"),
+    ],
+)
+def test_what_is_no_command_ends_the_run_and_names_the_step(answer: object, words: str) -> None:
+    told = Told()
+    outcome = run(ToldPlant(told), Wrong(answer), 10, sink=told)
+    assert (outcome.status, outcome.cause, outcome.cycles) == ("fault", "controller failed", 3)
+    assert len(told.rows) == 3
+    assert told.calls[-1] == "plant.close"
+    assert outcome.message is not None
+    assert re.search(words, outcome.message)
+    assert re.search(r"\n  .*test_loop\.py:\d+ in step: def step\(", outcome.message)
+
+
+@pytest.mark.parametrize("phase", [3, Phase.PUSH, np.int64(3), np.array(3), np.array(3, np.int8)])
+def test_a_phase_may_be_an_integer_of_any_kind(phase: object) -> None:
+    outcome = run(ToldPlant(Told()), Wrong(command(np.zeros(2), phase)), 10)
+    assert outcome.status == "complete"
+
+
+@pytest.mark.parametrize("error", [BrokenPipeError(), AttributeError("no write"), OSError(28, "")])
+def test_progress_that_fails_is_not_asked_again_and_ends_nothing(error: Exception) -> None:
+    told, asked = Told(), []
+
+    def fail(done: int, total: int) -> None:
+        asked.append(done)
+        raise error
+
+    outcome = run(ToldPlant(told), ToldController(told), 3 * PROGRESS_EVERY, progress=fail)
+    assert (outcome.status, outcome.cycles) == ("complete", 3 * PROGRESS_EVERY)
+    assert asked == [PROGRESS_EVERY]

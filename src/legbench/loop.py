@@ -1,26 +1,24 @@
 """The only while-loop: observation in, command out, one row a cycle."""
 
-import signal
-import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
-from types import FrameType
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 from legbench.clock import AbstractClock, VirtualClock
 from legbench.control import AbstractController
-from legbench.errors import PlantFault
+from legbench.control.check import CommandError, check_command
+from legbench.errors import LegbenchError, PlantFault
+from legbench.failures import defined_at, failed, own_lines
+from legbench.interrupts import StopFlag
+from legbench.onlooker import Onlooker
 from legbench.plant.abstract import AbstractPlant
-from legbench.signals import Command, Observation
+from legbench.signals import Command, Floats, Observation
 
 Progress = Callable[[int, int], None]
 """Called now and then, and at the end, with cycles done and cycles in all."""
 PROGRESS_EVERY = 250
 """Cycles between two calls of the progress function."""
-STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-"""^C, a polite end, and the terminal's end."""
 
 
 class RowSink(Protocol):
@@ -46,49 +44,8 @@ class Outcome:
     cycles: int
     wall_time: float
     """[s]"""
-
-
-class StopFlag:
-    """Set by ^C or by whoever holds it; the loop ends before the next cycle.
-
-    Attributes:
-        is_set: whether the loop has been asked to end.
-        raises: whether to ask by KeyboardInterrupt: while a plant goes to its start posture, no
-            loop looks at the flag.
-    """
-
-    def __init__(self) -> None:
-        self.is_set = False
-        self.raises = False
-
-    def set(self) -> None:
-        """Ask the loop to end.
-
-        Raises:
-            KeyboardInterrupt: a plant is being reset.
-        """
-        self.is_set = True
-        if self.raises:
-            raise KeyboardInterrupt
-
-
-@contextmanager
-def stop_on_interrupt() -> Iterator[StopFlag]:
-    """Turn ^C, SIGTERM and SIGHUP into a flag, so that the loop ends between two rows."""
-    flag = StopFlag()
-    if threading.current_thread() is not threading.main_thread():
-        yield flag
-        return
-
-    def handle(_signal: int, _frame: FrameType | None) -> None:
-        flag.set()
-
-    previous = {name: signal.signal(name, handle) for name in STOP_SIGNALS}
-    try:
-        yield flag
-    finally:
-        for name, handler in previous.items():
-            signal.signal(name, handler)
+    time: float = 0.0
+    """Plant time of the last observation [s]."""
 
 
 def run(
@@ -103,27 +60,46 @@ def run(
 ) -> Outcome:
     """Control a plant for a number of cycles.
 
-    The first fault ends the run and is returned as its cause; every row until then is kept. An
-    exception of any kind closes the plant before anything else happens: drives come to rest
-    while disks are still busy.
+    A run that has lasted its time then comes to rest in the controller's first posture
+    (`AbstractPlant.rest`), which adds no row. A stop that comes before the first row ends the run
+    there, with no cycle; from the first row on it ends the run between two rows.
+
+    The first fault ends the run and is returned as its cause; every row until then is kept. What
+    the controller raises, or returns instead of a command, is a fault, too ("controller failed"),
+    and so is what the plant raises beside its faults ("plant failed"). Faults and exceptions of
+    any kind close the plant before anything else happens: drives come to rest while disks are
+    still busy. `progress` ends nothing, whatever it raises.
 
     Raises:
         PlantFault: the plant did not get to its start.
         RecordingError: the recording failed.
     """
     clock, stop = clock or VirtualClock(), stop or StopFlag()
+    began = False
     try:
         stop.raises = True
-        observation = plant.reset()
-        stop.raises = False
-        controller.reset(observation)
-        return _cycle(plant, controller, observation, cycles, clock, sink, stop, progress)
+        observation = _start(plant)
+        began, stop.raises = True, False
+        watched = progress if isinstance(progress, Onlooker) else Onlooker("progress", progress)
+        outcome = _cycle(plant, controller, observation, cycles, clock, sink, stop, watched)
+        return _to_rest(plant, controller.start_motor_pos, outcome, stop)
     except BaseException as error:
         stop.raises = False
         plant.close()
-        if isinstance(error, KeyboardInterrupt) and stop.is_set:
+        if not began and isinstance(error, KeyboardInterrupt) and stop.is_set:
             return Outcome(status="interrupted", cause=None, message=None, cycles=0, wall_time=0.0)
         raise
+
+
+def _start(plant: AbstractPlant) -> Observation:
+    """Reset a plant; raises PlantFault also where it raises what no plant should."""
+    try:
+        return plant.reset()
+    except LegbenchError:
+        raise
+    except Exception as error:
+        plant.close()
+        raise failed("plant", "on its way to the start", error, own_lines(error)) from error
 
 
 def _cycle(
@@ -134,27 +110,34 @@ def _cycle(
     clock: AbstractClock,
     sink: RowSink | None,
     stop: StopFlag,
-    progress: Progress | None,
+    progress: Onlooker,
 ) -> Outcome:
     """The loop itself, from the first observation on."""
     began = time.perf_counter()
     previous = began
     cycle_us = 0.0
     cycle = 0
-    fault: PlantFault | None = None
+    fault = _reset(plant, controller, observation)
     clock.start()
-    while cycle < cycles and not stop.is_set:
+    while fault is None and cycle < cycles and not stop.is_set:
         late = clock.wait(cycle)
-        command = controller.step(observation)
+        try:
+            command = controller.step(observation)
+            check_command(command, observation)
+        except Exception as error:  # Whatever it is, the drives stop first.
+            plant.close()
+            fault = _controller_failed(controller, error, observation)
+            break
         if sink is not None:
             sink.append(command, observation, cycle_us, 1e6 * late)
         cycle += 1
         try:
             observation = plant.step(command)
-        except PlantFault as error:
-            fault = error
+        except Exception as error:
+            plant.close()
+            fault = _plant_failed(error, observation)
             break
-        if progress is not None and (cycle % PROGRESS_EVERY == 0 or cycle == cycles):
+        if cycle % PROGRESS_EVERY == 0 or cycle == cycles:
             progress(cycle, cycles)
         now = time.perf_counter()
         cycle_us, previous = 1e6 * (now - previous), now
@@ -166,4 +149,50 @@ def _cycle(
     else:
         ending = ("complete", None, None)
     status, cause, message = ending
-    return Outcome(status=status, cause=cause, message=message, cycles=cycle, wall_time=wall_time)
+    return Outcome(
+        status=status,
+        cause=cause,
+        message=message,
+        cycles=cycle,
+        wall_time=wall_time,
+        time=observation.time,
+    )
+
+
+def _to_rest(plant: AbstractPlant, motor_pos: Floats, outcome: Outcome, stop: StopFlag) -> Outcome:
+    """End a run that has lasted its time at rest; ^C and faults end it at once, there as well."""
+    if outcome.status != "complete":
+        return outcome
+    try:
+        message = plant.rest(motor_pos, lambda: stop.is_set)
+    except PlantFault as error:
+        text = f"after its last row, on the way to rest: {error}"
+        return replace(outcome, status="fault", cause=error.cause, message=text)
+    return replace(outcome, status="interrupted" if stop.is_set else "complete", message=message)
+
+
+def _reset(
+    plant: AbstractPlant, controller: AbstractController, observation: Observation
+) -> PlantFault | None:
+    """Show a controller the leg at rest; the fault with which the run ends if it cannot take it."""
+    try:
+        controller.reset(observation)
+    except Exception as error:
+        plant.close()
+        return _controller_failed(controller, error, observation)
+    return None
+
+
+def _controller_failed(
+    controller: AbstractController, error: Exception, seen: Observation
+) -> PlantFault:
+    """Return the fault that shows a controller's own lines; where it was told, its `step`."""
+    told = isinstance(error, CommandError | PlantFault)
+    lines = defined_at(type(controller.law).step) if told else own_lines(error)
+    return failed("controller", f"at t = {seen.time:.3f} s", error, lines, told=told)
+
+
+def _plant_failed(error: Exception, seen: Observation) -> PlantFault:
+    if isinstance(error, PlantFault):
+        return error
+    return failed("plant", f"after t = {seen.time:.3f} s", error, own_lines(error))

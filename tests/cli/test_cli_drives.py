@@ -17,6 +17,8 @@ from legbench.drives.master.lock import ChannelLock
 from legbench.drives.realtime import Granted
 from legbench.drives.session import Session
 from legbench.plant import can_open
+from legbench.plants import IDLE_POS
+from legbench.recording.reader import load
 
 HARDWARE = Path(__file__).parents[2] / "hardware"
 MODELS = Path(__file__).parents[2] / "models"
@@ -86,8 +88,11 @@ def test_zero_writes_offsets_and_keeps_the_comments(
     done = called(capfd, "drives", "zero", "--posture", "-0.4", "0.4", *where)
     assert done.status == 0, done.err
     nodes = load_bus(path).nodes
-    assert abs(nodes[0].motor.to_rad(0) + 0.4) < nodes[0].motor.resolution
-    assert abs(nodes[1].link.to_rad(0) - 0.4) < nodes[1].link.resolution
+    before = load_bus(BUS).nodes
+    motor = before[0].motor.to_counts(IDLE_POS[0])
+    assert abs(nodes[0].motor.to_rad(motor) + 0.4) < nodes[0].motor.resolution
+    link = before[1].link.to_counts(IDLE_POS[1])
+    assert abs(nodes[1].link.to_rad(link) - 0.4) < nodes[1].link.resolution
     assert path.read_text().count("#") == BUS.read_text().count("#")
 
 
@@ -160,6 +165,21 @@ def test_jitter_in_virtual_time_is_punctual(drives: Drives, tmp_path: Path) -> N
     assert told["skipped"] == 0
     assert told["granted"] is None
     assert plot.stat().st_size > 1000
+
+
+def test_jitter_measures_with_a_recording_and_without(drives: Drives, tmp_path: Path) -> None:
+    done = drives(
+        "jitter", "--cycles", "120", "--recording", "both", "--out", tmp_path / "kept", "--json"
+    )
+    assert done.status == 0, done.err
+    tables = json.loads(done.out)["recording"]
+    assert {name: table["lost"] for name, table in tables.items()} == {"with": 0, "without": 0}
+    (run,) = (tmp_path / "kept").iterdir()
+    assert len(load(run).time) == 120
+    assert f"wrote {run}" in done.err
+    done = drives("jitter", "--cycles", "60", "--recording", "without")
+    assert "without a recording" in done.out
+    assert "with a recording" not in done.out
 
 
 def test_budget_is_the_worst_case_and_refuses_too_much(

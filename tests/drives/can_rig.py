@@ -1,9 +1,11 @@
 """An emulated leg behind CAN frames, as the tests of the whole plant want it."""
 
+import itertools
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import final
 
 from legbench.control import AbstractController
 from legbench.design import LegDesign, load_design
@@ -24,6 +26,7 @@ from legbench.drives.emulated.build import emulate
 from legbench.drives.emulated.network import Network
 from legbench.drives.limits import SafetyLimits
 from legbench.drives.session import Session
+from legbench.drives.timebase import NetworkTime
 from legbench.drives.units import AxisUnits
 from legbench.experiment import (
     ControllerSettings,
@@ -65,6 +68,21 @@ def experiment(controller: ControllerSettings, duration: float = 1.0) -> Experim
         setup=Setup(kind=controller.usual_setup),
         duration=duration,
     )
+
+
+@final
+class LateTime:
+    """Virtual time whose waits end late, by what `late_ns` says of one after the other."""
+
+    def __init__(self, network: Network) -> None:
+        self._time = NetworkTime(network)
+        self.late_ns: Iterator[int] = itertools.repeat(0)
+
+    def now_ns(self) -> int:
+        return self._time.now_ns()
+
+    def wait_until(self, at_ns: int) -> None:
+        self._time.wait_until(at_ns + next(self.late_ns))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -247,7 +247,7 @@ def test_a_search_that_is_too_fast_is_refused() -> None:
 
 
 def test_a_leg_can_be_jogged_after_homing() -> None:
-    session, network = opened()
+    session, network = opened(starts=(0.0, 0.4))
     with session:
         homed(session, method=37)
     with Session(LockstepBus("leg", network=network), session.config) as session:
@@ -276,9 +276,10 @@ def test_a_signal_stops_all_drives_before_the_command_ends(
 ) -> None:
     made: list[Network] = []
 
-    def the_bench(config: BusConfig, *, configured: bool) -> Network:
+    def the_bench(config: BusConfig, _idle: object, *, configured: bool) -> Network:
         assert not configured
-        behaviours = [Behaviour(hard_stop=(-STOP, STOP)) for _ in config.nodes]
+        stops = (-STOP, STOP)
+        behaviours = [Behaviour(start_pos=start, hard_stop=stops) for start in (0.0, 0.9 * STOP)]
         made.append(emulate(config, behaviours, keep_log=True))
         return made[0]
 
@@ -339,9 +340,30 @@ def test_a_jog_is_refused_while_any_motor_is_outside_its_range(
 
 
 @pytest.mark.parametrize(
+    ("starts", "by", "said"),
+    [
+        (
+            (0.0, 0.1),
+            -0.1,
+            r"the motors stand with q2 - q1 at 0\.100 rad, the limits are \[0\.2, 3\]",
+        ),
+        ((0.0, 0.4), 0.3, r"would take q2 - q1, the knee, from 0\.400 to 0\.100 rad"),
+    ],
+)
+def test_a_jog_does_not_lead_the_knee_into_its_stop(
+    starts: tuple[float, float], by: float, said: str
+) -> None:
+    session, network = opened(starts=starts)
+    with session, pytest.raises(ConfigError, match=said):
+        jogged_by(session, by)
+    assert [words(network, node) for node in (1, 2)] == [[], []]
+
+
+@pytest.mark.parametrize(
     "name",
     [
         *("command_speed", "command_step", "spring_torque", "following_error"),
+        *("joint_speed", "standing", "sway"),
         *("motor_range", "joint_range"),
     ],
 )

@@ -1,5 +1,6 @@
 """The drives change nothing but one cycle of delay and the encoders' resolution."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import final
@@ -22,7 +23,7 @@ from legbench.recording.manifest import OWN_KEYS
 from legbench.recording.reader import Recording, load
 from legbench.recording.writer import RunWriter
 from legbench.servo import ServoConfig
-from legbench.signals import Command, Observation
+from legbench.signals import Command, Floats, Observation
 
 SIGNALS = ("command_pos", "applied_pos", "motor_pos", "joint_pos", "spring_torque")
 RESOLUTION = load_bus(BUS).nodes[0].link.resolution
@@ -67,6 +68,9 @@ class Settled(AbstractPlant):
     def step(self, command: Command) -> Observation:
         self._cycle += 1
         return self._shifted(self._plant.step(command))
+
+    def rest(self, motor_pos: Floats, interrupted: Callable[[], bool]) -> None:
+        self._plant.rest(motor_pos, interrupted)
 
     def close(self) -> None:
         self._plant.close()

@@ -17,13 +17,15 @@ from legbench.drives.link import LinkState
 from legbench.errors import ConfigError, PlantFault
 from legbench.experiment import record, start_of
 from legbench.loop import run
+from legbench.plant.landing import End
 from legbench.plant.limited import LimitedPlant
 from legbench.plant.sim import SimPlant
 from legbench.plants import CanChoice, SimChoice, joint_ranges, limits_for
 from legbench.recording.reader import load
-from legbench.signals import Command
+from legbench.signals import Command, Observation
 
-EMULATED = CanChoice(bus=BUS, interface="legbench")
+EMULATED = CanChoice(bus=BUS, interface="legbench", end=End.STOP)
+"""What follows the last row is told in test_can_landing."""
 
 
 def test_a_jump_over_frames_leaves_a_whole_recording(tmp_path: Path) -> None:
@@ -36,7 +38,7 @@ def test_a_jump_over_frames_leaves_a_whole_recording(tmp_path: Path) -> None:
     said = run_folder.manifest["plant"]
     assert said["bus"]["interface"] == "legbench"
     assert said["limits"]["spring_torque"] == load_limits(LIMITS).spring_torque
-    assert {event["name"] for event in run_folder.events} == {"bus", "end"}
+    assert {event["name"] for event in run_folder.events} == {"bus", "end", "limited"}
     log = (finished.path / "bus.log").read_text(encoding="ascii").splitlines()
     assert sum(line.endswith("080#") for line in log) > 1000
 
@@ -97,6 +99,36 @@ def test_closing_stops_both_drives_in_the_same_cycle_and_twice_is_once() -> None
         states = [drive.axis.power.state for drive in it.network.drives]
         assert states == [DriveState.SWITCH_ON_DISABLED] * 2
         assert it.plant.link.state is LinkState.STOPPED
+
+
+@pytest.mark.parametrize("answer", [LookupError("no such phase"), None])
+def test_a_controller_that_fails_stops_both_drives_in_that_cycle(
+    answer: Exception | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with stage(experiment(JumpConfig())) as it:
+        usual, failed_ns = it.controller.step, []
+
+        def fail(observation: Observation) -> object:
+            if observation.time < 0.1:
+                return usual(observation)
+            failed_ns.append(it.network.now_ns)
+            if answer is not None:
+                raise answer
+            return answer
+
+        monkeypatch.setattr(it.controller, "step", fail)
+        outcome = run(it.plant, it.controller, 1000)
+        assert (outcome.status, outcome.cause) == ("fault", "controller failed")
+        assert (outcome.cycles, len(failed_ns)) == (100, 1)
+        stops = {
+            frame.cob_id: at_ns
+            for at_ns, frame in reversed(it.network.log or [])
+            if frame.cob_id in (0x201, 0x202) and frame.data[:2] == b"\x02\x00"
+        }
+        assert set(stops) == {0x201, 0x202}
+        assert all(0 <= at_ns - failed_ns[0] < MS for at_ns in stops.values())
+        states = [drive.axis.power.state for drive in it.network.drives]
+        assert states == [DriveState.SWITCH_ON_DISABLED] * 2
 
 
 def stand(it: Stage, cycles: int) -> None:

@@ -17,6 +17,17 @@ from pathlib import Path
 import pytest
 from can_rig import BUS, LIMITS, ROOT
 
+from legbench.commissioning import configure, jitter, zero
+from legbench.commissioning.home import home
+from legbench.commissioning.jog import jog
+from legbench.design import load_design
+from legbench.drives.bus_file import load_bus
+from legbench.drives.master.lock import ChannelLock
+from legbench.drives.session import Session
+from legbench.drives.unix_bus import UnixBus
+from legbench.errors import PlantFault
+from legbench.plants import limits_for
+from legbench.recording.events import read_events
 from legbench.recording.repair import recover
 
 PATIENCE = 30.0
@@ -47,7 +58,8 @@ class Served:
 def calm(folder: Path) -> Path:
     """The bench's files, patient enough for a busy machine."""
     text = BUS.read_text(encoding="utf-8")
-    text = text.replace("master_heartbeat_ms = 10", "master_heartbeat_ms = 200")
+    waived = 'waive = ["master watch", "drive heartbeat"]'
+    text = text.replace("master_heartbeat_ms = 10", f"master_heartbeat_ms = 200\n{waived}")
     text = text.replace("heartbeat_ms = 20\n", "heartbeat_ms = 500\n", 1)
     rpdo = '\n[[node.rpdo]]\nnumber = 1\nobjects = ["6040:00 u16", "607A:00 i32"]\n'
     text = text.replace("\n[node.parameters]", rpdo + "deadline_ms = 1000\n\n[node.parameters]")
@@ -58,7 +70,8 @@ def calm(folder: Path) -> Path:
         loose = "\n".join(
             f"{name} = 3000" if line.startswith(name) else line for line in loose.splitlines()
         )
-    (folder / "limits.toml").write_text(loose, encoding="utf-8")
+    waive = 'waive = ["lost_frames", "overrun_cycles", "following_cycles"]\n'
+    (folder / "limits.toml").write_text(loose + "\n" + waive, encoding="utf-8")
     return folder / "leg.toml"
 
 
@@ -203,3 +216,48 @@ def test_looking_beside_a_master_changes_nothing_for_it(tmp_path: Path) -> None:
     assert json.loads((kept / "run.json").read_text())["status"] == "interrupted"
     # The drives stayed enabled from the master's start to its ^C.
     assert [state for _, state in drives.seen].count("operation enabled") == 2
+
+
+def test_nobody_acts_beside_a_master_of_another_computer(tmp_path: Path) -> None:
+    """The lock keeps others of this computer away; those of another one have only the wire."""
+    with served(tmp_path, seconds=3 * PATIENCE) as drives:
+        drives.await_state("switch on disabled")
+        run = master(tmp_path)
+        try:
+            drives.await_state("operation enabled")
+            rows_on_disk(tmp_path)
+            config = load_bus(tmp_path / "leg.toml")
+            limits = limits_for(
+                tmp_path / "limits.toml", load_design(ROOT / "models" / "optimal.toml")
+            )
+            for act in (
+                configure.write,
+                lambda it: home(it, config.nodes[0], 37),
+                lambda it: jog(it, limits, (4.0, 5.0), "motor1", by=0.01, speed=0.1, back=True),
+                lambda it: jitter.measure(it, (4.0, 5.0), 10),
+                lambda it: zero.measure(it, (0.0, 0.0)),
+                lambda it: it.link(limits, (4.0, 5.0)).start(),
+            ):
+                bus = UnixBus(str(tmp_path / "leg.sock"))
+                with (
+                    Session(bus, config, lock=ChannelLock.private("another computer")) as session,
+                    pytest.raises(PlantFault, match="somebody else sends") as caught,
+                ):
+                    act(session)
+                assert caught.value.cause == "second master"
+            assert run.poll() is None
+            os.kill(run.pid, signal.SIGINT)
+            drives.await_state("switch on disabled")
+            _, trouble = run.communicate(timeout=PATIENCE)
+        finally:
+            end(run)
+    assert run.returncode == 0, trouble
+    manifest = json.loads((run_folder(tmp_path) / "run.json").read_text())
+    assert manifest["status"] == "interrupted"
+    assert [state for _, state in drives.seen].count("operation enabled") == 2
+    # What the files waive is said before the run, in its manifest and in its events.
+    assert "the bus file waives the master watch: drives may go on for 601 ms" in trouble
+    assert manifest["bus"]["waived"] == ["master watch", "drive heartbeat"]
+    assert manifest["limits"]["waive"] == ["lost_frames", "overrun_cycles", "following_cycles"]
+    (told,) = [event for event in read_events(run_folder(tmp_path))[0] if event["name"] == "waived"]
+    assert len(told["protections"]) == 5

@@ -1,10 +1,12 @@
 import math
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from legbench.drives.limits import Guard, SafetyLimits
+from legbench.drives.guard import Guard
+from legbench.drives.limits import SafetyLimits
 from legbench.errors import ConfigError, PlantFault
 
 PERIOD = 1e-3
@@ -17,6 +19,9 @@ LIMITS = SafetyLimits(
     spring_torque=8.0,
     following_error=0.1,
     following_cycles=3,
+    joint_speed=100.0,
+    standing=0.05,
+    sway=0.1,
     temperature=80.0,
 )
 ANYTHING = st.floats(allow_nan=True, allow_infinity=True)
@@ -87,12 +92,19 @@ def test_no_wish_may_jump_not_even_the_first(first: tuple[float, ...]) -> None:
 
 def test_limits_that_real_drives_need_are_named_when_they_are_missing() -> None:
     LIMITS.require_complete()
-    words = "limits leave out command_step, spring_torque; real drives are not led without"
+    words = (
+        "limits leave out command_step, spring_torque, joint_speed, standing, sway; real drives "
+        "are not led without"
+    )
     with pytest.raises(ConfigError, match=words):
         SafetyLimits(command_speed=1.0, following_error=0.1).require_complete()
 
 
-GOOD = {"motor_pos": (0.0, 1.0), "joint_pos": (0.0, 1.0), "spring_torque": (0.0, 0.0)}
+GOOD: dict[str, Any] = {
+    "motor_pos": (0.0, 1.0),
+    "joint_pos": (0.0, 1.0),
+    "spring_torque": (0.0, 0.0),
+}
 
 
 @pytest.mark.parametrize(
@@ -115,10 +127,36 @@ def test_every_limit_has_its_cause(change: dict[str, object], cause: str, words:
 
 def test_a_following_error_may_last_its_cycles() -> None:
     guard = Guard(LIMITS, PERIOD)
+    guard.start_at((0.0, 1.0))
+    away = {**GOOD, "motor_pos": (0.2, 1.0)}
     for _ in range(3):
-        guard.check(**GOOD, expected_pos=(0.2, 1.0))
-    guard.check(**GOOD, expected_pos=(0.05, 1.0))
+        guard.check(**away, expected_pos=(0.0, 1.0))
+    guard.check(**GOOD, expected_pos=(0.0, 1.0))
     for _ in range(3):
-        guard.check(**GOOD, expected_pos=(0.2, 1.0))
-    with pytest.raises(PlantFault, match=r"0\.200 rad away from its command for 4 cycles"):
-        guard.check(**GOOD, expected_pos=(0.2, 1.0))
+        guard.check(**away, expected_pos=(0.0, 1.0))
+    words = r"motor 1 shows 0\.200 rad and is 0\.200 rad away .* for 4 cycles"
+    with pytest.raises(PlantFault, match=words) as caught:
+        guard.check(**away, expected_pos=(0.0, 1.0))
+    assert caught.value.cause == "following error"
+
+
+def test_a_wish_that_is_changed_is_counted() -> None:
+    guard = Guard(LIMITS, PERIOD)
+    guard.start_at((0.0, 1.0))
+    guard.command((0.0, 1.0))
+    assert guard.shortfall.told() is None
+    guard.command((0.05, 1.0))  # slewed: 0.01 rad a cycle
+    guard.command((0.02, 1.4))
+    for _ in range(100):
+        guard.command((0.02, 1.9))
+    guard.command((0.02, 2.3))
+    assert guard.shortfall.told() == {
+        "cycles": 91,
+        "of": 104,
+        "first": pytest.approx(1 * PERIOD),
+        "clamped": [0, 1],
+        "slewed": [1, 90],
+        "worst": [pytest.approx(0.04), pytest.approx(0.88)],
+    }
+    guard.start_at((0.0, 1.0))
+    assert guard.shortfall.told() is None

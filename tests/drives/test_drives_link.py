@@ -164,7 +164,7 @@ def test_the_same_run_gives_the_same_bytes(tmp_path: Path) -> None:
                     link.exchange()
         bus.shutdown()
         digests.append(hashlib.sha256(log.read_bytes()).hexdigest())
-        assert list(can.CanutilsLogReader(log))[-1].arbitration_id == 0x000
+        assert list(can.CanutilsLogReader(log))[-1].arbitration_id == 0x582
     assert digests[0] == digests[1]
 
 
@@ -200,7 +200,10 @@ def test_a_drive_that_ignores_quick_stop_loses_its_voltage(tmp_path: Path) -> No
         after = [(at_ns - began, word) for at_ns, word in words if at_ns > began]
         assert after[0][1] == Controlword.QUICK_STOP
         first_off = next(at_ns for at_ns, word in after if word == Controlword.DISABLE_VOLTAGE)
-        assert first_off == pytest.approx(51 * MS, abs=2 * MS)
+        assert first_off == pytest.approx(40 * MS, abs=2 * MS)
+        assert it.link.stopped is not None
+        assert it.link.stopped.verified
+        assert it.link.stopped.cut_off == ("hip",)
 
 
 def test_a_missing_node_is_named(tmp_path: Path) -> None:

@@ -324,5 +324,5 @@ def test_nothing_else_gets_past_the_port(tmp_path: Path) -> None:
 def test_jitter_is_not_measured_on_the_sync_of_another(tmp_path: Path) -> None:
     with beside(tmp_path) as (_, it):
         session = Session(it.bus, it.config, lock=ChannelLock("rig", tmp_path))
-        with pytest.raises(DriveError, match="another master sends SYNC on this bus"):
+        with pytest.raises(PlantFault, match=r"somebody else sends 000h \(NMT order\)"):
             measure(session, STIFFNESS, 10)

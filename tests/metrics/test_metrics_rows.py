@@ -43,6 +43,27 @@ def test_extreme_of_a_parabola_is_exact(offset: float, top: float, bend: float) 
     assert height == pytest.approx(top, abs=1e-9)
 
 
+UNEVEN = np.array([0.0, 1.0, 2.4, 3.0, 4.0, 6.0, 6.7])
+"""Times of rows between which ticks were late or missed."""
+
+
+@settings(derandomize=True)
+@given(st.floats(1.8, 4.9), st.floats(-2.0, 2.0), st.sampled_from([-3.0, -0.1, 0.1, 3.0]))
+def test_extreme_between_uneven_rows_is_exact(summit: float, top: float, bend: float) -> None:
+    value = top + bend * np.square(UNEVEN - summit)
+    row = int(np.argmin(bend * (value - top)))
+    at, height = extreme(UNEVEN, value, row)
+    assert at == pytest.approx(summit, abs=1e-9)
+    assert height == pytest.approx(top, abs=1e-9)
+
+
+@pytest.mark.parametrize(("row", "zero"), [(2, 2.3), (3, 2.5), (4, 3.9), (5, 4.1)])
+def test_zero_between_uneven_rows_is_exact(row: int, zero: float) -> None:
+    falling = np.where(zero > UNEVEN, 1.7 * (zero - UNEVEN), 7.0)
+    found = zeros_before(UNEVEN, falling, np.array([row]), otherwise=0.5)
+    assert found[0] == pytest.approx(zero, abs=1e-12)
+
+
 def test_extreme_at_an_end_or_on_a_line_is_the_sample() -> None:
     time, line = np.arange(4.0), np.arange(4.0)
     assert extreme(time, line, 3) == (3.0, 3.0)

@@ -1,12 +1,17 @@
 """What every plant promises at the seam."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from plants import PLANTS, Case, arrays, copied, same, wobble
 
+from legbench.drives.limits import SafetyLimits
+from legbench.plant.abstract import AbstractPlant
+from legbench.plant.limited import LimitedPlant
 from legbench.plant.start import PERIOD
 from legbench.servo import ServoConfig
-from legbench.signals import Command
+from legbench.signals import Command, Floats, Observation
 
 IDEAL = ServoConfig()
 LIMITED = ServoConfig(slew_rate=6.0, bandwidth=40.0, delay_cycles=2, encoder_counts=4096)
@@ -157,3 +162,52 @@ def test_encoders_round_to_whole_counts(case: Case) -> None:
             ):
                 assert np.allclose(coarse / count, np.round(coarse / count), atol=1e-9)
                 assert np.max(np.abs(coarse - fine)) <= 0.5 * count * (1.0 + 1e-9)
+
+
+@EVERY_PLANT
+@pytest.mark.parametrize("limited", [False, True], ids=["bare", "limited"])
+def test_a_computed_leg_is_left_as_it_is_at_the_end(case: Case, limited: bool) -> None:
+    """`rest` asks nobody, says nothing, and the next step goes on as if it had not been called."""
+
+    def asked() -> bool:
+        raise AssertionError("nothing happens that could be interrupted")
+
+    with case.make(IDEAL) as plain, case.make(IDEAL) as other:
+        if limited and case.stiffness.ndim > 1:
+            pytest.skip("limits are of one leg")
+        ended = LimitedPlant(other, SafetyLimits()) if limited else other
+        rest = plain.reset().motor_pos
+        ended.reset()
+        for cycle in range(20):
+            expected, seen = (each.step(wobble(rest, cycle)) for each in (plain, ended))
+            assert same(copied(expected), copied(seen))
+            assert ended.rest(rest, asked) is None
+
+
+def test_a_plant_with_limits_passes_rest_on() -> None:
+    given: list[object] = []
+
+    class Resting(AbstractPlant):
+        period = PERIOD
+
+        def reset(self) -> Observation:
+            raise AssertionError("not asked")
+
+        def step(self, command: Command) -> Observation:
+            raise AssertionError("not asked")
+
+        def rest(self, motor_pos: Floats, interrupted: Callable[[], bool]) -> str:
+            given.extend((motor_pos, interrupted))
+            return "it swung"
+
+        def close(self) -> None:
+            """Nothing to release."""
+
+    posture = np.array([0.1, -0.2])
+
+    def interrupted() -> bool:
+        return False
+
+    assert LimitedPlant(Resting(), SafetyLimits()).rest(posture, interrupted) == "it swung"
+    assert given[0] is posture
+    assert given[1] is interrupted

@@ -212,9 +212,12 @@ def test_a_command_that_is_no_number_ends_the_run(value: float) -> None:
     plant = SimPlant(PROTOTYPE, built(), start)
     bad = np.array([start.motor_pos[0], value])
     outcome = run(plant, Commanding(start.motor_pos, start.motor_pos, bad), 10)
-    assert (outcome.status, outcome.cause) == ("fault", "command not finite")
+    assert (outcome.status, outcome.cause) == ("fault", "controller failed")
     assert outcome.message is not None
     assert "at t = 0.002 s" in outcome.message
+    with pytest.raises(PlantFault, match="must give finite numbers") as caught:
+        plant.step(Command.holding(bad))
+    assert caught.value.cause == "command not finite"
 
 
 @pytest.mark.parametrize("speed", [1e7, np.nan])

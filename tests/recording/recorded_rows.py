@@ -46,9 +46,9 @@ def append_rows(writer: RunWriter, count: int, *, start: int = 0, truth: bool = 
         writer.append(*cycle(row, truth=truth))
 
 
-def paced(parent: Path) -> None:
+def paced(parent: Path, *, realtime: bool) -> None:
     """Append at 1 kHz for ever, telling each row after it was appended."""
-    writer = RunWriter.create(parent, {})
+    writer = RunWriter.create(parent, {}, realtime=realtime)
     begin = time.monotonic()
     for row in range(1_000_000):
         writer.append(*cycle(row))
@@ -58,10 +58,10 @@ def paced(parent: Path) -> None:
         time.sleep(max(0.0, begin + row / RATE - time.monotonic()))
 
 
-def starved(parent: Path) -> None:
+def starved(parent: Path, *, realtime: bool) -> None:
     """Append until no file may grow any more, then close as a control loop would."""
     resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, resource.RLIM_INFINITY))
-    until_full(RunWriter.create(parent, {}))
+    until_full(RunWriter.create(parent, {}, realtime=realtime))
 
 
 def until_full(writer: RunWriter) -> None:
@@ -77,4 +77,5 @@ def until_full(writer: RunWriter) -> None:
 
 
 if __name__ == "__main__":
-    {"paced": paced, "starved": starved}[sys.argv[1]](Path(sys.argv[2]))
+    program = {"paced": paced, "starved": starved}[sys.argv[1]]
+    program(Path(sys.argv[2]), realtime=sys.argv[3] == "process")

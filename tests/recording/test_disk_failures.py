@@ -1,3 +1,4 @@
+import fcntl
 import os
 import subprocess
 import sys
@@ -11,7 +12,8 @@ import recorded_rows
 from recorded_rows import append_rows, cycle
 
 from legbench.errors import RecordingError
-from legbench.recording.disk import MAX_WAITING, Disk
+from legbench.recording.abstract_disk import MAX_WAITING
+from legbench.recording.disk import Disk
 from legbench.recording.files import Appender, append_to
 from legbench.recording.manifest import new_manifest, read_manifest
 from legbench.recording.reader import load
@@ -43,8 +45,9 @@ def check_starved(run: Path, appended: int, message: str) -> None:
     assert not found.complete
 
 
-def test_a_file_that_may_not_grow(tmp_path: Path) -> None:
-    command = [sys.executable, recorded_rows.__file__, "starved", str(tmp_path)]
+@pytest.mark.parametrize("kind", ["thread", "process"])
+def test_a_file_that_may_not_grow(tmp_path: Path, kind: str) -> None:
+    command = [sys.executable, recorded_rows.__file__, "starved", str(tmp_path), kind]
     done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
     appended, message = done.stdout.splitlines()
     (run,) = tmp_path.iterdir()
@@ -83,7 +86,6 @@ def test_a_full_disk(small_disk: Path, capfd: pytest.CaptureFixture[str]) -> Non
     assert not (writer.path / "samples.arrows").exists()
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
 def append_slowly(writer: RunWriter, count: int) -> None:
     """Append rows and let the disk thread have its turn, which a tight loop may not give it."""
     for _ in range(count // BATCH_ROWS):
@@ -91,26 +93,52 @@ def append_slowly(writer: RunWriter, count: int) -> None:
         time.sleep(1e-3)
 
 
-def test_an_error_is_told_once_by_append_or_else_by_close(tmp_path: Path) -> None:
-    for told_by_append in (True, False):
-        run = tmp_path / str(told_by_append)
-        run.mkdir()
-        full = Appender(os.open("/dev/full", os.O_WRONLY))
-        writer = writer_onto(run, append_to(run / "samples.arrows"), full)
-        append_rows(writer, 60)
-        writer.event(0.06, "touchdown")
-        if told_by_append:
-            with pytest.raises(RecordingError, match=r"No space left .* \[ENOSPC\]; 50 rows"):
-                append_slowly(writer, 100_000)
-            with pytest.raises(RecordingError, match="ENOSPC"):
-                append_rows(writer, 1)
-            writer.close("fault", "recording")
-        else:
-            with pytest.raises(RecordingError, match=r"ENOSPC\]; \d+ rows are safe"):
-                writer.close()
-        manifest = read_manifest(run)
-        assert manifest is not None
-        assert (manifest["status"], manifest["cause"]) == ("fault", "recording")
+def seal(descriptor: int) -> None:
+    """Let a file in memory take nothing any more: every write is refused with EPERM."""
+    add_seals, write_and_grow = 1033, 0x8 | 0x4  # fcntl(2); the module lacks the names in 3.11
+    fcntl.fcntl(descriptor, add_seals, write_and_grow)
+
+
+@pytest.mark.parametrize("told_by_append", [True, False])
+def test_an_error_is_told_once_by_append_or_else_by_close(
+    tmp_path: Path, told_by_append: bool
+) -> None:
+    samples = os.memfd_create("samples", os.MFD_ALLOW_SEALING)
+    writer = writer_onto(tmp_path, Appender(samples), append_to(tmp_path / "events.jsonl"))
+    append_rows(writer, 49)
+    seal(samples)
+    append_rows(writer, 1)
+    if told_by_append:
+        with pytest.raises(RecordingError, match=r"not permitted \[EPERM\]; 0 rows are safe"):
+            append_slowly(writer, 100_000)
+        with pytest.raises(RecordingError, match="EPERM"):
+            append_rows(writer, 1)
+        writer.close("fault", "recording")
+    else:
+        with pytest.raises(RecordingError, match=r"EPERM\]; 0 rows are safe"):
+            writer.close()
+    manifest = read_manifest(tmp_path)
+    assert manifest is not None
+    assert (manifest["status"], manifest["cause"]) == ("fault", "recording")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
+def test_events_that_cannot_be_written_end_no_run_and_are_told_at_its_end(tmp_path: Path) -> None:
+    full = Appender(os.open("/dev/full", os.O_WRONLY))
+    writer = writer_onto(tmp_path, append_to(tmp_path / "samples.arrows"), full)
+    append_rows(writer, 60)
+    writer.event(0.06, "touchdown")
+    for row in range(60, 260, 20):
+        append_rows(writer, 20, start=row)
+        time.sleep(1e-3)
+    with pytest.raises(
+        RecordingError, match=r"events were lost: No space left .* \[ENOSPC\]; its 260 rows"
+    ):
+        writer.close()
+    found = load(tmp_path)
+    assert found.manifest["status"] == "complete"
+    assert found.manifest["events_error"] == "No space left on device [ENOSPC]"
+    assert len(found.time) == 260
 
 
 def test_a_stuck_disk_never_stops_the_loop_but_ends_the_run(tmp_path: Path) -> None:

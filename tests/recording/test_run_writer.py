@@ -1,8 +1,10 @@
 import errno
 import json
 import os
+import signal
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from recorded_rows import append_rows, cycle
 from legbench import __version__
 from legbench.errors import ConfigError, PlantFault, RecordingError
 from legbench.recording import files
+from legbench.recording import writer as writer_module
 from legbench.recording.reader import load
 from legbench.recording.writer import RunWriter
 from legbench.signals import Command
@@ -122,6 +125,45 @@ def test_a_run_ends_as_its_with_block_ends(
     assert (run.manifest["status"], run.manifest["cause"]) == (status, cause)
     assert len(run.time) == 70
     assert not run.complete
+
+
+def test_a_fault_stays_the_cause_when_it_is_dealt_with_and_interrupted(tmp_path: Path) -> None:
+    writer = RunWriter.create(tmp_path, {})
+    append_rows(writer, 70)
+
+    def fail() -> None:
+        try:
+            raise PlantFault("bus_off", "the bus is off")
+        finally:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt), writer:
+        fail()
+    run = load(writer.path)
+    assert (run.manifest["status"], run.manifest["cause"]) == ("fault", "bus_off")
+    assert len(run.time) == 70
+
+
+def test_a_signal_while_a_run_is_closed_waits_until_it_is_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    writer = RunWriter.create(tmp_path, {})
+    append_rows(writer, 120)
+    real = writer_module.write_archive
+
+    def interrupting(*arguments: Any) -> int:
+        signal.raise_signal(signal.SIGINT)
+        return real(*arguments)
+
+    monkeypatch.setattr(writer_module, "write_archive", interrupting)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    with pytest.raises(KeyboardInterrupt):
+        writer.close()
+    signal.signal(signal.SIGINT, before)
+    run = load(writer.path)
+    assert run.complete
+    assert len(run.time) == 120
+    assert not (writer.path / "samples.arrows").exists()
 
 
 def test_a_batch_of_legs_is_refused(tmp_path: Path) -> None:

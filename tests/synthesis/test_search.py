@@ -9,7 +9,7 @@ from legbench.design.dependent import cost
 from legbench.design.requirements import PAPER, VARIABLES, Requirements
 from legbench.design.scaling import quadruped
 from legbench.errors import ConfigError, DesignError
-from legbench.loop import StopFlag
+from legbench.interrupts import StopFlag
 from legbench.signals import Floats
 from legbench.synthesis.crosscheck import evolve
 from legbench.synthesis.search import SearchSettings, identity_of, search

@@ -62,7 +62,7 @@ def test_own_signals_and_phases_are_shown(guest: Recording, tmp_path: Path) -> N
 
 
 def test_each_own_signal_has_a_tab_with_its_unit(guest: Recording) -> None:
-    facts = facts_of(guest.description, guest.path)
+    facts = facts_of(guest.description)
     names = _view_names(blueprint(facts, room=(0.0, 1.0)).root_container)
     assert {"target [rad]", "effort [W]"} <= set(names)
 
@@ -82,6 +82,6 @@ def test_a_figure_of_a_guest_is_coloured_by_period(guest: Recording) -> None:
 
 
 def test_the_facts_of_a_guest_are_its_settings(guest: Recording) -> None:
-    text = as_markdown(facts_of(guest.description, guest.path))
+    text = as_markdown(facts_of(guest.description))
     assert "- kind: mine.py:Sine" in text
     assert "- freq: 3.1" in text

@@ -6,16 +6,17 @@ import imageio.v3 as iio
 import mujoco
 import numpy as np
 import pytest
-from viz_runs import PROTOTYPE, part, record
+from viz_runs import PROTOTYPE, manifest_of, part, record
 
-from legbench.design.setup import Setup, SetupKind
+from legbench.design.setup import SetupKind
 from legbench.errors import ConfigError, MissingExtraError, RecordingError
 from legbench.kinematics import leg_points
-from legbench.mjcf import BuildOptions, build_spec, to_xml
+from legbench.recording.description import describe
 from legbench.recording.reader import Recording
 from legbench.viz.film.offscreen import OffScreen, backend
 from legbench.viz.film.render import FRAME, STILL, STILLS, VIDEO, render
 from legbench.viz.pose import Puppet
+from legbench.viz.run_model import model_of
 
 
 def gl_works() -> bool:
@@ -35,7 +36,7 @@ needs_gl = pytest.mark.skipif(not gl_works(), reason="no OpenGL without a displa
 @pytest.mark.parametrize("kind", list(SetupKind))
 def test_the_model_takes_the_recorded_posture(kind: SetupKind, tmp_path: Path) -> None:
     run = record(tmp_path, kind, 300)
-    puppet = Puppet(tmp_path / "leg.xml")
+    puppet = Puppet(model_of(run.description))
     points = run["trunk_pos"][:, None] + leg_points(run["joint_pos"], PROTOTYPE.lengths)
     for row, qpos in enumerate(puppet.positions(run["trunk_pos"], run["joint_pos"])):
         puppet.pose(qpos)
@@ -49,11 +50,9 @@ def test_the_model_takes_the_recorded_posture(kind: SetupKind, tmp_path: Path) -
             assert np.linalg.norm(gap) < 1e-9
 
 
-def test_a_boom_carries_the_hip_where_it_was(tmp_path: Path) -> None:
-    setup = Setup(kind=SetupKind.FFS, boom_radius=1.2)
-    spec = build_spec(PROTOTYPE, BuildOptions(setup=setup))
-    (tmp_path / "leg.xml").write_text(to_xml(spec))
-    puppet = Puppet(tmp_path / "leg.xml")
+def test_a_boom_carries_the_hip_where_it_was() -> None:
+    setup = {"kind": "ffs", "boom_radius": 1.2}
+    puppet = Puppet(model_of(describe(manifest_of(SetupKind.FFS, setup=setup))))
     hip = np.array([[0.02, 0.21], [-0.03, 0.17]])
     joint = np.array([[-0.6, 0.7], [-0.5, 0.6]])
     for row, qpos in enumerate(puppet.positions(hip, joint)):
@@ -118,24 +117,6 @@ def test_a_time_outside_the_run_is_refused(hop: Recording, tmp_path: Path) -> No
     with pytest.raises(ConfigError, match=r"time is 99 s; the run lasts from 0 to 2\.499 s"):
         render(hop, tmp_path / "a.png", time=99.0)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_run_without_model_says_so(hop: Recording, tmp_path: Path) -> None:
-    bare = Recording(
-        path=tmp_path,
-        manifest={},
-        described=hop.described,
-        time=hop.time,
-        columns=hop.columns,
-        events=(),
-    )
-    with pytest.raises(RecordingError, match=r"leg\.xml does not exist: the run keeps no model"):
-        render(bare, tmp_path / "a.gif")
-    (tmp_path / "leg.xml").write_text(
-        "<mujoco><worldbody><body name='trunk'/></worldbody></mujoco>"
-    )
-    with pytest.raises(RecordingError, match=r"leg\.xml has no camera 'side'"):
-        render(bare, tmp_path / "a.gif")
 
 
 @pytest.mark.parametrize("wish", ["off", "glfw"])

@@ -166,7 +166,7 @@ def test_slices_publish_what_the_whole_run_publishes(
     whole = viz_rrd.temporal(write_rrd(run, tmp_path / "whole.rrd"))
     stream = rr.RecordingStream(APPLICATION, recording_id="slices")
     stream.save(tmp_path / "slices.rrd")
-    publisher = Publisher(stream, facts_of(run.description, run.path), live=True)
+    publisher = Publisher(stream, facts_of(run.description), live=True)
     for first in range(0, len(run.time), 333):
         publisher.push(part(run, first, first + 333))
     publisher.finish()
@@ -199,20 +199,6 @@ def test_every_setup_is_drawn(kind: SetupKind, tmp_path: Path) -> None:
     assert len(shown["/scene/model/foot"]["t"]) == 30
 
 
-def test_a_run_without_model_has_all_but_the_scene(hop: Recording, tmp_path: Path) -> None:
-    bare = Recording(
-        path=tmp_path,
-        manifest={},
-        described=hop.described,
-        time=hop.time,
-        columns=hop.columns,
-        events=(),
-    )
-    shown = viz_rrd.temporal(write_rrd(bare, tmp_path / "bare.rrd"))
-    assert not any(path.startswith("/scene") for path in shown)
-    assert "/leg/plane/segments" in shown
-
-
 def test_an_older_file_survives_a_failure(hop: Recording, tmp_path: Path) -> None:
     target = tmp_path / "view.rrd"
     target.write_bytes(b"older")
@@ -227,19 +213,12 @@ def test_an_older_file_survives_a_failure(hop: Recording, tmp_path: Path) -> Non
     )
     with pytest.raises(FormatError, match=r"setup\.kind is 'moon'"):
         write_rrd(broken, target)
-    (tmp_path / "leg.xml").write_text("<mujoco><worldbody><body/></worldbody>")
-    torn = Recording(
-        path=tmp_path,
-        manifest={},
-        described=hop.described,
-        time=hop.time,
-        columns=hop.columns,
-        events=(),
-    )
-    with pytest.raises(RecordingError, match="MuJoCo refuses the model"):
-        write_rrd(torn, target)
+    tables = {**hop.description.experiment, "linkage": {"crank_length": "far"}}
+    astray = replace(broken, described=replace(hop.description, experiment=tables))
+    with pytest.raises(FormatError, match=r"linkage\.crank_length is 'far'"):
+        write_rrd(astray, target)
     assert target.read_bytes() == b"older"
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["leg.xml", "view.rrd"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["view.rrd"]
 
 
 def test_a_run_without_rows_is_refused(hop: Recording, tmp_path: Path) -> None:

@@ -24,7 +24,7 @@ def test_slices_give_what_the_whole_run_gives(
     name: str, cuts: list[int], request: pytest.FixtureRequest
 ) -> None:
     run: Recording = request.getfixturevalue(name)
-    facts = facts_of(run.description, run.path)
+    facts = facts_of(run.description)
     whole = Tracer(facts).extend(run)
     tracer = Tracer(facts)
     traces = [tracer.extend(part(run, low, high)) for low, high in pairwise(cuts)]
@@ -45,7 +45,7 @@ def test_thinning_in_slices_keeps_the_rows_of_the_whole(freq: float, cuts: list[
 
 
 def test_jumps_are_counted_at_touchdown(hop: Recording) -> None:
-    trace = Tracer(facts_of(hop.description, hop.path)).extend(hop)
+    trace = Tracer(facts_of(hop.description)).extend(hop)
     jumps = int((hop.time[-1] + 0.4 * STANCE_TIME) / (STANCE_TIME + FLIGHT_TIME))
     assert trace.period[-1] == jumps
     gait = Analysis(hop).gait
@@ -69,17 +69,17 @@ def test_chattering_contact_is_one_touchdown(hop: Recording) -> None:
         columns={**hop.columns, "contact": contact},
         events=(),
     )
-    trace = Tracer(facts_of(hop.description, hop.path)).extend(chattering)
+    trace = Tracer(facts_of(hop.description)).extend(chattering)
     np.testing.assert_array_equal(np.flatnonzero(np.diff(trace.period)) + 1, touchdowns)
 
 
 def test_a_period_lasts_as_long_as_the_oscillation(swing: Recording) -> None:
-    trace = Tracer(facts_of(swing.description, swing.path)).extend(swing)
+    trace = Tracer(facts_of(swing.description)).extend(swing)
     starts = swing.time[np.flatnonzero(np.diff(trace.period)) + 1]
     np.testing.assert_allclose(np.diff(starts)[2:], 1.0 / 3.1, rtol=0.02)
 
 
 def test_a_real_leg_stands_when_its_controller_says_so(hop: Recording, real_hop: Recording) -> None:
-    expected = Tracer(facts_of(hop.description, hop.path)).extend(hop)
-    trace = Tracer(facts_of(real_hop.description, real_hop.path)).extend(real_hop)
+    expected = Tracer(facts_of(hop.description)).extend(hop)
+    trace = Tracer(facts_of(real_hop.description)).extend(real_hop)
     np.testing.assert_array_equal(trace.stance, expected.stance)

@@ -45,6 +45,7 @@ def main(arguments: list[str] | None = None) -> int:
     Every `LegbenchError` becomes one line on stderr, never a traceback; so does ^C outside of a
     run, with 130. Nobody reading any more, as under `head`, ends it with 141 and no word.
     """
+    _occupy_standard_streams()
     try:
         try:
             return _run(arguments)
@@ -55,6 +56,17 @@ def main(arguments: list[str] | None = None) -> int:
         if not _reader_left():
             raise
         return 141
+
+
+def _occupy_standard_streams() -> None:
+    """Open /dev/null for standard streams that are closed, as after `2>&-`.
+
+    Otherwise the next file that is opened, such as a recording, would take the number of stderr,
+    and libraries would write their warnings into it.
+    """
+    while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
+        pass
+    os.close(descriptor)
 
 
 def _reader_left() -> bool:
@@ -83,8 +95,13 @@ def _run(arguments: list[str] | None) -> int:
     try:
         return import_module(f"legbench.cli.{name}").main(rest)
     except LegbenchError as error:
-        report_error(str(error))
+        report_error("; ".join([str(error), *_notes(error)]))
         return 1
-    except KeyboardInterrupt:
-        report_error("interrupted")
+    except KeyboardInterrupt as error:
+        report_error("; ".join(["interrupted", *_notes(error)]))
         return 130
+
+
+def _notes(error: BaseException) -> list[str]:
+    """What was added to an exception on its way, such as drives that keep their power."""
+    return getattr(error, "__notes__", [])

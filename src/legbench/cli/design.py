@@ -130,7 +130,7 @@ def _solve(
     chosen: DesignArguments, requirements: Requirements, settings: Any, trace: "Trace"
 ) -> tuple["Solution", bool]:
     """The solution, and whether ^C asked for it early."""
-    from legbench.loop import stop_on_interrupt
+    from legbench.interrupts import stop_on_interrupt
     from legbench.synthesis.solve import solve
 
     scatter_cost = None

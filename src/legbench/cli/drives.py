@@ -5,9 +5,10 @@ from typing import Annotated
 
 from tyro.conf import subcommand
 
-from legbench.cli import drives_moving, drives_reading, drives_serving
+from legbench.cli import drives_moving, drives_reading, drives_serving, drives_timing
 from legbench.cli.drives_reading import Bench
 from legbench.cli.parse import parse
+from legbench.interrupts import stop_on_interrupt
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +40,7 @@ class DrivesArguments:
             subcommand("jog", description="move one motor a little, under all limits; IT MOVES"),
         ]
         | Annotated[
-            drives_reading.Jitter,
+            drives_timing.Jitter,
             subcommand("jitter", description="how punctual the cycle is; enables nothing"),
         ]
         | Annotated[
@@ -59,6 +60,11 @@ class DrivesArguments:
 
 
 def main(arguments: list[str]) -> int:
-    """Do one action; 0 when it went well, 1 when something is not as it should be."""
+    """Do one action; 0 when it went well, 1 when something is not as it should be.
+
+    ^C, SIGTERM and SIGHUP raise one KeyboardInterrupt, whatever the action is: drives that have
+    power lose it on the way out, and later signals change nothing about that.
+    """
     chosen = parse(DrivesArguments, "drives", arguments)
-    return chosen.action.run(chosen.bench)
+    with stop_on_interrupt(raises=True):
+        return chosen.action.run(chosen.bench)

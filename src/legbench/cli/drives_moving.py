@@ -1,20 +1,15 @@
 """`legbench drives configure|zero|home|jog`: writing to drives, moving them a little."""
 
-import signal
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from types import FrameType
 
 from legbench.cli.drives_reading import Bench
 from legbench.cli.output import note, print_json
+from legbench.cli.waived import tell_waived
 from legbench.drives.config import NodeConfig
 from legbench.drives.realtime import Granted
 from legbench.drives.session import Session
 from legbench.errors import ConfigError
-from legbench.loop import STOP_SIGNALS
 from legbench.plants import LIMITS_NAME, limits_for
 
 
@@ -22,30 +17,6 @@ def tell(granted: Granted | None) -> None:
     """What the system granted to those who move motors; in virtual time nothing was asked."""
     if granted is not None:
         note(f"SCHED_FIFO {granted.fifo}; locked memory {granted.mlockall}")
-
-
-@contextmanager
-def interrupted_by_signals() -> Iterator[None]:
-    """Turn ^C, SIGTERM and SIGHUP into KeyboardInterrupt, once: drives are brought to rest on the
-    way out, and a second signal must not end that.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    came = False
-
-    def handle(_signal: int, _frame: FrameType | None) -> None:
-        nonlocal came
-        if not came:
-            came = True
-            raise KeyboardInterrupt
-
-    previous = {name: signal.signal(name, handle) for name in STOP_SIGNALS}
-    try:
-        yield
-    finally:
-        for name, handler in previous.items():
-            signal.signal(name, handler)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,7 +92,7 @@ class Home:
         """Home and print the counts before and after."""
         from legbench.commissioning.home import home
 
-        with interrupted_by_signals(), bench.session(leads=True) as session:
+        with bench.session(leads=True) as session:
             granted = session.be_punctual()
             homed = home(session, _node(session, self.node), self.method, timeout=self.timeout)
         if bench.json:
@@ -153,8 +124,10 @@ class Jog:
         from legbench.commissioning.jog import jog
 
         design = bench.leg()
-        limits = limits_for(bench.limits or bench.bus.parent / LIMITS_NAME, design)
-        with interrupted_by_signals(), bench.session(leads=True) as session:
+        path = bench.limits or bench.bus.parent / LIMITS_NAME
+        limits = limits_for(path, design)
+        tell_waived(None, limits)
+        with bench.session(leads=True) as session:
             granted = session.be_punctual()
             jogged = jog(
                 session,

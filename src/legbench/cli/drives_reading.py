@@ -1,13 +1,11 @@
-"""`legbench drives scan|status|jitter|budget`: looking, never enabling."""
+"""`legbench drives scan|status|budget`: looking, never enabling."""
 
 from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Annotated
-
-from tyro.conf import arg
 
 from legbench.cli.output import note, print_json
+from legbench.cli.waived import tell_waived
 from legbench.design import LegDesign, load_design
 from legbench.drives.bus_file import load_bus
 from legbench.drives.config import BusConfig
@@ -53,6 +51,8 @@ class Bench:
 
     def session(self, *, leads: bool, read_only: bool = False) -> AbstractContextManager[Session]:
         """The bus, open, its channel locked by whoever leads; raises ConfigError, BusError."""
+        if leads:
+            tell_waived(self.bus, None)
         choice = replace(self.choice, read_only=read_only)
         return open_session(self.config(), choice, leads=leads)
 
@@ -117,61 +117,25 @@ class Status:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Jitter:
-    """How punctual the cycle is; SYNC and process data flow, nothing is enabled."""
-
-    cycles: int = 5000
-    """How many."""
-    cpu: int | None = None
-    """Processor to stay on."""
-    plot: Annotated[Path | None, arg(metavar="FILE")] = None
-    """Draw both distributions: .png, .svg or .pdf."""
-
-    def run(self, bench: Bench) -> int:
-        """Measure and print a table, with what the system granted."""
-        from legbench.commissioning.jitter import measure
-
-        if self.cycles < 1:
-            raise ConfigError(f"cycles is {self.cycles}; it must be 1 or more")
-        with bench.session(leads=True, read_only=True) as session:
-            granted = session.be_punctual(self.cpu)
-            timing = measure(session, bench.leg().stiffness, self.cycles)
-        table = timing.table()
-        if self.plot is not None:
-            from legbench.viz.print.timing import draw_timing
-
-            draw_timing(timing.late_us, timing.exchange_us, self.plot)
-            note(f"wrote {self.plot}")
-        content = {
-            "cycles": self.cycles,
-            "time": "virtual" if granted is None else "wall",
-            "granted": None if granted is None else asdict(granted),
-            **table,
-            "skipped": timing.skipped,
-            "lost": timing.lost,
-        }
-        if bench.json:
-            print_json(content)
-            return 0
-        print(f"{self.cycles} cycles in {content['time']} time")
-        for name, words in ({} if granted is None else asdict(granted)).items():
-            print(f"  {name:<11} {words}")
-        print(f"{'[us]':<13}" + "".join(f"{word:>9}" for word in table["late_us"]))
-        for label, name in (("wake-up", "late_us"), ("exchange", "exchange_us")):
-            print(f"{label:<13}" + "".join(f"{value:9.0f}" for value in table[name].values()))
-        print(f"skipped {timing.skipped} ticks, lost process data in {timing.lost} cycles")
-        return 0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Budget:
-    """What the schedule of the bus file takes of the wire at worst; opens no bus."""
+    """What the schedule of the bus file takes of the wire at worst; opens no bus.
+
+    It also says how soon every drive stands when its master is gone, and checks bus and limits
+    files against each other.
+    """
 
     def run(self, bench: Bench) -> int:
-        """Print every frame; raises ConfigError above 80 %."""
+        """Print every frame; raises ConfigError above 80 %, or where the files do not fit."""
+        from legbench.drives.checks import check_together
+        from legbench.drives.master_watch import means_of
         from legbench.drives.wire import MAX_LOAD, bus_load, check_load, schedule
+        from legbench.plants import LIMITS_NAME, joint_ranges, limits_for
 
         config = bench.config().at(bench.bitrate)
+        limits = limits_for(bench.limits or bench.bus.parent / LIMITS_NAME, bench.leg())
+        means = {
+            node.name: means_of(config, node, speed=limits.command_speed) for node in config.nodes
+        }
         entries, load = schedule(config), bus_load(config)
         if bench.json:
             print_json(
@@ -180,6 +144,10 @@ class Budget:
                     "load": load,
                     "limit": MAX_LOAD,
                     "frames": [asdict(entry) for entry in entries],
+                    "master_watch": {
+                        name: [asdict(one) | {"stop_ms": one.stop_ms} for one in found]
+                        for name, found in means.items()
+                    },
                 }
             )
         else:
@@ -193,5 +161,9 @@ class Budget:
                 f"{'worst load':<24} {100 * load:.1f} % of {config.bitrate} bit/s, the limit is "
                 f"{100 * MAX_LOAD:.0f} %"
             )
+            for name, found in means.items():
+                texts = [f"{one.stop_ms:.0f} ms by {one.name}" for one in found]
+                print(f"without master, {name} stands after {' or '.join(texts) or 'no time'}")
         check_load(config)
+        check_together(config, limits, stops=joint_ranges(bench.leg()))
         return 0

@@ -47,7 +47,7 @@ class Emulate:
         from legbench.drives.slcan_server import SlcanServer
         from legbench.drives.unix_server import UnixServer
         from legbench.experiment import Experiment, start_of
-        from legbench.loop import stop_on_interrupt
+        from legbench.interrupts import stop_on_interrupt
         from legbench.plant.can_open import open_session
         from legbench.plant.emulated_leg import EmulatedLeg
 

@@ -1,8 +1,10 @@
 """What commands print: results on stdout, everything else on stderr."""
 
+import os
 import select
 import sys
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +14,16 @@ from legbench.strict_json import null_for_nan
 
 def report_error(message: str) -> None:
     """One line that begins with `legbench: `."""
-    print(f"legbench: {message}", file=sys.stderr)
+    note(f"legbench: {message}")
 
 
 def note(message: str) -> None:
-    """Something that a person may want to know and a script does not."""
-    print(message, file=sys.stderr)
+    """Something that a person may want to know and a script does not.
+
+    Where nobody reads it any more, or stderr was closed before the program began, it is dropped:
+    words end no command.
+    """
+    _to_stderr(f"{message}\n")
 
 
 def print_json(content: Mapping[str, Any]) -> None:
@@ -46,13 +52,39 @@ def write_json(path: Path, content: Mapping[str, Any]) -> None:
 
 
 def progress(done: int, total: int) -> None:
-    """A line that overwrites itself, on a terminal that takes it at once: a stalled one (^S, a lost
-    connection) must not hold up who reports.
+    """Draw a line that overwrites itself, on a terminal that takes it at once.
+
+    A stalled terminal (^S, a lost connection) must not hold up who reports, and one that is gone
+    is no terminal.
     """
-    if not sys.stderr.isatty() or not select.select([], [sys.stderr], [], 0.0)[1]:
+    if not _draws():
         return
     width = 32
     filled = width * done // max(total, 1)
     bar = "#" * filled + "-" * (width - filled)
     end = "\n" if done >= total else ""
-    print(f"\r[{bar}] {100 * done // max(total, 1):3d} %", end=end, file=sys.stderr, flush=True)
+    _to_stderr(f"\r[{bar}] {100 * done // max(total, 1):3d} %{end}")
+
+
+def _draws() -> bool:
+    """Whether stderr is a terminal that takes a line now."""
+    with suppress(OSError, ValueError):
+        if sys.stderr is not None and sys.stderr.isatty():
+            return bool(select.select([], [sys.stderr], [], 0.0)[1])
+    return False
+
+
+def _to_stderr(text: str) -> None:
+    """Write to stderr, if there is one; once it takes nothing, /dev/null takes the rest.
+
+    Otherwise the text that it refused would be tried again when the interpreter ends, and turn
+    the exit status into 120.
+    """
+    if sys.stderr is None:
+        return
+    try:
+        sys.stderr.write(text)
+        sys.stderr.flush()
+    except (OSError, ValueError):
+        with suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stderr.fileno())

@@ -48,26 +48,34 @@ class Watching:
 
 
 def main(arguments: list[str]) -> int:
-    """Run; 0 when it came to its end or was stopped by ^C, 1 when a fault ended it."""
+    """Run a controller on a leg and record it.
+
+    Returns:
+        0 when the run came to its end or was stopped by ^C after its first row, 1 when a fault
+        ended it or a drive kept its power, 2 for wrong usage, 130 when ^C came before the first
+        row.
+    """
     try:
         asked = chosen_by(arguments)
     except UsageError as error:
         report_error(str(error))
         return 2
-    from legbench.cli.table import print_summary
+    from legbench.cli.table import limited, print_summary
+    from legbench.cli.waived import tell_waived_of
     from legbench.clock import WallClock
     from legbench.experiment.running import record
-    from legbench.loop import stop_on_interrupt
+    from legbench.interrupts import stop_on_interrupt
     from legbench.metrics import summarise
     from legbench.plant.start import PERIOD
     from legbench.recording.reader import load
 
     chosen, experiment = asked.arguments, asked.experiment
+    tell_waived_of(experiment.plant)
     watched = chosen.view or chosen.serve
     watching = Watching(serve=chosen.serve)
     paced = watched or chosen.real_time
     clock = WallClock(PERIOD) if paced and plays_alone(experiment) else None
-    with stop_on_interrupt() as stop:
+    with stop_on_interrupt(raises=True) as stop:
         finished = record(
             experiment,
             chosen.out,
@@ -77,9 +85,17 @@ def main(arguments: list[str]) -> int:
             on_started=watching.start if watched else None,
         )
     watching.stop()
+    if finished.outcome.status == "interrupted" and finished.outcome.cycles == 0:
+        report_error(f"interrupted before the first row; {finished.path} holds 0 rows")
+        return 130
     if finished.outcome.message is not None:
         note(f"legbench: {finished.outcome.message}")
     summary = summarise(load(finished.path))
+    if summary.limited_cycles:
+        note(
+            f"legbench: the limits changed the command in {limited(summary)}: the leg ran "
+            "something else than it was asked to; the event 'limited' in events.jsonl says more"
+        )
     if chosen.json:
         print_json(summary.to_json())
     else:

@@ -13,6 +13,8 @@ def print_summary(summary: Summary) -> None:
     print(f"run               {summary.run}")
     ending = summary.status or "unknown"
     print(f"ended             {ending}" + (f": {summary.cause}" if summary.cause else ""))
+    if summary.limited_cycles:
+        print(f"{'limited':<17} {limited(summary)}")
     for name, values in (
         ("P^r stance", summary.rating_stance),
         ("P^r flight", summary.rating_flight),
@@ -27,6 +29,12 @@ def print_summary(summary: Summary) -> None:
             print(f"{label:<17} {value * factor:.4g} {unit}")
     for warning in summary.warnings:
         print(f"{'note':<17} {warning}")
+
+
+def limited(summary: Summary) -> str:
+    """Say in how many cycles, and by how much, the limits changed the command."""
+    worst = ", ".join(f"{value:.3g}" for value in summary.limited_max)
+    return f"{summary.limited_cycles} cycles, by up to {worst} rad (motor 1, 2)"
 
 
 def print_comparison(comparison: Comparison) -> None:

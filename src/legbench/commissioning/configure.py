@@ -37,10 +37,13 @@ def write(session: Session) -> int:
 
     Raises:
         BusError: the channel has a master.
+        PlantFault: somebody else leads these drives; nothing has been written since it was heard.
         DriveError: a drive is another one, or does not take a value.
     """
     session.hold()
     up = session.bring_up()
+    up.listen()
     up.identify()
+    up.glance()
     up.pre_operational()
     return sum(up.configure(node) for node in session.config.nodes)

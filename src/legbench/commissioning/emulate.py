@@ -12,6 +12,7 @@ from legbench.drives.emulated.network import Body, Network, stiff_body
 from legbench.drives.realtime import PRIORITY, ask
 from legbench.drives.slcan_server import SlcanServer
 from legbench.drives.unix_server import UnixServer
+from legbench.onlooker import Onlooker
 
 Server = UnixServer | SlcanServer | BusServer
 """Where the drives are reached."""
@@ -40,7 +41,7 @@ def serve(
         start_pos: motor positions at power-on [rad].
         body: what hangs on the shafts.
         patience: periods without SYNC or target after which an enabled drive faults.
-        report: told every change of a drive's state.
+        report: told every change of a drive's state, until it fails.
         ready: called when the bus can be used.
         stop: asked all the time.
 
@@ -60,6 +61,8 @@ def serve(
     # A master on the same processor goes first, as it would on one of its own.
     ask(priority=PRIORITY - 1)
     network = emulate(config, behaviours, body=body)
+    # A terminal that is closed must not take the drives from a master that leads them.
+    reporting = Onlooker("report", report)
     shown: dict[str, DriveState] = {}
     began = time.monotonic()
     with serve_at(network) as server:
@@ -70,4 +73,4 @@ def serve(
                 state = drive.axis.power.state
                 if shown.get(node.name) is not state:
                     shown[node.name] = state
-                    report(time.monotonic() - began, node.name, state.value)
+                    reporting(time.monotonic() - began, node.name, state.value)

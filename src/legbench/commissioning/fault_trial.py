@@ -28,8 +28,10 @@ from legbench.drives.errors import DriveError
 from legbench.drives.limits import SafetyLimits
 from legbench.errors import ConfigError
 from legbench.experiment import Experiment, make_controller, start_of, targets_of
-from legbench.loop import Outcome, StopFlag, run
+from legbench.interrupts import StopFlag
+from legbench.loop import Outcome, run
 from legbench.plant.can import CanPlant
+from legbench.plant.landing import End
 from legbench.plants import BUS_LOG, EMULATED, LIMITS_NAME, CanChoice, Leg, OpenPlant, open_plant
 from legbench.recording.reader import load
 from legbench.recording.writer import RunWriter
@@ -120,6 +122,10 @@ def _node(kind: NodeFaultKind, node_id: int) -> Fault:
     return NodeFault(kind=kind, node_id=node_id, start_ns=STRIKE_NS)
 
 
+def _part(kind: NodeFaultKind, node_id: int, size: float = 0.0) -> Fault:
+    return NodeFault(kind=kind, node_id=node_id, start_ns=STRIKE_NS, size=size)
+
+
 def _babble(every_us: int) -> Fault:
     return Babble(
         cob_id=1, start_ns=STRIKE_NS, end_ns=STRIKE_NS + 100 * MS, every_ns=1000 * every_us
@@ -127,7 +133,7 @@ def _babble(every_us: int) -> Fault:
 
 
 _F, _N = FrameFaultKind, NodeFaultKind
-LOST, EMERGENCY = "process data lost", "drive emergency"
+LOST, EMERGENCY, FOLLOWING = "process data lost", "drive emergency", "following error"
 TRIALS = (
     Trial(name="answers of a drive dropped", faults=(_frame(_F.DROP, 0x181),), cause=LOST),
     Trial(
@@ -190,6 +196,25 @@ TRIALS = (
     ),
     Trial(name="under-voltage", faults=(_node(_N.UNDER_VOLTAGE, 1),), cause=EMERGENCY),
     Trial(name="over-temperature", faults=(_node(_N.OVER_TEMPERATURE, 2),), cause=EMERGENCY),
+    Trial(name="drive warns", faults=(_node(_N.WARNING, 1),)),
+    Trial(name="jammed motor", faults=(_part(_N.JAMMED, 1),), cause=FOLLOWING),
+    Trial(name="frozen motor encoder", faults=(_part(_N.MOTOR_FROZEN, 2),), cause=FOLLOWING),
+    Trial(
+        name="motor encoder steps 0.1 rad", faults=(_part(_N.MOTOR_STEP, 1, 0.1),), cause=FOLLOWING
+    ),
+    Trial(
+        name="motor encoder drifts 1 rad/s",
+        faults=(_part(_N.MOTOR_DRIFT, 2, 1.0),),
+        cause=FOLLOWING,
+    ),
+    Trial(name="frozen link encoder", faults=(_part(_N.LINK_FROZEN, 1),), cause="sway"),
+    Trial(
+        name="link encoder steps 0.1 rad",
+        faults=(_part(_N.LINK_STEP, 2, 0.1),),
+        cause="joint speed",
+    ),
+    Trial(name="link encoder drifts 1 rad/s", faults=(_part(_N.LINK_DRIFT, 1, 1.0),), cause="sway"),
+    Trial(name="process data repeated", faults=(_part(_N.REPEATING, 2),), cause="sway"),
     Trial(name="master killed or frozen", gone=True, cause="master gone"),
     Trial(name="^C", interrupted=True),
     Trial(name="the viewer hangs", viewer=True),
@@ -209,7 +234,7 @@ def try_fault(
         raise ConfigError(f"the trial '{trial.name}' needs a viewer to freeze: give start_view")
     config = load_bus(bus_file)
     limits = load_limits(bus_file.parent / LIMITS_NAME)
-    choice = CanChoice(bus=bus_file, interface=EMULATED, faults=trial.faults)
+    choice = CanChoice(bus=bus_file, interface=EMULATED, faults=trial.faults, end=End.STOP)
     chosen = Experiment(design=design, controller=JumpConfig())
     start = start_of(chosen)
     leg = Leg(design=design, options=chosen.options, start=start, servo=chosen.servo)

@@ -4,13 +4,10 @@ The drive is configured as for a run and goes to operational, so that its own wa
 when this master falls silent; it is always led out by quick stop.
 """
 
-import math
 from dataclasses import dataclass
 from typing import final
 
 from legbench.drives.cia402 import (
-    POWERED,
-    Controlword,
     DriveState,
     Goal,
     Mode,
@@ -24,10 +21,15 @@ from legbench.drives.codec.datatypes import DataType
 from legbench.drives.codec.nmt import NmtCommand, NmtState, heartbeat_frame, nmt_frame
 from legbench.drives.config import NodeConfig
 from legbench.drives.errors import DriveError
+from legbench.drives.master.bring_up import BringUp
 from legbench.drives.master.sdo_port import SdoPort
+from legbench.drives.master.sdo_stop import SdoStop, leave_operational
+from legbench.drives.master.stop_report import Lead
+from legbench.drives.master_watch import check_master_watch
 from legbench.drives.objects import name_of
 from legbench.drives.session import Session
 from legbench.errors import ConfigError
+from legbench.interrupts import shielded
 
 START_HOMING = 0x1F
 """Enable operation with bit 4."""
@@ -37,10 +39,10 @@ NEEDED = ((0x6065, 0), (0x6072, 0), (0x6085, 0))
 """Window, torque and ramp that a search is not made without, in the bus file."""
 FASTEST = 1.0
 """A search for a hard stop goes no faster (6099h:01) [rad/s]."""
+LONGEST = 600.0
+"""A search at the lowest sensible speed, 0.01 rad/s, has made a turn by then [s]."""
 PATIENCE = 200
 """Looks at a drive for one step."""
-OBEY_LOOKS = 10
-"""A drive that is still enabled so many looks after quick stop loses its voltage."""
 LOOK_NS = 5_000_000
 """Between two looks, or less, so that every one can bring a heartbeat in time [ns]."""
 U16, U32, I8, I32 = (
@@ -71,18 +73,26 @@ def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20
         timeout: [s]
 
     Raises:
-        ConfigError: no time at all, the bus file does not bound a search, or it is too fast.
+        ConfigError: no time at all or more than 10 minutes, the bus file does not bound a search,
+            it is too fast, or a drive would go on without its master.
         BusError: the channel has a master.
+        PlantFault: somebody else leads these drives; before the homing has begun, nothing has been
+            sent since it was heard.
         DriveError: another drive, a refused step, or homing failed.
+        StopError: the drive keeps its power, or does not answer.
     """
-    if not 0.0 < timeout < math.inf:
-        raise ConfigError(f"timeout is {timeout:g} s; it must be positive")
+    if not 0.0 < timeout <= LONGEST:
+        raise ConfigError(f"timeout is {timeout:g} s; it must be positive, {LONGEST:g} s at most")
     if method not in IN_PLACE:
         _check_bounded(node)
+    # Led by SDO a drive gets no RPDO, whose deadline therefore never begins.
+    check_master_watch(session.config, speed=FASTEST, commands=False)
     session.hold()
     up = session.bring_up()
+    up.listen()
     up.identify()
     up.unpower()
+    up.glance()
     up.pre_operational()
     up.configure(node)
     sdo = up.sdo(node)
@@ -90,19 +100,17 @@ def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20
         _check_speed(sdo, node)
     before = up.preload(node)
     _choose(sdo, node, method)
-    master = _Master(session, sdo, node)
-    try:
+    master = _Master(session, up, node)
+    session.leads(master)
+    up.glance()
+    with master:
         master.start()
         master.enter_homing()
         master.enable()
         master.command(START_HOMING)
         master.await_end(timeout)
-    finally:
-        try:
-            master.stop()
-        finally:
-            # Whatever failed until here: a drive that leaves operational stops by itself (6007h).
-            up.pre_operational()
+    up.lookout.rest()
+    sdo.put(0x6060, 0, I8, Mode.CYCLIC_SYNCHRONOUS_POSITION)
     after = sdo.get_int(0x6064, 0, I32)
     return Homed(node=node.name, method=method, before_counts=before, after_counts=after)
 
@@ -134,17 +142,20 @@ def _choose(sdo: SdoPort, node: NodeConfig, method: int) -> None:
 
 
 @final
-class _Master:
+class _Master(Lead):
     """Leads one drive by SDO, with a heartbeat in every wait."""
 
-    def __init__(self, session: Session, sdo: SdoPort, node: NodeConfig) -> None:
-        self._port, self._sdo, self._node = session.port(), sdo, node
+    def __init__(self, session: Session, up: BringUp, node: NodeConfig) -> None:
+        self._port, self._up, self._node = session.port(), up, node
+        self._sdo = up.sdo(node)
+        self._begun = self._closed = False
         self._timebase = session.timebase
         self._beat = heartbeat_frame(session.config.master_id, NmtState.OPERATIONAL)
         self._rest_ns = min(LOOK_NS, 1_000_000 * session.config.master_heartbeat_ms // 2)
 
     def start(self) -> None:
         """From the first heartbeat on the drive's watchdog runs (1016h)."""
+        self._begun = True
         self._port.send_frame(self._beat)
         self._port.send_frame(nmt_frame(NmtCommand.START, self._node.node_id))
 
@@ -187,28 +198,21 @@ class _Master:
                 return
         raise DriveError(f"homing of '{name}' has not ended within {timeout:g} s; raise --timeout")
 
-    def stop(self) -> None:
-        """Quick stop, no voltage for a drive that does not obey, back to the usual mode.
+    def close(self) -> None:
+        """Quick stop, no voltage for a drive that takes too long, pre-operational; once.
 
-        Raises:
-            DriveError: the drive keeps its power, or does not answer.
+        A drive that leaves operational stops by itself, whatever failed until then (6007h).
         """
-        self.command(Controlword.QUICK_STOP)
-        word = 0
-        for look in range(PATIENCE):
-            word = self._look()
-            state = decode_state(word)
-            if state not in POWERED:
-                break
-            if look >= OBEY_LOOKS and state in (None, DriveState.OPERATION_ENABLED):
-                self.command(Controlword.DISABLE_VOLTAGE)
-        else:
-            raise DriveError(
-                f"drive '{self._node.name}' keeps its power after quick stop: "
-                f"{describe_statusword(word)}; switch its power off"
-            )
-        self.command(Controlword.DISABLE_VOLTAGE)
-        self._sdo.put(0x6060, 0, I8, Mode.CYCLIC_SYNCHRONOUS_POSITION)
+        if self._closed or not self._begun:
+            return
+        with shielded() as shield:
+            port, nodes, hold = self._port, (self._node,), shield.hold
+            stop = SdoStop(port, nodes, hold, beat=self._beat, rest_ns=self._rest_ns)
+            self.stopped = stop.run()
+            order = self._up.pre_operational
+            again = leave_operational(order, port, nodes, self.stopped, hold)
+            self.stopped = again or self.stopped
+            self._closed = True
 
     def command(self, controlword: int) -> None:
         """Write 6040h."""

@@ -1,5 +1,6 @@
 """How punctual the cycle is: wake-up latency and exchange time, nothing enabled."""
 
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -7,22 +8,31 @@ import numpy as np
 
 from legbench.drives.errors import DriveError
 from legbench.drives.limits import SafetyLimits
+from legbench.drives.link import Link, Sample
 from legbench.drives.session import Session
-from legbench.signals import Floats
+from legbench.recording.writer import RunWriter
+from legbench.signals import Command, Floats, Observation
 
 QUANTILES = {"p50": 0.5, "p90": 0.9, "p99": 0.99, "p99_9": 0.999, "max": 1.0}
+LATE_SHARE = 0.1
+"""Share of a period after which a SYNC counts as late [-]: drives that interpolate between set
+points begin to show it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Timing:
-    """One value a cycle."""
+    """What a measurement found; arrays have one value a cycle."""
 
     late_us: Floats
     """SYNC after its place on the grid."""
     exchange_us: Floats
     """From SYNC to the last process data."""
     skipped: int
-    """Ticks missed."""
+    """Ticks that this computer missed."""
+    silent: int
+    """Ticks left out on purpose, after an answer that had not come."""
+    late: int
+    """Cycles whose SYNC was later than a tenth of a period."""
     lost: int
     """Cycles in which process data was missing."""
 
@@ -33,29 +43,87 @@ class Timing:
             for name, values in (("late_us", self.late_us), ("exchange_us", self.exchange_us))
         }
 
+    def counts(self) -> dict[str, int]:
+        """What went wrong, by name."""
+        return {
+            "skipped": self.skipped,
+            "late": self.late,
+            "silent": self.silent,
+            "lost": self.lost,
+        }
 
-def measure(session: Session, stiffness: Sequence[float], cycles: int) -> Timing:
-    """Exchange frames in read-only for a number of cycles.
+
+def measure(
+    session: Session, stiffness: Sequence[float], cycles: int, writer: RunWriter | None = None
+) -> Timing:
+    """Exchange frames in read-only for a number of cycles, and record every one of them.
+
+    A machine or a bus that is bad ends nothing: what is skipped, late and lost is counted.
+
+    Args:
+        session: of the bus.
+        stiffness: of the series springs [N m/rad].
+        cycles: how many.
+        writer: takes a row a cycle, as in a run; none measures without recording.
 
     Raises:
-        DriveError: another master sends SYNC, whose punctuality is not ours.
-        BusError, DriveError, PlantFault: as `Link.start`, `Link.exchange`.
+        PlantFault: another master leads the drives, whose punctuality is not ours.
+        BusError, DriveError: as `Link.start`.
+        RecordingError: the recording failed.
     """
-    timebase = session.timebase
-    late, exchange = np.zeros(cycles), np.zeros(cycles)
-    lost = 0
+    session.bring_up().listen()
     with session.link(SafetyLimits(), stiffness, read_only=True) as link:
-        link.start()
+        began_ns = link.start().time_ns
         if link.listening:
             raise DriveError(
                 "another master sends SYNC on this bus; its cycle cannot be measured from here: "
                 "end it, or run jitter on its computer"
             )
-        before = link.skipped_total
-        for cycle in range(cycles):
-            sample = link.exchange()
-            late[cycle] = 1e-3 * sample.late_ns
-            exchange[cycle] = 1e-3 * (timebase.now_ns() - sample.time_ns)
-            lost += not all(sample.fresh)
-        skipped = link.skipped_total - before
-    return Timing(late_us=late, exchange_us=exchange, skipped=skipped, lost=lost)
+        return measure_link(session, link, cycles, writer, began_ns)
+
+
+def measure_link(
+    session: Session, link: Link, cycles: int, writer: RunWriter | None, began_ns: int
+) -> Timing:
+    """Measure on a read-only link that has started; rows tell the time since `began_ns` [ns].
+
+    Raises:
+        PlantFault, RecordingError: as `measure`.
+    """
+    timebase, period_us = session.timebase, session.config.period_us
+    late, exchange = np.zeros(cycles), np.zeros(cycles)
+    lost = 0
+    skipped, silent = link.skipped_total, link.cycle.silent_total
+    previous = time.perf_counter()
+    for cycle in range(cycles):
+        sample = link.look()
+        late[cycle] = 1e-3 * sample.late_ns
+        exchange[cycle] = 1e-3 * (timebase.now_ns() - sample.time_ns)
+        lost += not all(sample.fresh)
+        now = time.perf_counter()
+        if writer is not None:
+            seen = _observation(sample, began_ns)
+            command = Command.holding(seen.motor_pos)
+            writer.append(command, seen, 1e6 * (now - previous), late[cycle])
+        previous = now
+    silent = link.cycle.silent_total - silent
+    return Timing(
+        late_us=late,
+        exchange_us=exchange,
+        skipped=link.skipped_total - skipped - silent,
+        silent=silent,
+        late=int(np.sum(late > LATE_SHARE * period_us)),
+        lost=lost,
+    )
+
+
+def _observation(sample: Sample, began_ns: int) -> Observation:
+    motors = np.array(sample.motor_pos)
+    return Observation(
+        time=1e-9 * (sample.time_ns - began_ns),
+        motor_pos=motors,
+        joint_pos=np.array(sample.link_pos),
+        joint_vel=np.zeros(len(motors)),
+        spring_torque=np.array(sample.spring_torque),
+        applied_pos=motors,
+    )

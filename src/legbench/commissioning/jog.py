@@ -5,9 +5,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from legbench.commissioning.status import read_counts
+from legbench.drives.checks import check_together
+from legbench.drives.knee import knee_of
 from legbench.drives.limits import START_TOLERANCE, SafetyLimits
 from legbench.drives.session import Session
-from legbench.drives.stopping import check_stopping
 from legbench.errors import ConfigError
 
 FARTHEST = 0.3
@@ -45,7 +46,8 @@ def jog(
 
     Raises:
         ConfigError: no such node, too far or too fast for a jog, limits that leave something out,
-            ramps on which a motor runs on too far, or a motor that stands outside its range.
+            ramps on which a motor runs on too far, an object that cannot hold its range, a drive
+            that would go on without its master, or a motor that stands outside its range.
         BusError, DriveError, PlantFault: as `Link.start`, `Link.move_to`.
     """
     names = [node.name for node in session.config.nodes]
@@ -56,8 +58,10 @@ def jog(
     if not 0.0 < speed <= FASTEST:
         raise ConfigError(f"a jog at {speed:g} rad/s; it may be up to {FASTEST:g} rad/s")
     _check_limits(limits)
-    check_stopping(session.config, limits)
-    session.bring_up().identify()
+    check_together(session.config, limits)
+    up = session.bring_up()
+    up.listen()
+    up.identify()
     _check_range(session, limits, names.index(name), by)
     with session.link(limits, stiffness) as link:
         start = link.start().motor_pos
@@ -86,11 +90,13 @@ def _check_limits(limits: SafetyLimits) -> None:
 
 
 def _check_range(session: Session, limits: SafetyLimits, place: int, by: float) -> None:
-    """Every motor stands in its range, and the jogged one stays there."""
+    """Every motor and the knee stand in their ranges, and stay there over the jog."""
+    shown = []
     for axis, (node, (low, high)) in enumerate(
         zip(session.config.nodes, limits.motor_range, strict=True)
     ):
         here = node.motor.to_rad(read_counts(session, node)[0])
+        shown.append(here)
         if not low - START_TOLERANCE <= here <= high + START_TOLERANCE:
             raise ConfigError(
                 f"'{node.name}' stands at {here:.3f} rad, the limits are [{low:g}, {high:g}] rad; "
@@ -101,3 +107,16 @@ def _check_range(session: Session, limits: SafetyLimits, place: int, by: float) 
                 f"the jog would take '{node.name}' from {here:.3f} to {here + by:.3f} rad, the "
                 f"limits are [{low:g}, {high:g}] rad"
             )
+    before = knee_of(shown)
+    shown[place] += by
+    after, (low, high) = knee_of(shown), limits.motor_knee_range
+    if not low - START_TOLERANCE <= before <= high + START_TOLERANCE:
+        raise ConfigError(
+            f"the motors stand with q2 - q1 at {before:.3f} rad, the limits are [{low:g}, "
+            f"{high:g}] rad; all motors are enabled for a jog: move them back by hand"
+        )
+    if not low <= after <= high:
+        raise ConfigError(
+            f"the jog would take q2 - q1, the knee, from {before:.3f} to {after:.3f} rad, the "
+            f"limits are [{low:g}, {high:g}] rad"
+        )

@@ -60,7 +60,9 @@ def _status(sdo: SdoPort, node: NodeConfig) -> NodeStatus:
     mode = sdo.get_int(0x6061, 0, DataType.INTEGER8)
     code = sdo.get_int(0x603F, 0, DataType.UNSIGNED16)
     heat = node.temperature_object
-    celsius = None if heat is None else 0.1 * sdo.get_int(heat.index, heat.sub, heat.kind)
+    celsius = None
+    if heat is not None:
+        celsius = node.temperature_scale * sdo.get_int(heat.index, heat.sub, heat.kind)
     motor_pos = node.motor.to_rad(motor)
     near = node.link.to_counts(motor_pos)
     return NodeStatus(

@@ -38,12 +38,15 @@ def measure(session: Session, posture: Sequence[float]) -> list[Zero]:
 
     Raises:
         ConfigError: an angle that no leg stands at.
+        PlantFault: somebody else leads these drives.
         DriveError: a drive does not answer, is another one, or its encoders move.
     """
     for angle in posture:
         if not abs(angle) <= math.pi:
             raise ConfigError(f"an angle of the posture is {angle:g} rad; it must be -pi to pi rad")
-    session.bring_up().identify()
+    up = session.bring_up()
+    up.listen()
+    up.identify()
     return [
         _node(session, node, angle)
         for node, angle in zip(session.config.nodes, posture, strict=True)

@@ -11,7 +11,12 @@ class AbstractController(ABC):
     @property
     @abstractmethod
     def start_motor_pos(self) -> Floats:
-        """Motor positions (..., 2) [rad] that a run begins at rest with."""
+        """Motor positions (..., 2) [rad] that a run begins at rest with, and ends at on drives."""
+
+    @property
+    def law(self) -> "AbstractController":
+        """Controller whose source a fault shows: this one, or the one that it wraps."""
+        return self
 
     @abstractmethod
     def reset(self, observation: Observation) -> None:

@@ -50,6 +50,11 @@ class Checked(AbstractController):
         """The law's own, as an array (2,) [rad]."""
         return self._start
 
+    @property
+    def law(self) -> AbstractController:
+        """The guest's own law."""
+        return self._law
+
     def reset(self, observation: Observation) -> None:
         """Show the law the leg at rest."""
         _protect(observation)

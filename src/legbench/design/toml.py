@@ -2,13 +2,13 @@
 
 import json
 import math
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
 from legbench.design.leg import LegDesign, Limits, Segment
 from legbench.errors import DesignError
+from legbench.reading import UnreadableError, read_toml
 
 Built = TypeVar("Built")
 
@@ -172,16 +172,11 @@ def load_tables(path: Path, build: Callable[[Mapping[str, Any]], Built], hint: s
             refuses it; the message starts with the path.
     """
     try:
-        with path.open("rb") as file:
-            return build(tomllib.load(file))
+        return build(read_toml(path))
     except FileNotFoundError:
         raise DesignError(f"{path}: {hint}") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise DesignError(f"{path}: cannot be read: {error}") from None
-    except DesignError as error:
+    except (DesignError, UnreadableError) as error:
         raise DesignError(f"{path}: {error}") from None
-    except ValueError as error:  # TOMLDecodeError, or a whole number of thousands of digits
-        raise DesignError(f"{path}: not valid TOML: {error}") from None
 
 
 def design_to_mapping(design: LegDesign) -> dict[str, Any]:

@@ -13,11 +13,13 @@ What a program needs:
         sample = it.move_to(posture, speed)             # guarded, before the first real cycle
         applied = it.command(motor_pos)                 # [rad], slewed and clamped
         sample = it.exchange()                          # next tick; PlantFault after a stop
-    # close(): quick stop of all drives, pre-operational, lock released; never raises
+    # close(): quick stop of all drives, a look whether they have no power, pre-operational, lock
+    # released; a drive that keeps its power then ends the `with` by a StopError
 
 `link.Sample`: time_ns, late_ns, skipped, motor_pos, link_pos, spring_torque, applied_pos,
-statusword, fresh, temperature. `link.Link`: state (`LinkState`), fault, skipped_total, open(),
-stop(), close(); `cycle` (axes, watches, error_frames, late_frames), `bring_up`.
+statusword, fresh, temperature. `link.Link`: state (`LinkState`), fault, skipped_total,
+stopped (`master.stop_report.StopReport`), open(), stop(), close(); `cycle` (axes, watches,
+error_frames, late_frames), `bring_up`.
 
 The emulated leg, in virtual time:
 

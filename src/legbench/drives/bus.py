@@ -62,6 +62,11 @@ class LockstepBus(can.BusABC):
         super().__init__(channel=channel, can_filters=can_filters)
 
     @property
+    def alone(self) -> bool:
+        """Whether this is the only master, and nothing but drives hangs on the bus."""
+        return self.network.alone(self._station)
+
+    @property
     def state(self) -> can.BusState:
         """From the error counters; setting it `ACTIVE` restarts the controller."""
         errors = max(self.network.errors[self._station], self._station.unread)

@@ -1,7 +1,6 @@
 """Bus and limit files: TOML to dataclasses, every key checked."""
 
 import re
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from pathlib import Path
@@ -20,13 +19,23 @@ from legbench.drives.config import (
 )
 from legbench.drives.errors import CodecError
 from legbench.drives.limits import SafetyLimits
+from legbench.drives.objects import name_of
 from legbench.drives.units import AxisUnits
 from legbench.errors import ConfigError
+from legbench.reading import UnreadableError, read_toml
 
 Built = TypeVar("Built")
 _OBJECT = re.compile(r"([0-9A-Fa-f]{4}):([0-9A-Fa-f]{2}) ([a-z]+[0-9]*)")
 _IDENTITY = tuple(field.name for field in fields(Identity))
-_PLAIN_TYPES: dict[str, tuple[type, ...]] = {"str": (str,), "float": (int, float)}
+_PLAIN_TYPES: dict[str, tuple[type, ...]] = {
+    "str": (str,),
+    "float": (int, float),
+    "bool": (bool,),
+}
+LARGEST = 1e18
+"""No number of a file reaches it."""
+AXES = 2
+"""Axes of a leg, and so pairs of a range."""
 
 
 def load_bus(path: Path) -> BusConfig:
@@ -49,15 +58,10 @@ def load_limits(path: Path) -> SafetyLimits:
 
 def _load(path: Path, build: Callable[[Mapping[str, Any]], Built]) -> Built:
     try:
-        with path.open("rb") as file:
-            return build(tomllib.load(file))
+        return build(read_toml(path))
     except FileNotFoundError:
         raise ConfigError(f"{path}: no such file; hardware/ holds the bench's") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: cannot be read: {error}") from None
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigError(f"{path}: not valid TOML: {error}") from None
-    except ConfigError as error:
+    except (ConfigError, UnreadableError) as error:
         raise ConfigError(f"{path}: {error}") from None
 
 
@@ -66,8 +70,19 @@ def limits_from_mapping(content: Mapping[str, Any]) -> SafetyLimits:
     given = dict(content)
     for name in ("motor_range", "joint_range"):
         if name in given:
-            given[name] = tuple(_range(name, pair) for pair in _list(name, given[name]))
-    return _build(SafetyLimits, "limits", given, converted=("motor_range", "joint_range"))
+            pairs = _list(name, given[name])
+            if len(pairs) != AXES:
+                raise ConfigError(
+                    f"{name} has {len(pairs)} entries; it needs {AXES} pairs [low, high] in rad, "
+                    "one for each axis"
+                )
+            given[name] = tuple(_range(name, pair) for pair in pairs)
+    for name in ("motor_knee_range", "joint_knee_range"):
+        if name in given:
+            given[name] = _range(name, given[name])
+    _waive(given)
+    done = ("motor_range", "joint_range", "motor_knee_range", "joint_knee_range", "waive")
+    return _build(SafetyLimits, "limits", given, converted=done)
 
 
 def bus_from_mapping(content: Mapping[str, Any]) -> BusConfig:
@@ -75,7 +90,17 @@ def bus_from_mapping(content: Mapping[str, Any]) -> BusConfig:
     given = dict(content)
     tables = _list("node", given.pop("node", []))
     given["nodes"] = tuple(_node(table) for table in tables)
-    return _build(BusConfig, "bus", given, converted=("nodes",))
+    _waive(given)
+    return _build(BusConfig, "bus", given, converted=("nodes", "waive"))
+
+
+def _waive(given: dict[str, Any]) -> None:
+    """Turn the list of waivers into a tuple of names."""
+    if "waive" in given:
+        names = _list("waive", given["waive"])
+        if not all(isinstance(name, str) for name in names):
+            raise ConfigError(f"'waive' must be a list of names, not {names!r}")
+        given["waive"] = tuple(names)
 
 
 def _node(table: object) -> NodeConfig:
@@ -98,7 +123,11 @@ def _node(table: object) -> NodeConfig:
     if "soft_limits" in given:
         given["soft_limits"] = _range("soft_limits", given["soft_limits"])
     parameters = _table("parameters", given.get("parameters", {}))
-    given["parameters"] = tuple(_parameter(*item) for item in parameters.items())
+    given["parameters"] = found = tuple(_parameter(*item) for item in parameters.items())
+    keys = [parameter.key for parameter in found]
+    for key in keys:
+        if keys.count(key) > 1:
+            raise ConfigError(f"{where} gives parameter {name_of(*key)} twice")
     done = ("identity", "motor", "link", "link_object", "temperature_object", "rpdos", "tpdos")
     return _build(NodeConfig, where, given, converted=(*done, "parameters", "soft_limits"))
 
@@ -160,12 +189,28 @@ def _build(
             continue
         words = str(getattr(known[name].type, "__name__", known[name].type)).split(" | ")[0]
         allowed = _PLAIN_TYPES.get(words, (int,))
-        if isinstance(value, bool) or not isinstance(value, allowed):
+        if (isinstance(value, bool) and words != "bool") or not isinstance(value, allowed):
             raise ConfigError(f"{where}: {name} is {value!r}; it must be of type {words}")
+    plain = {
+        name: _finite(where, name, value)
+        for name, value in given.items()
+        if name not in converted and isinstance(value, int | float)
+    }
     try:
-        return kind(**given)
+        return kind(**(dict(given) | plain))
     except TypeError as error:
         raise ConfigError(f"{where}: {str(error).partition(') ')[2] or error}") from None
+
+
+def _finite(where: str, name: str, value: float) -> float:
+    """A number that arithmetic can take; one that says nothing is left out, not infinite."""
+    if not abs(value) < LARGEST:
+        text = f"{value}" if isinstance(value, float) else "too large"
+        raise ConfigError(
+            f"{where}: {name} is {text}; it must be a number below {LARGEST:g}: a limit that is "
+            "not to act is left out"
+        )
+    return value
 
 
 def _table(name: str, value: object) -> dict[str, Any]:
@@ -186,4 +231,5 @@ def _range(name: str, pair: object) -> tuple[float, float]:
         isinstance(number, int | float) and not isinstance(number, bool) for number in numbers
     ):
         raise ConfigError(f"{name} needs pairs [low, high] in rad, not {pair!r}")
-    return (float(numbers[0]), float(numbers[1]))
+    low, high = (float(_finite("range", name, number)) for number in numbers)
+    return (low, high)

@@ -3,13 +3,17 @@
 import math
 from dataclasses import dataclass, field, replace
 
+from legbench.drives.bus_numbers import BUS_NUMBERS, LONG, WORD, check_bus_numbers
+from legbench.drives.cob_ids import check_cob_id, check_distinct
 from legbench.drives.codec.datatypes import DataType
 from legbench.drives.codec.frame import LAST_NODE, RPDO_BASES, TPDO_BASES
 from legbench.drives.codec.pdo import Mapped, PdoMap
 from legbench.drives.errors import CodecError
 from legbench.drives.limits import Range
-from legbench.drives.objects import LINK_SHORT, PDO_COUNT, Key, name_of
+from legbench.drives.objects import LINK_SHORT, PDO_COUNT
+from legbench.drives.parameters import Parameter, check_parameter
 from legbench.drives.units import AxisUnits
+from legbench.drives.upper_ends import BUS_WAIVERS, check_number, check_waivers
 from legbench.errors import ConfigError
 
 STATUSWORD = Mapped(0x6041, 0, DataType.UNSIGNED16)
@@ -24,12 +28,22 @@ LARGEST_COUNT = (1 << 31) - 1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Identity:
-    """Identity object 1018h; what is not given is not checked."""
+    """Identity object 1018h; what is not given is not checked.
+
+    Raises:
+        ConfigError: a number that 32 bits do not hold.
+    """
 
     vendor: int
     product: int
     serial: int | None = None
     revision: int | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("vendor", "product", "serial", "revision"):
+            value = getattr(self, name)
+            if value is not None:
+                check_number(name, value, 0, LONG, "")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,52 +70,15 @@ class PdoConfig:
             PdoMap(self.objects)
         except CodecError as error:
             raise ConfigError(f"PDO {self.number}: {error}") from None
+        if self.cob_id is not None:
+            check_cob_id(self.cob_id)
+        check_number("deadline_ms", self.deadline_ms, 0, WORD, "ms")
 
 
 RPDO = PdoConfig(number=1, objects=(CONTROLWORD, TARGET_POSITION), deadline_ms=20)
 """The usual command: six bytes."""
 TPDO = PdoConfig(number=1, objects=(STATUSWORD, POSITION_ACTUAL, LINK_POSITION_SHORT))
 """The usual answer: eight bytes."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Parameter:
-    """An object that is written before enabling, and read back."""
-
-    index: int
-    sub: int
-    kind: DataType
-    value: int
-    optional: bool = False
-    """Left out on a drive that has no such object."""
-
-    @property
-    def key(self) -> Key:
-        """Index and sub-index."""
-        return (self.index, self.sub)
-
-
-OWN_OBJECTS = (0x1005, 0x1006, 0x1016, 0x1017, 0x1029, 0x6007, 0x6040, 0x605A, 0x6060)
-OWN_OBJECTS += (0x607A, 0x60B0, 0x60C2)
-"""Written from the rest of the bus file; a parameter would undo it."""
-PDO_OBJECTS = range(0x1400, 0x1C00)
-STOP_OBJECTS = range(0x605B, 0x605F)
-FOLLOWING_WINDOW, NO_WINDOW, SOFT_LIMITS = 0x6065, 0xFFFFFFFF, 0x607D
-
-
-def check_parameter(name: str, parameter: Parameter) -> None:
-    """Refuse a parameter that takes a protection away; raises ConfigError."""
-    index, what = parameter.index, None
-    if index in OWN_OBJECTS or index in PDO_OBJECTS:
-        what = "is written by itself, from the rest of the bus file: leave it out"
-    elif index == SOFT_LIMITS:
-        what = "would not move with offset_counts: give soft_limits = [low, high] in rad"
-    elif index in STOP_OBJECTS and parameter.value <= 0:
-        what = f"is {parameter.value}, which lets the leg drop: give 1 to 4"
-    elif index == FOLLOWING_WINDOW and parameter.value == NO_WINDOW:
-        what = "switches the following error off: give a window in counts"
-    if what is not None:
-        raise ConfigError(f"node '{name}': parameter {name_of(index, parameter.sub)} {what}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,7 +100,12 @@ class NodeConfig:
     parameters: tuple[Parameter, ...] = ()
     """Beyond what `configuration.configuration` writes by itself, in this order."""
     temperature_object: Mapped | None = None
-    """In 0.1 deg C, if the drive reports it."""
+    """Of whole numbers, if the drive reports its temperature."""
+    temperature_scale: float = 0.1
+    """What one count of that object is, which differs from maker to maker [deg C]."""
+    heartbeat_consumer: bool = True
+    """Whether the drive has 1016h, and so stops when its master's heartbeat is missing; some have
+    not, and must be given a `deadline_ms` of their commands instead."""
     soft_limits: Range | None = None
     """Of the motor, in the drive itself (607Dh), which clamps targets to them [rad]."""
 
@@ -148,6 +130,7 @@ class NodeConfig:
             )
         for parameter in self.parameters:
             check_parameter(self.name, parameter)
+        check_number("temperature_scale", self.temperature_scale, 1e-4, 10.0, "deg C a count")
         if self.soft_limits is not None:
             _ = self.soft_limits_counts
 
@@ -172,11 +155,15 @@ class NodeConfig:
 
     def rpdo_id(self, pdo: PdoConfig) -> int:
         """COB-ID of an RPDO."""
-        return pdo.cob_id or RPDO_BASES[pdo.number - 1] + self.node_id
+        return _given(pdo, RPDO_BASES[pdo.number - 1] + self.node_id)
 
     def tpdo_id(self, pdo: PdoConfig) -> int:
         """COB-ID of a TPDO."""
-        return pdo.cob_id or TPDO_BASES[pdo.number - 1] + self.node_id
+        return _given(pdo, TPDO_BASES[pdo.number - 1] + self.node_id)
+
+
+def _given(pdo: PdoConfig, predefined: int) -> int:
+    return predefined if pdo.cob_id is None else pdo.cob_id
 
 
 NOT_IN_FILES = "not in files"
@@ -225,6 +212,8 @@ class BusConfig:
     """Of a move to the start posture, before a run begins [rad/s]."""
     stated_bitrate: int | None = field(default=None, metadata={NOT_IN_FILES: True})
     """What the bus file says, where an interface is opened at another `bitrate` [bit/s]."""
+    waive: tuple[str, ...] = ()
+    """Protections that these drives do without, by name; every run says so."""
 
     def __post_init__(self) -> None:
         if not self.nodes:
@@ -234,19 +223,32 @@ class BusConfig:
             raise ConfigError(
                 f"node ids {', '.join(map(str, ids))} and master {self.master_id} must differ"
             )
-        cobs = [node.rpdo_id(pdo) for node in self.nodes for pdo in node.rpdos]
-        cobs += [node.tpdo_id(pdo) for node in self.nodes for pdo in node.tpdos]
-        if len(set(cobs)) != len(cobs):
-            raise ConfigError("two PDOs share a COB-ID; give one of them another 'cob_id'")
+        names = [node.name for node in self.nodes]
+        if len(set(names)) != len(names):
+            raise ConfigError(f"nodes are named {', '.join(names)}; names must differ")
+        self._check_pdos()
+        check_waivers(self.waive, BUS_WAIVERS, "bus")
+        numbers = {name: getattr(self, name) for name in (*BUS_NUMBERS, "heartbeat_ms")}
+        check_bus_numbers(numbers, self.waive)
         check_start_speed(self.start_speed)
         if not 0 < self.tpdo_deadline_us < self.period_us:
             raise ConfigError(
                 f"tpdo_deadline_us is {self.tpdo_deadline_us}; it must lie within the period of "
                 f"{self.period_us} us"
             )
-        for name in ("bitrate", "heartbeat_ms", "master_heartbeat_ms", "sdo_timeout_ms"):
-            if getattr(self, name) <= 0:
-                raise ConfigError(f"{name} is {getattr(self, name)}; it must be positive")
+
+    def _check_pdos(self) -> None:
+        users: dict[str, int] = {}
+        for node in self.nodes:
+            for words, pdos, cob_of in (
+                ("RPDO", node.rpdos, node.rpdo_id),
+                ("TPDO", node.tpdos, node.tpdo_id),
+            ):
+                numbers = [pdo.number for pdo in pdos]
+                if len(set(numbers)) != len(numbers):
+                    raise ConfigError(f"node '{node.name}' has {words}s {numbers}; each once")
+                users |= {f"{words}{pdo.number} of '{node.name}'": cob_of(pdo) for pdo in pdos}
+        check_distinct(users)
 
     def at(self, bitrate: int | None) -> "BusConfig":
         """The same bus as an interface at another bitrate sees it [bit/s]."""

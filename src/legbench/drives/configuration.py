@@ -9,6 +9,8 @@ from legbench.drives.config import BusConfig, NodeConfig, Parameter, PdoConfig
 from legbench.drives.objects import PDO_COUNT
 from legbench.errors import ConfigError
 
+HEARTBEATS_MISSED = 3
+"""So many periods of the master's heartbeat a drive waits (1016h)."""
 QUICK_STOP = 3
 """6007h: what a drive does when the connection is lost."""
 EVERY_SYNC = 1
@@ -38,10 +40,11 @@ def interpolation_time(period_us: int) -> tuple[int, int]:
 def configuration(bus: BusConfig, node: NodeConfig) -> Iterator[Parameter]:
     """Everything a drive is told in pre-operational, defaults included: nothing is assumed."""
     value, exponent = interpolation_time(bus.period_us)
-    watched = bus.master_id << 16 | 3 * bus.master_heartbeat_ms
+    watched = bus.master_id << 16 | HEARTBEATS_MISSED * bus.master_heartbeat_ms
     yield _parameter(0x1005, 0, U32, SYNC_ID)  # bit 30 clear: the drive is no SYNC producer
     yield _parameter(0x1006, 0, U32, bus.period_us)
-    yield _parameter(0x1016, 1, U32, watched)
+    if node.heartbeat_consumer:
+        yield _parameter(0x1016, 1, U32, watched)
     yield _parameter(0x1017, 0, U16, bus.heartbeat_ms)
     yield _parameter(0x1029, 1, U8, 0)  # a communication error leads to pre-operational
     yield _parameter(0x6007, 0, I16, QUICK_STOP)

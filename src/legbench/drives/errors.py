@@ -11,6 +11,10 @@ class NoAnswerError(DriveError):
     """A node that keeps silent when it is asked for an object."""
 
 
+class StopError(DriveError):
+    """Drives that keep their power after a stop, or no longer answer whether they do."""
+
+
 class BusError(LegbenchError, OSError):
     """A CAN interface that is not there, is down, is taken, or has left the bus."""
 

@@ -18,25 +18,31 @@ from typing import final
 
 import can
 
-from legbench.closing import Closing
 from legbench.drives.cia402 import Goal
 from legbench.drives.codec.nmt import NmtState
 from legbench.drives.config import BusConfig, check_start_speed
-from legbench.drives.errors import BusError, DriveError
-from legbench.drives.limits import Guard, SafetyLimits
+from legbench.drives.errors import DriveError
+from legbench.drives.guard import Guard
+from legbench.drives.limits import SafetyLimits
 from legbench.drives.master.bring_up import BringUp
 from legbench.drives.master.cycle import Cycle, Tick
 from legbench.drives.master.lock import ChannelLock
+from legbench.drives.master.parking import park
 from legbench.drives.master.port import Listener, Port
 from legbench.drives.master.read_only import may_pace, may_read
 from legbench.drives.master.sample import Sample, sample_of
+from legbench.drives.master.sdo_stop import leave_operational
 from legbench.drives.master.start_up import StartUp
 from legbench.drives.master.stop import StopLadder
+from legbench.drives.master.stop_report import Lead, StopReport
 from legbench.drives.master.supervisor import Supervisor
+from legbench.drives.master_watch import check_master_watch
 from legbench.drives.open_bus import timebase_of
+from legbench.drives.shortfall import Shortfall
 from legbench.drives.timebase import Timebase
 from legbench.drives.wire import check_load
 from legbench.errors import PlantFault
+from legbench.interrupts import Shield, shielded
 
 LISTEN_NS = 100_000_000
 """So long read-only listens for the SYNC of another master, and for heartbeats."""
@@ -54,17 +60,22 @@ class LinkState(Enum):
     """Process data flows, targets follow the motors."""
     RUNNING = auto()
     """All drives in operation enabled, commands are taken."""
+    STOPPING = auto()
+    """Told to stop, and not every drive has been seen without power yet."""
     STOPPED = auto()
+    """Every drive has been seen without power; or this link never led one."""
 
 
 @final
-class Link(Closing):
+class Link(Lead):
     """One master, its bus and its drives.
 
     Attributes:
         state: how far it has come.
         fault: the first fault; what ended the link.
+        stopped: how the stop of the drives has ended, none before it.
         skipped_total: ticks without SYNC since the start.
+        not_parked: what `close` failed to switch off, see `master.parking`.
         listening: read-only, and another master sends SYNC: this one sends nothing.
     """
 
@@ -107,16 +118,29 @@ class Link(Closing):
         self.state = LinkState.NEW
         self.fault: PlantFault | None = None
         self.skipped_total = 0
+        self.stopped: StopReport | None = None
+        self.not_parked: list[str] = []
         self._supervisor = Supervisor(self.cycle, config, self._limits, self._port.timebase)
         self._start_up = StartUp(self._port, self.cycle, config, read_only=read_only)
         self._last = Tick(0, 0, 0, 0, False)
         self._expected: list[tuple[float, ...]] = []
-        self._holds = self._closed = False
+        self._holds = self._closed = self._leads = False
+        self._told: Listener | None = None
         self.listening = False
 
     def tell(self, listener: Listener) -> None:
-        """Show every frame to a listener from now on."""
-        self._port.listener = listener
+        """Show every frame to a listener from now on, or from when the drives are configured.
+
+        A log that holds their configuration would, played back, bring parked drives back to life.
+        """
+        self._told = listener
+        if self.state is not LinkState.NEW:
+            self._port.listener = listener
+
+    @property
+    def listener_error(self) -> str | None:
+        """What a listener raised, in one line; it hears nothing more then."""
+        return self._port.listener_error
 
     # --- before anything moves ---------------------------------------------------------------
 
@@ -127,6 +151,7 @@ class Link(Closing):
         here.
 
         Raises:
+            ConfigError: a drive would go on for too long without its master.
             BusError: the channel has a master, or the interface does not work.
             DriveError: a drive is missing, is another one, or refuses its configuration; or, in
                 read-only, is not configured.
@@ -138,6 +163,7 @@ class Link(Closing):
             if self._read_only:
                 self._prepare_to_look()
             else:
+                check_master_watch(self._config, speed=self._limits.command_speed)
                 self._hold()
                 self._prepare_to_move()
             for node, poll in zip(self._config.nodes, self.cycle.polls, strict=True):
@@ -148,6 +174,8 @@ class Link(Closing):
             self._let_go()
             raise
         self.state = LinkState.CONFIGURED
+        if self._told is not None:
+            self._port.listener = self._told
 
     def _hold(self) -> None:
         self._lock.acquire()
@@ -159,8 +187,10 @@ class Link(Closing):
             self._lock.release()
 
     def _prepare_to_move(self) -> None:
+        self.bring_up.listen()
         self.bring_up.identify()
         self.bring_up.unpower()
+        self.bring_up.glance()
         self.bring_up.pre_operational()
         for node in self._config.nodes:
             self.bring_up.configure(node)
@@ -179,8 +209,11 @@ class Link(Closing):
         now_ns = self._port.timebase.now_ns()
         self.listening = self.cycle.hears_sync(now_ns + LISTEN_NS)
         self._start_up.listening = self.listening
-        if not self.listening:
+        if self.listening:
+            self.bring_up.lookout.rest()
+        else:
             self._hold()
+            self.bring_up.listen()
         self.bring_up.identify()
         self.bring_up.refuse_differences()
         if self.listening:
@@ -211,6 +244,8 @@ class Link(Closing):
             raise DriveError(
                 f"a link that is {self.state.name.lower()} cannot start; make a new one"
             )
+        if not self._read_only and self.cycle.led_by_another():
+            self._supervisor.alone()  # It has come since `open`, and keeps the drives.
         self.state = LinkState.CYCLIC
         try:
             self._start_up.settle(self._settling_tick)
@@ -226,6 +261,7 @@ class Link(Closing):
 
     def _enable(self, *, clear_faults: bool) -> None:
         up = self._start_up
+        self._leads = True
         if clear_faults:
             words = "leave its fault, whose cause still stands"
             up.seek(Goal.FAULT_RESET, up.faulted(), self._watched_tick, words)
@@ -261,6 +297,7 @@ class Link(Closing):
                 return self._sample()
             self._watched_tick()
             self._supervisor.states()
+            self.cycle.notices.statuswords(self.cycle.axes, self._last.time_ns)
             sample = self._sample()
             self._check(sample)
         except PlantFault as error:
@@ -270,6 +307,29 @@ class Link(Closing):
             self.stop()
             raise
         return sample
+
+    def look(self) -> Sample:
+        """Wait for the next tick and show what came, however late and incomplete it is.
+
+        In read-only, for those who measure: nothing has power, and no limit ends it.
+
+        Raises:
+            PlantFault: another master leads the drives.
+            DriveError: the link is not read-only, or not started.
+        """
+        self._refuse_ended()
+        if not self._read_only:
+            raise DriveError("this link may lead drives; limits have to watch it: use exchange")
+        try:
+            self._settling_tick()
+            self._start_up.idle()
+        except PlantFault as error:
+            self._end(error)
+            raise
+        except BaseException:
+            self.stop()
+            raise
+        return self._sample()
 
     def command(self, motor_pos: Sequence[float]) -> tuple[float, ...]:
         """Send a command for the coming period; what of it was applied [rad].
@@ -298,6 +358,16 @@ class Link(Closing):
             self.stop()
             raise
         return applied
+
+    def forget_wish(self) -> tuple[float, ...]:
+        """Measure the next step of the command from what was applied last; that [rad]."""
+        self._guard.forget_wish()
+        return self._guard.applied
+
+    @property
+    def shortfall(self) -> Shortfall:
+        """Which wishes were let through otherwise than wished."""
+        return self._guard.shortfall
 
     def move_to(self, motor_pos: Sequence[float], speed: float | None = None) -> Sample:
         """Go to a posture at a speed [rad/s], `start_speed` of the bus file by default.
@@ -368,6 +438,8 @@ class Link(Closing):
             spring_torque=sample.spring_torque,
             expected_pos=self._expected[0] if self._expected else None,
             temperature=sample.temperature,
+            fresh=sample.fresh,
+            elapsed=1 + sample.skipped,
         )
 
     def _end(self, error: PlantFault) -> None:
@@ -385,29 +457,64 @@ class Link(Closing):
     # --- the end -----------------------------------------------------------------------------
 
     def stop(self) -> None:
-        """Quick stop of all drives in this cycle, then no power; never raises."""
-        if self.state in (LinkState.CYCLIC, LinkState.RUNNING):
-            self.state = LinkState.STOPPED
-            if not self._read_only:
-                StopLadder(self.cycle).run()
+        """Quick stop of all drives in this cycle, then no power, then a look whether it is gone.
+
+        Raises no error; `stopped` tells how it has ended. No signal gets in between: a ^C that
+        comes meanwhile is raised at the end. While the stop is not verified, calling it again
+        repeats it. Drives that another master took before this one led them are left to it.
+        """
+        if self.state not in (LinkState.CYCLIC, LinkState.RUNNING, LinkState.STOPPING):
+            return
+        with shielded() as shield:
+            self.state = LinkState.STOPPING
+            if self._read_only or (not self._leads and self._led_by_another(shield)):
+                self.state = LinkState.STOPPED
+            else:
+                self._note(StopLadder(self.cycle, shield.hold).run())
 
     def close(self) -> None:
-        """Stop, leave the drives in pre-operational, release the channel; never raises.
+        """Stop, leave the drives parked in pre-operational, release the channel; raises no error.
 
-        Twice is once. A link that only looks leaves the drives of another master alone.
+        Twice is once. A stop that is not verified is repeated, in the end over SDO. A link that
+        only looks leaves the drives of another master alone.
         """
         if self.state is LinkState.NEW or self._closed:
             return
-        self._closed = True
-        looked = self.listening or self.state is LinkState.CONFIGURED
-        try:
+        with shielded() as shield:
+            looked = self.listening or self.state is LinkState.CONFIGURED
             self.stop()
-        finally:
-            try:
-                if not (self._read_only and (looked or self.cycle.led_by_another())):
-                    self.bring_up.pre_operational()
-            except BusError as error:
-                self.cycle.bus_error = error
-            finally:
-                self._let_go()
+            led = self._led_by_another(shield)
+            if not ((led and not self._leads) or (self._read_only and looked)):
+                order, nodes = self.bring_up.pre_operational, self._config.nodes
+                report = leave_operational(order, self._port, nodes, self.stopped, shield.hold)
+                if report is not None:
+                    self._note(report)
+            if not (self._read_only or led):
+                self._park(shield)
+            self._let_go()
+            self._closed = True
+            if self.state is not LinkState.STOPPING:
                 self.state = LinkState.STOPPED
+
+    def _note(self, report: StopReport) -> None:
+        """Remember how a stop has ended; one that repeats another keeps what that had to tell."""
+        self.stopped = report.after(self.stopped)
+        if report.verified:
+            self.state = LinkState.STOPPED
+
+    def _park(self, shield: Shield) -> None:
+        """Switch the drives' command frames off, so that no recorded log moves them."""
+        try:
+            powered = () if self.stopped is None else self.stopped.powered
+            self.not_parked = park(self._port, self._config, self.cycle.other, powered)
+        except BaseException as error:  # Whatever a driver raises, the channel is still released.
+            self.not_parked = [f"the drives are not parked: {error!r}"]
+            shield.hold(error)
+
+    def _led_by_another(self, shield: Shield) -> bool:
+        """Whether another master has been heard; where that cannot be told, by what is known."""
+        try:
+            return self.cycle.led_by_another()
+        except BaseException as error:  # Whatever a driver raises, the stop goes on.
+            shield.hold(error)
+            return self._read_only or self.cycle.stranger is not None

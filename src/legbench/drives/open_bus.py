@@ -100,6 +100,20 @@ def _named(interface: str, channel: str | None, error: Exception) -> BusError:
     )
 
 
+LISTEN_NS = 600_000_000
+"""So long a bus is listened to before anything is sent to drives [ns].
+
+A master that leads a leg sends SYNC and commands every few milliseconds. One that has only started,
+or stands still, is given away by its heartbeat: usual periods are 100 to 500 ms, and drives that
+are to stop within 100 ms need one of 33 ms. 600 ms hold a whole period of the slowest.
+"""
+
+
+def listening_ns(bus: can.BusABC) -> int:
+    """How long to listen for another master; not at all where nobody else is plugged in [ns]."""
+    return 0 if isinstance(bus, LockstepBus) and bus.alone else LISTEN_NS
+
+
 def timebase_of(bus: can.BusABC, spin_ns: int = 0) -> Timebase:
     """Virtual time of an emulated bus, the machine's for all others."""
     return bus.timebase if isinstance(bus, LockstepBus) else SystemTime(spin_ns)

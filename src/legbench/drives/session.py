@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from types import TracebackType
 from typing import final
 
 import can
@@ -15,9 +16,11 @@ from legbench.drives.master.bring_up import BringUp
 from legbench.drives.master.bus_log import BusLog
 from legbench.drives.master.lock import ChannelLock
 from legbench.drives.master.port import Port
+from legbench.drives.master.stop_report import Lead, StopReport, add_trouble
 from legbench.drives.open_bus import timebase_of
 from legbench.drives.realtime import Granted, ask
 from legbench.drives.timebase import SystemTime, Timebase
+from legbench.interrupts import shielded
 
 
 @final
@@ -50,6 +53,7 @@ class Session(Closing):
         self.timebase = timebase or timebase_of(bus)
         self.log: BusLog | None = None
         self._links: list[Link] = []
+        self._leads: list[Lead] = []
         self._lock = lock or self._lock_of_bus()
         self._closed = False
 
@@ -70,7 +74,11 @@ class Session(Closing):
         return granted
 
     def log_to(self, path: Path) -> None:
-        """Write every frame of all links from now on; raises BusError if there can be no file."""
+        """Write every frame of all links from now on, or from when their drives are configured.
+
+        Raises:
+            BusError: there can be no file.
+        """
         self.log = BusLog(path, str(getattr(self.bus, "channel", "can")))
         for link in self._links:
             link.tell(self.log)
@@ -103,27 +111,58 @@ class Session(Closing):
             limits,
             stiffness=stiffness,
             timebase=self.timebase,
-            listener=self.log,
             read_only=read_only,
             lock=self._lock,
         )
+        if self.log is not None:
+            link.tell(self.log)
         self._links.append(link)
+        self.leads(link)
         return link
 
+    def leads(self, lead: Lead) -> None:
+        """Close somebody who leads drives with this session, before the bus is shut down."""
+        self._leads.append(lead)
+
+    @property
+    def stopped(self) -> tuple[StopReport, ...]:
+        """How the stops of those who have led drives have ended."""
+        return tuple(lead.stopped for lead in self._leads if lead.stopped is not None)
+
     def close(self) -> None:
-        """Stop all links, close the log, shut the bus down; may be called twice, never raises."""
+        """Stop all drives, close the log, shut the bus down; may be called twice, raises no error.
+
+        No signal gets in between: a ^C that comes meanwhile is raised at the end.
+        """
         if self._closed:
             return
-        self._closed = True
-        for link in self._links:
-            link.close()
-        if self.log is not None:
-            self.log.close()
-        try:
-            self.bus.shutdown()
-        except Exception:
-            # The drives have been told to stop; the interface itself is beyond help, whatever it
-            # raises: a serial adapter has a ValueError for a garbled line.
-            return
-        finally:
+        with shielded() as shield:
+            for lead in self._leads:
+                try:
+                    lead.close()
+                except BaseException as error:  # The others have to be stopped, too.
+                    shield.hold(error)
+            self._closed = True
+            if self.log is not None:
+                self.log.close()
+            try:
+                self.bus.shutdown()
+            except BaseException as error:
+                # The drives have been told to stop; the interface itself is beyond help, whatever
+                # it raises: a serial adapter has a ValueError for a garbled line.
+                shield.hold(error)
             self._lock.release()
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Close; an exception on its way gets a note of every drive that keeps its power."""
+        try:
+            self.close()
+        finally:
+            if error is not None:
+                for report in self.stopped:
+                    add_trouble(error, report)

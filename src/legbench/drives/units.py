@@ -6,6 +6,11 @@ from typing import final
 
 from legbench.errors import ConfigError
 
+MOST_COUNTS = 1 << 31
+"""Beyond what a position object of 32 bits holds."""
+LEAST_GEAR = 1e-4
+"""No reduction of a joint lies beyond, nor its inverse."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AxisUnits:
@@ -29,10 +34,21 @@ class AxisUnits:
     """Signed [counts/rad]."""
 
     def __post_init__(self) -> None:
-        if self.counts_per_rev <= 0:
-            raise ConfigError(f"counts_per_rev is {self.counts_per_rev}; it must be positive")
-        if not (math.isfinite(self.gear) and self.gear > 0.0):
-            raise ConfigError(f"gear is {self.gear:g}; it must be positive, the sign is 'sign'")
+        if not 0 < self.counts_per_rev <= MOST_COUNTS:
+            raise ConfigError(
+                f"counts_per_rev is {self.counts_per_rev}; it must be positive and at most "
+                f"{MOST_COUNTS}"
+            )
+        if not LEAST_GEAR <= self.gear <= 1.0 / LEAST_GEAR:
+            raise ConfigError(
+                f"gear is {self.gear:g}; it must be positive, {LEAST_GEAR:g} to "
+                f"{1.0 / LEAST_GEAR:g}, the sign is 'sign'"
+            )
+        if not abs(self.offset_counts) < MOST_COUNTS:
+            raise ConfigError(
+                f"offset_counts is {self.offset_counts}; a position object of 32 bits shows less "
+                f"than {MOST_COUNTS} either way"
+            )
         if self.sign not in (-1, 1):
             raise ConfigError(f"sign is {self.sign}; it must be 1 or -1")
         if self.bits not in (16, 32):

@@ -51,26 +51,32 @@ def zeros_before(time: Floats, falling: Floats, rows: Ints, otherwise: float) ->
 
     On the line through the two samples before that step, clipped to it: what follows an event,
     impact or flight, obeys another law and is not interpolated into. Where those samples do not
-    fall, the share `otherwise` of the step. Rows are 1 or more, evenly spaced in time.
+    fall, the share `otherwise` of the step. Rows are 1 or more; their times need not be even.
     """
-    last = rows - 1
-    fall = falling[np.maximum(rows - 2, 0)] - falling[last]
+    last, before = rows - 1, np.maximum(rows - 2, 0)
+    step = time[rows] - time[last]
+    fall = falling[before] - falling[last]
     falls = fall > 0.0
-    share = np.where(falls, falling[last] / np.where(falls, fall, 1.0), otherwise)
-    return time[last] + np.clip(share, 0.0, 1.0) * (time[rows] - time[last])
+    # The fall goes on over this step as it went over the one before, which may be a longer one.
+    stretch = (time[last] - time[before]) / step
+    share = np.where(falls, falling[last] / np.where(falls, fall, 1.0) * stretch, otherwise)
+    return time[last] + np.clip(share, 0.0, 1.0) * step
 
 
 def extreme(time: Floats, value: Floats, row: int) -> tuple[float, float]:
     """Time [s] and value of the parabola through three samples around the extreme sample `row`.
 
-    The sample itself at either end of the column, or where the three lie on a line.
+    The sample itself at either end of the column, or where the three lie on a line. The times of
+    the samples need not be even.
     """
     if not 0 < row < len(value) - 1:
         return float(time[row]), float(value[row])
-    before, at, after = value[row - 1 : row + 2]
-    bend = before - 2.0 * at + after
+    left, right = np.diff(time[row - 1 : row + 2])
+    fall, rise = np.diff(value[row - 1 : row + 2])
+    # Divided differences: slope at the sample, and half of the second derivative.
+    bend = (rise / right - fall / left) / (left + right)
     if not (np.isfinite(bend) and bend != 0.0):
-        return float(time[row]), float(at)
-    offset = float(np.clip(0.5 * (before - after) / bend, -0.5, 0.5))
-    step = 0.5 * (time[row + 1] - time[row - 1])
-    return float(time[row] + offset * step), float(at - 0.25 * (before - after) * offset)
+        return float(time[row]), float(value[row])
+    slope = (fall / left * right + rise / right * left) / (left + right)
+    offset = float(np.clip(-0.5 * slope / bend, -0.5 * left, 0.5 * right))
+    return float(time[row] + offset), float(value[row] + (slope + bend * offset) * offset)

@@ -9,6 +9,7 @@ import numpy as np
 from legbench.metrics.analysis import Analysis, analysed
 from legbench.metrics.caveats import warnings_of
 from legbench.metrics.energy import energy_residual, loop_gap_max
+from legbench.metrics.limited import limited_commands
 from legbench.metrics.source import Recorded
 from legbench.strict_json import null_for_nan
 
@@ -29,6 +30,10 @@ class Summary:
     """How the run ended, as it says itself."""
     cause: str | None
     """Why it ended early."""
+    limited_cycles: int
+    """Cycles in which the limits changed the command."""
+    limited_max: list[float]
+    """Largest change of each motor's command by the limits [rad]."""
     duration: float
     """First to last row [s]."""
     real_time_factor: float
@@ -121,6 +126,7 @@ def summarise(recording: Recorded) -> Summary:
         periods=periods,
         loop_gap_max=loop_gap_max(run),
         warnings=warnings_of(run),
+        **limited_commands(run),
         **_clock(run),
         **_jumping(run),
         **_energy(run),

@@ -6,7 +6,6 @@ it stopped; the file begins with what was asked, and a different question is ref
 
 import json
 import multiprocessing
-import signal
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
@@ -23,8 +22,10 @@ from legbench.control import JumpConfig
 from legbench.design import LegDesign
 from legbench.design.toml import design_to_mapping
 from legbench.errors import ConfigError
+from legbench.interrupts import ignore_interrupts
 from legbench.modes.drive import AbstractDrive, JumpLaw, Passive
 from legbench.modes.hop import NAMES, UNITS, Apex, Ending, return_map
+from legbench.reading import parse_json
 from legbench.signals import Floats, Ints
 
 Progress = Callable[[int, int], None]
@@ -148,7 +149,7 @@ def _start_worker(question: Question) -> None:
 def _start_process(question: Question) -> None:
     # ^C goes to the whole group; a worker that dies of it takes the queue's lock along, and the
     # one who tidies up waits for ever.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    ignore_interrupts()
     _start_worker(question)
 
 
@@ -176,7 +177,7 @@ def _read(path: Path, question: Question) -> dict[int, list[int]]:
     rows: dict[int, list[int]] = {}
     for line in lines[1:]:
         try:
-            entry = json.loads(line)
+            entry = parse_json(line)
             index, fates = int(entry["row"]), [int(fate) for fate in entry["fates"]]
         except (ValueError, KeyError, TypeError):
             continue

@@ -10,9 +10,10 @@ first seen in `observation_{k+1}`. Time comes from the plant, waiting from the l
 """
 
 from abc import abstractmethod
+from collections.abc import Callable
 
 from legbench.closing import Closing
-from legbench.signals import Command, Observation
+from legbench.signals import Command, Floats, Observation
 
 
 class AbstractPlant(Closing):
@@ -32,6 +33,25 @@ class AbstractPlant(Closing):
         Raises:
             PlantFault: the plant cannot go on; what it did until then stands.
         """
+
+    def rest(self, motor_pos: Floats, interrupted: Callable[[], bool]) -> str | None:
+        """Lead the leg to rest with its motors at a posture, after the last step of a run.
+
+        A leg that nothing can happen to, such as a simulated one, is left as it is: nothing is
+        done, a later `step` goes on as if this had not been called. Returns early, and stops
+        nothing, once `interrupted` says so; `close` stops.
+
+        Args:
+            motor_pos: the posture (..., 2) [rad].
+            interrupted: asked in every period.
+
+        Returns:
+            What to tell the user about it, None if there is nothing.
+
+        Raises:
+            PlantFault: the plant cannot go on; the run ends with this fault.
+        """
+        return None
 
     @abstractmethod
     def close(self) -> None:

@@ -1,6 +1,7 @@
 """One leg in the equations of the paper, behind the same seam as the simulated one."""
 
 import math
+from collections.abc import Callable
 from typing import final
 
 import numpy as np
@@ -15,7 +16,7 @@ from legbench.errors import ConfigError, PlantFault
 from legbench.plant.abstract import AbstractPlant
 from legbench.plant.start import PERIOD, Start
 from legbench.servo import Servo, ServoConfig
-from legbench.signals import Command, Observation, Truth
+from legbench.signals import Command, Floats, Observation, Truth
 
 STRAIGHT_MARGIN = 0.02
 """A knee this close to 0 or pi has gone through its stop [rad]."""
@@ -95,6 +96,9 @@ class AnalyticPlant(AbstractPlant):
                 "(--dz2) or limit the servo (--slew-rate)",
             )
         return self._observe(command)
+
+    def rest(self, motor_pos: Floats, interrupted: Callable[[], bool]) -> None:
+        """Leave the computed leg where it is."""
 
     def close(self) -> None:
         """Nothing to release."""

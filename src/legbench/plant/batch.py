@@ -1,7 +1,7 @@
 """Many legs in step, each with a design of its own, bit-identical to as many single ones."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import final
 
 import mujoco
@@ -15,7 +15,7 @@ from legbench.plant.abstract import AbstractPlant
 from legbench.plant.observe import LiveArrays, Observer, branch_fault_mask
 from legbench.plant.start import PERIOD, Start
 from legbench.servo import Servo, ServoConfig
-from legbench.signals import Bools, Command, Observation
+from legbench.signals import Bools, Command, Floats, Observation
 
 
 @final
@@ -100,6 +100,9 @@ class BatchPlant(AbstractPlant):
         self._cycle += 1
         self.faulted |= branch_fault_mask(self._observer.joints, self._arrays.qpos)
         return self._observer.look(self._cycle * PERIOD, command.motor_pos)
+
+    def rest(self, motor_pos: Floats, interrupted: Callable[[], bool]) -> None:
+        """Leave the simulated legs where they are."""
 
     def close(self) -> None:
         """Nothing to release."""

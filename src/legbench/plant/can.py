@@ -1,6 +1,6 @@
 """The leg on the bench, or an emulated one: two servo drives on a CAN bus."""
 
-import math
+from collections.abc import Callable, Sequence
 from typing import final
 
 import numpy as np
@@ -8,7 +8,9 @@ import numpy as np
 from legbench.drives.link import Link, LinkState, Sample
 from legbench.drives.session import Session
 from legbench.plant.abstract import AbstractPlant
+from legbench.plant.landing import PATIENCE, STILL_RANGE, Landing, land
 from legbench.plant.start import Start
+from legbench.plant.velocity import VelocityEstimate
 from legbench.signals import Command, Floats, Observation
 
 VELOCITY_BANDWIDTH = 200.0
@@ -27,16 +29,19 @@ class CanPlant(AbstractPlant):
 
     The link waits for its own grid: run it with a clock that does not (`VirtualClock`, or one
     that reports `late`). Link and motor angles are the encoders', spring torque is stiffness times
-    their difference. `joint_vel` is the encoders' difference over one period behind a first-order
-    low-pass of 200 Hz, 0.8 ms late. `applied_pos` is what the limits let through; in read-only,
-    where nothing is commanded, it is where the motors are. There is no truth. A command is seen
-    two observations later: one cycle more than in `SimPlant`.
+    their difference. `time` is that of the SYNC that the observation answers, since the one of
+    observation 0: a late SYNC has a late time, and a tick without SYNC leaves a gap. `joint_vel` is
+    the encoders' difference over the time between two SYNCs behind a first-order low-pass of
+    200 Hz, 0.8 ms late; a drive whose answer is missing keeps its velocity. `applied_pos` is what
+    the limits let through; in read-only, where nothing is commanded, it is where the motors are.
+    There is no truth. A command is seen two observations later: one cycle more than in `SimPlant`.
 
     Attributes:
         link: the cyclic link.
         sample: what it showed last.
         late: of the last SYNC after its place on the grid [s].
         began: SYNC of observation 0, on the link's time base [s].
+        landing: how `rest` went.
     """
 
     def __init__(
@@ -47,6 +52,7 @@ class CanPlant(AbstractPlant):
         *,
         read_only: bool = False,
         speed: float | None = None,
+        lands: bool = True,
     ) -> None:
         """Wire the parts; nothing is sent.
 
@@ -55,18 +61,20 @@ class CanPlant(AbstractPlant):
             link: of that session.
             start: posture of the motors at which a run begins.
             read_only: never enable; commands are recorded and go nowhere.
-            speed: of the way to the start posture, `start_speed` of the bus file by default
-                [rad/s].
+            speed: of the way to the start posture and to rest, `start_speed` of the bus file by
+                default [rad/s].
+            lands: whether `rest` leads the leg to rest, instead of leaving it to `close`.
         """
         self.period = session.config.period
         self.link, self.late, self.began = link, 0.0, 0.0
         self.sample: Sample | None = None
         self._session, self._start = session, start
+        self.landing: Landing | None = None
+        self._lands = lands and not read_only
         self._read_only, self._speed = read_only, speed
-        self._gain = 1.0 - math.exp(-2.0 * math.pi * VELOCITY_BANDWIDTH * self.period)
-        self._links: Floats = np.zeros(2)
-        self._velocity: Floats = np.zeros(2)
-        self._cycle = 0
+        self._velocity = VelocityEstimate(VELOCITY_BANDWIDTH, self.period)
+        self._period_ns = session.config.period_ns
+        self._began_ns = 0
 
     def reset(self) -> Observation:
         """Start the drives where they stand, go slowly to the start posture, wait for rest.
@@ -81,8 +89,7 @@ class CanPlant(AbstractPlant):
         sample = self.link.exchange() if running else self.link.start()
         if not self._read_only:
             sample = self.link.move_to(self._start.motor_pos.tolist(), self._speed)
-        self._links = np.array(sample.link_pos)
-        self._velocity = np.zeros(2)
+        self._velocity.reset(sample.time_ns, sample.link_pos)
         still = 0
         for _ in range(STILL_PATIENCE):
             seen = self._observe(self._exchange(self._start.motor_pos))
@@ -90,7 +97,8 @@ class CanPlant(AbstractPlant):
             if still >= STILL_CYCLES:
                 break
         sample = self._exchange(self._start.motor_pos)
-        self._cycle, self.began = 0, 1e-9 * sample.time_ns
+        self.link.shortfall.restart()
+        self._began_ns, self.began = sample.time_ns, 1e-9 * sample.time_ns
         return self._observe(sample)
 
     def step(self, command: Command) -> Observation:
@@ -99,9 +107,36 @@ class CanPlant(AbstractPlant):
         Raises:
             PlantFault: a limit or a watchdog; all drives have been stopped in that cycle.
         """
-        sample = self._exchange(command.motor_pos)
-        self._cycle += 1 + sample.skipped
-        return self._observe(sample)
+        return self._observe(self._exchange(command.motor_pos))
+
+    def rest(self, motor_pos: Floats, interrupted: Callable[[], bool]) -> str | None:
+        """Lead the motors to a posture as slowly as to the start, wait until the leg rests.
+
+        Limits and watchdogs act as in `step`. In read-only nothing is commanded.
+
+        Raises:
+            PlantFault: a limit or a watchdog; all drives have been stopped in that cycle.
+        """
+        if not self._lands or self.link.state is not LinkState.RUNNING:
+            return None
+        self.landing = landing = land(
+            self._lead,
+            motor_pos.tolist(),
+            self.link.forget_wish(),
+            speed=self._speed or self._session.config.start_speed,
+            period=self.period,
+            interrupted=interrupted,
+        )
+        if landing.rested or landing.interrupted:
+            return None
+        return (
+            f"the leg still swung by more than {STILL_RANGE:g} rad after {PATIENCE:g} s in its "
+            "rest posture; its power went then"
+        )
+
+    def _lead(self, motor_pos: Sequence[float]) -> tuple[Sequence[float], Sequence[float]]:
+        sample = self._exchange(np.array(motor_pos))
+        return sample.applied_pos, sample.link_pos
 
     def close(self) -> None:
         """Quick stop of both drives, pre-operational, bus closed; twice is once, never raises."""
@@ -120,15 +155,17 @@ class CanPlant(AbstractPlant):
         return self.sample
 
     def _observe(self, sample: Sample) -> Observation:
-        links, motors = np.array(sample.link_pos), np.array(sample.motor_pos)
-        rate = (links - self._links) / (self.period * (1 + sample.skipped))
-        self._velocity = self._velocity + self._gain * (rate - self._velocity)
-        self._links = links
+        motors = np.array(sample.motor_pos)
         return Observation(
-            time=self._cycle * self.period,
+            time=self._since_start(sample.time_ns),
             motor_pos=motors,
-            joint_pos=links,
-            joint_vel=self._velocity,
+            joint_pos=np.array(sample.link_pos),
+            joint_vel=self._velocity.update(sample.time_ns, sample.link_pos, sample.fresh),
             spring_torque=np.array(sample.spring_torque),
             applied_pos=np.array(sample.applied_pos) if sample.applied_pos else motors,
         )
+
+    def _since_start(self, time_ns: int) -> float:
+        """Time since observation 0 [s]; on the grid the same number as in a simulation."""
+        cycles, beside_ns = divmod(time_ns - self._began_ns, self._period_ns)
+        return cycles * self.period + 1e-9 * beside_ns

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, ClassVar, Final
 from legbench.drives.emulated.faults import Fault
 from legbench.drives.limits import SafetyLimits
 from legbench.guests import WHERE, load_text
+from legbench.plant.landing import End
 from legbench.plant.opening import Leg, OpenPlant
 
 if TYPE_CHECKING:
@@ -39,6 +40,9 @@ class CanChoice:
     """Observe, change nothing in a drive; commands are recorded and go nowhere."""
     limits: SafetyLimits | None = None
     """Safety limits, by default those of limits.toml beside the bus file [a limits file]."""
+    end: End = End.REST
+    """End of a run whose time is over: rest leads the leg to its start posture and waits until it
+    is still, for 10 s at most; stop is a quick stop at the last row, in mid-flight, too."""
     faults: tuple[Fault, ...] = ()
     """Faults to inject into the emulated leg in this process, on its virtual time."""
 

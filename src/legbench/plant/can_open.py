@@ -6,6 +6,7 @@ from typing import Any, final
 from legbench.clock import AbstractClock
 from legbench.drives.bus import LockstepBus
 from legbench.drives.bus_file import load_bus
+from legbench.drives.checks import check_together
 from legbench.drives.config import BusConfig
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.build import emulate
@@ -15,17 +16,22 @@ from legbench.drives.master.lock import ChannelLock
 from legbench.drives.open_bus import adapter_of, open_bus
 from legbench.drives.realtime import Granted
 from legbench.drives.session import Session
-from legbench.drives.stopping import check_stopping
+from legbench.drives.waivers import describe_waivers
 from legbench.drives.wire import check_load
-from legbench.errors import ConfigError, LegbenchError
+from legbench.errors import ConfigError
 from legbench.plant.can import CanPlant
 from legbench.plant.can_choice import BUS_LOG, LIMITS_NAME, CanChoice
-from legbench.plant.design_limits import limits_within
+from legbench.plant.can_events import bus_events, gone_drive
+from legbench.plant.design_limits import joint_ranges, limits_events, limits_within
 from legbench.plant.emulated_leg import EmulatedLeg
+from legbench.plant.landing import End
 from legbench.plant.limits_file import limits_for
 from legbench.plant.opening import Leg, OpenPlant
 from legbench.plant.start import PERIOD
 from legbench.servo import ServoConfig
+
+IDLE_POS = (-0.3, 0.3)
+"""Motors of emulated drives that nothing hangs on: a knee that every leg can have [rad]."""
 
 
 @final
@@ -66,24 +72,30 @@ def open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
         limits = limits_for(choice.bus.parent / LIMITS_NAME, leg.design)
     else:
         limits = limits_within(choice.limits, leg.design)
-    check_stopping(config, limits)
+    check_together(config, limits, stops=joint_ranges(leg.design), leads=not choice.read_only)
     if not choice.is_virtual(config):
         limits.require_complete()
     session = open_session(config, choice, leg, leads=not choice.read_only)
-    granted = session.be_punctual()
     try:
+        granted = session.be_punctual()
         link = session.link(limits, leg.design.stiffness, read_only=choice.read_only)
         link.open()
-    except LegbenchError:
+    except BaseException:
         session.close()
         raise
-    plant = CanPlant(session, link, leg.start, read_only=choice.read_only)
+    plant = CanPlant(
+        session, link, leg.start, read_only=choice.read_only, lands=choice.end is End.REST
+    )
+    waived = describe_waivers(config, limits)
     return OpenPlant(
         plant=plant,
         clock=CanClock(plant),
         facts=_facts(choice, config, limits, granted),
         start_log=lambda run: session.log_to(run / BUS_LOG),
-        events=lambda: {"bus": _bus_event(plant)},
+        events=lambda: limits_events(waived, link.shortfall) | bus_events(plant),
+        realtime=not session.virtual,
+        gone=lambda: gone_drive(link),
+        trouble=lambda: None if link.stopped is None else link.stopped.trouble,
     )
 
 
@@ -98,6 +110,8 @@ def _facts(
             "channel": choice.channel or config.channel,
             "bitrate": choice.bitrate or config.bitrate,
             "read_only": choice.read_only,
+            "end": choice.end.value,
+            "waived": list(config.waive),
             "nodes": {
                 node.name: {"id": node.node_id, "identity": asdict(node.identity)}
                 for node in config.nodes
@@ -105,21 +119,6 @@ def _facts(
         },
         "limits": asdict(limits),
         "realtime": None if granted is None else asdict(granted),
-    }
-
-
-def _bus_event(plant: CanPlant) -> dict[str, Any]:
-    """What happened on the bus during a run."""
-    link, cycle = plant.link, plant.link.cycle
-    return {
-        "skipped_cycles": link.skipped_total,
-        "silent_cycles": cycle.silent_total,
-        "late_frames": cycle.late_frames,
-        "error_frames": cycle.error_frames,
-        "lost_cycles": [watch.lost_total for watch in cycle.watches],
-        "emergencies": [str(text) for watch in cycle.watches for text in watch.history],
-        "state": link.state.name.lower(),
-        "began": plant.began,
     }
 
 
@@ -162,7 +161,9 @@ def _emulated(config: BusConfig, choice: CanChoice, leg: Leg | None) -> Network:
     For those who only look its drives have kept their configuration: nobody may write it.
     """
     if leg is None:
-        return emulate(config, configured=choice.read_only)
+        idle = [Behaviour(start_pos=start) for start in IDLE_POS]
+        fits = len(config.nodes) == len(idle)
+        return emulate(config, idle if fits else None, configured=choice.read_only)
     motors = [float(value) for value in leg.start.motor_pos]
     return emulate(
         config,

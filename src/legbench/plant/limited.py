@@ -1,14 +1,17 @@
 """Safety limits around a plant that has none of its own."""
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import replace
 from typing import final
 
 import numpy as np
 
-from legbench.drives.limits import Guard, SafetyLimits
+from legbench.drives.guard import Guard
+from legbench.drives.limits import SafetyLimits
+from legbench.drives.shortfall import Shortfall
 from legbench.plant.abstract import AbstractPlant
-from legbench.signals import Command, Observation
+from legbench.signals import Command, Floats, Observation
 
 
 @final
@@ -52,6 +55,15 @@ class LimitedPlant(AbstractPlant):
             expected_pos=self._expected.popleft(),
         )
         return seen
+
+    def rest(self, motor_pos: Floats, interrupted: Callable[[], bool]) -> str | None:
+        """Pass it on to the plant within."""
+        return self._plant.rest(motor_pos, interrupted)
+
+    @property
+    def shortfall(self) -> Shortfall:
+        """Which commands were let through otherwise than wished."""
+        return self._guard.shortfall
 
     def close(self) -> None:
         """Close the plant within."""

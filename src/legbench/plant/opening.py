@@ -27,6 +27,11 @@ def _no_log(run: Path) -> None:
     """Most plants log nothing of their own."""
 
 
+def _nothing() -> str | None:
+    """Most plants have nothing to tell."""
+    return None
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OpenPlant:
     """A plant that is ready to be reset, and what belongs to a run on it."""
@@ -40,6 +45,12 @@ class OpenPlant:
     """Begin to log into a run folder, such as raw frames."""
     events: Callable[[], dict[str, dict[str, Any]]] = dict
     """What a run on it has to tell in the end, by name."""
+    realtime: bool = False
+    """Whether the machine's clock paces it: whoever holds up its loop holds up drives."""
+    gone: Callable[[], str | None] = _nothing
+    """Why a run that has lasted its time was none to its end, asked before the plant is closed."""
+    trouble: Callable[[], str | None] = _nothing
+    """What a person beside the plant has to know once it is closed, such as a drive with power."""
 
 
 @runtime_checkable

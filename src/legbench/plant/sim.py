@@ -1,6 +1,7 @@
 """One leg in MuJoCo."""
 
 import math
+from collections.abc import Callable
 from typing import final
 
 import mujoco
@@ -13,7 +14,7 @@ from legbench.plant.abstract import AbstractPlant
 from legbench.plant.observe import LiveArrays, Observer, branch_fault
 from legbench.plant.start import PERIOD, Start
 from legbench.servo import Servo, ServoConfig
-from legbench.signals import Command, Observation
+from legbench.signals import Command, Floats, Observation
 
 
 @final
@@ -89,6 +90,9 @@ class SimPlant(AbstractPlant):
                 "it was assembled on; push less (--dz2) or limit the servo (--slew-rate)",
             )
         return self._observer.look(self._cycle * PERIOD, command.motor_pos)
+
+    def rest(self, motor_pos: Floats, interrupted: Callable[[], bool]) -> None:
+        """Leave the simulated leg where it is."""
 
     def close(self) -> None:
         """Nothing to release."""

@@ -37,6 +37,7 @@ def write_archive(run: Path, batches: WholeBatches, manifest: Mapping[str, Any])
     else:
         schema = batches.schema.with_metadata(carrying(manifest))
     try:
+        draft.unlink(missing_ok=True)
         written = _write(draft, batches, schema)
         found = count_rows(draft)
         if found != written:

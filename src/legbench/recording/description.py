@@ -93,6 +93,8 @@ class RunDescription:
     """Plant time that was asked for [s]."""
     period: float | None
     """Time from row to row [s]."""
+    looks_only: bool
+    """Whether the plant was only looked at, so that commands went nowhere."""
     initial_state: InitialState | None
     versions: Mapping[str, str]
     """Version by package."""
@@ -159,6 +161,7 @@ def describe(manifest: Mapping[str, Any], fallback_id: str = "") -> RunDescripti
         duration=head.number("duration"),
         planned_duration=experiment.number("duration"),
         period=head.number("period"),
+        looks_only=head.table("plant").table("bus").entries.get("read_only") is True,
         initial_state=_initial_state(head.table("initial_state")),
         versions=MappingProxyType(
             {str(name): str(text) for name, text in provenance.table("versions").entries.items()}

@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from legbench.errors import RecordingError
-from legbench.recording.files import reason, write_whole
+from legbench.reading import LARGEST_EVENTS, UnreadableError, parse_json, read_file
+from legbench.recording.files import write_whole
 from legbench.recording.layout import EVENTS, TORN
 from legbench.recording.manifest import plain
 
@@ -49,17 +50,17 @@ def drop_torn_events(run: Path) -> int:
 
 def _lines(run: Path) -> list[bytes]:
     try:
-        content = (run / EVENTS).read_bytes()
+        content = read_file(run / EVENTS, LARGEST_EVENTS)
     except FileNotFoundError:
         return []
-    except OSError as error:
-        raise RecordingError(f"{run / EVENTS} cannot be read: {reason(error)}") from error
+    except UnreadableError as error:
+        raise RecordingError(f"{run / EVENTS}: {error}") from error
     return [line for line in content.split(b"\n") if line]
 
 
 def _parse(line: bytes) -> Event | None:
     try:
-        event = json.loads(line)
-    except ValueError:
+        event = parse_json(line)
+    except UnreadableError:
         return None
     return event if isinstance(event, dict) else None

@@ -3,6 +3,7 @@
 import errno
 import fcntl
 import os
+import time
 from contextlib import suppress
 from pathlib import Path
 from typing import final
@@ -78,30 +79,51 @@ def put_in_place(draft: Path, path: Path) -> None:
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Write `content` as the file `path`, or leave `path` untouched and raise OSError."""
+    """Write `content` as the file `path`, or leave `path` untouched; raises OSError."""
     draft = path.with_name(f".{path.name}.draft")
     try:
-        draft.write_bytes(content)
+        # Made anew: whatever lies there, such as a link, is not written through.
+        draft.unlink(missing_ok=True)
+        with draft.open("xb") as file:
+            file.write(content)
         put_in_place(draft, path)
-    except OSError:
+    except BaseException:
         with suppress(OSError):
             draft.unlink()
         raise
 
 
-def lock(fd: int, run: Path) -> None:
+def lock(fd: int, run: Path, *, patience: float = 0.0) -> None:
     """Hold an advisory lock on `fd` until it is closed, by whatever end of the process.
 
     A file system without locks is taken as it is.
 
+    Args:
+        fd: of a file of the run.
+        run: its folder.
+        patience: how long to wait for a process that holds the lock [s].
+
     Raises:
         RecordingError: another process holds the lock, so it is writing this run.
     """
+    deadline = time.monotonic() + patience
     try:
-        fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        message = f"{run} is still being written by another process; end that run first"
-        raise RecordingError(message) from None
+        while not _locked(fd):
+            if time.monotonic() >= deadline:
+                message = f"{run} is still being written by another process; end that run first"
+                raise RecordingError(message)
+            time.sleep(0.02)
+    except RecordingError:
+        raise
     except OSError as error:
         if error.errno not in (errno.ENOLCK, errno.ENOTSUP, errno.EBADF):
             raise
+
+
+def _locked(fd: int) -> bool:
+    """Take the lock if nobody holds it; raises OSError where there are no locks."""
+    try:
+        fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True

@@ -12,8 +12,9 @@ import numpy as np
 from legbench import __version__
 from legbench.errors import ConfigError, FormatError, RecordingError
 from legbench.guests import load_text
+from legbench.reading import LARGEST_JSON, UnreadableError, parse_json, read_file
 from legbench.recording.description import layout_of
-from legbench.recording.files import reason, write_whole
+from legbench.recording.files import write_whole
 from legbench.recording.layout import FORMAT, RUN, RUNNING
 
 Manifest = dict[str, Any]
@@ -85,19 +86,19 @@ def read_manifest(run: Path) -> Manifest | None:
     """
     path = run / RUN
     try:
-        content = path.read_bytes()
+        content = read_file(path, LARGEST_JSON)
     except FileNotFoundError:
         return None
-    except OSError as error:
-        raise RecordingError(f"{path} cannot be read: {reason(error)}") from error
+    except UnreadableError as error:
+        raise RecordingError(f"{path}: {error}") from error
     return parse_manifest(content, source=str(path))
 
 
 def parse_manifest(content: bytes, *, source: str) -> Manifest:
     """Return the manifest in `content`; raises as `read_manifest`."""
     try:
-        manifest = json.loads(content)
-    except ValueError as error:
+        manifest = parse_json(content)
+    except UnreadableError as error:
         raise RecordingError(
             f"{source} is damaged: {error}; move it away and the copy in the samples is used"
         ) from error

@@ -16,6 +16,9 @@ from legbench.recording.manifest import Manifest, read_manifest, write_manifest
 from legbench.recording.reader import run_folder
 from legbench.recording.stream import WholeBatches, carried_manifest
 
+HANDED_OVER = 2.0
+"""Longest wait for a recording process that writes what its killed master handed over [s]."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecoveryReport:
@@ -71,7 +74,7 @@ def recover(path: Path) -> RecoveryReport:
             if (run / STREAM).is_file():
                 fd = os.open(run / STREAM, os.O_RDWR)
                 held.callback(os.close, fd)
-                lock(fd, run)
+                lock(fd, run, patience=HANDED_OVER)
             return _recover(run)
         except RecordingError:
             raise

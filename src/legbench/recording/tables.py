@@ -85,7 +85,10 @@ class Table:
             return float(found)
         if isinstance(found, bool) or not isinstance(found, int | float):
             raise self.refusal(key, found, "a number")
-        return float(found)
+        try:
+            return float(found)
+        except OverflowError:
+            raise self.refusal(key, "a whole number of too many digits", "a number") from None
 
     def whole(self, key: str) -> int | None:
         """Whole number below a key; raises FormatError where there is something else."""

@@ -1,6 +1,7 @@
 """Writing a run: one row a cycle from the control loop, at a few microseconds a row."""
 
 import shutil
+import sys
 from collections.abc import Mapping
 from contextlib import ExitStack, suppress
 from datetime import UTC, datetime
@@ -9,6 +10,8 @@ from types import TracebackType
 from typing import Any, Self, final
 
 from legbench.errors import ConfigError, PlantFault, RecordingError
+from legbench.interrupts import shielded
+from legbench.recording.abstract_disk import AbstractDisk
 from legbench.recording.archive import write_archive
 from legbench.recording.description import layout_of
 from legbench.recording.disk import Disk
@@ -24,6 +27,7 @@ from legbench.recording.layout import (
     file_safe,
 )
 from legbench.recording.manifest import Manifest, new_manifest, write_manifest
+from legbench.recording.process_disk import ProcessDisk
 from legbench.recording.rows import BATCH_ROWS, Block, RowLayout
 from legbench.recording.stream import WholeBatches, schema_for
 from legbench.signals import Command, Observation
@@ -33,15 +37,16 @@ from legbench.signals import Command, Observation
 class RunWriter:
     """Writes one run folder; call it from one thread, close it or use it in a `with`.
 
-    Rows go to the operating system in batches of 50 from a thread of their own, so a process
-    that dies loses at most 100 rows (at 1 kHz: 100 ms) while the disk keeps up; the loop never
-    waits for the disk. A power cut costs about one second.
+    Rows go to the operating system in batches of 50 from a thread or, for a loop in real time, from
+    a process of their own. A process that dies loses at most 100 rows (at 1 kHz: 100 ms) while
+    the disk keeps up, or 50 with a process for them; the loop never waits for the disk. A power
+    cut costs about one second.
 
     Attributes:
         path: the run folder.
     """
 
-    def __init__(self, path: Path, manifest: Manifest, disk: Disk) -> None:
+    def __init__(self, path: Path, manifest: Manifest, disk: AbstractDisk) -> None:
         """Join the parts; `create` is the way to make a run."""
         self.path = path
         self._manifest = manifest
@@ -59,6 +64,7 @@ class RunWriter:
         *,
         name: str | None = None,
         created: datetime | None = None,
+        realtime: bool = False,
     ) -> Self:
         """Start a run in a fresh folder `<parent>/<UTC time>_<name>`, with -2, -3 if taken.
 
@@ -67,6 +73,8 @@ class RunWriter:
             manifest: what ran on what; `manifest.OWN_KEYS` are filled in here.
             name: a hint in the folder's name, such as the controller and the plant.
             created: the moment of the start, now by default.
+            realtime: write from a process, not a thread, so that a loop in real time never waits
+                for the interpreter's lock; on Linux alone.
 
         Raises:
             RecordingError: the folder cannot be written.
@@ -78,12 +86,17 @@ class RunWriter:
         try:
             run = _fresh_folder(parent, stem)
             full["id"] = run.name
-            return cls(run, full, _open(run, full))
+            return cls(run, full, _open(run, full, realtime=realtime))
         except OSError as error:
             raise RecordingError(
                 f"cannot write a run in {parent}: {reason(error)};"
                 " choose a folder that you can write to with --out"
             ) from error
+
+    @property
+    def rows(self) -> int:
+        """Number of rows that were appended so far."""
+        return self._handed + self._block.count
 
     def append(
         self, command: Command, observation: Observation, cycle_us: float, late_us: float
@@ -100,7 +113,7 @@ class RunWriter:
             RecordingError: the disk has failed or is a minute behind, or the run is closed.
             ConfigError: the arrays are not those of one leg.
         """
-        if self._closed or self._disk.error is not None:
+        if self._closed or self._disk.kept.error is not None:
             raise self._refusal()
         self._block.put(command, observation, cycle_us, late_us)
         if self._block.count == BATCH_ROWS:
@@ -121,30 +134,32 @@ class RunWriter:
     def close(self, status: str = COMPLETE, cause: str | None = None) -> None:
         """End the run: write what waits, make the archive, say in `run.json` how it ended.
 
-        Whatever fails, the rows already on disk stay readable. A second call does nothing.
+        Whatever fails, the rows already on disk stay readable. A second call does nothing. No
+        signal gets in between: a ^C that comes meanwhile is raised when the run is closed.
 
         Args:
             status: "complete", "interrupted" or "fault"; a run that lost rows is a fault.
             cause: a short name of why it ended, None if it came to its end.
 
         Raises:
-            RecordingError: rows were lost or `run.json` was not updated, and no `append` has
-                said so yet.
+            RecordingError: rows or events were lost or `run.json` was not updated, and no
+                `append` has said so yet.
             ConfigError: the status is none of the three.
         """
         if self._closed:
             return
         if status not in CLOSING:
             raise ConfigError(f"a run cannot end as {status!r}; choose from {', '.join(CLOSING)}")
-        self._closed = True
-        if self._block.count:
-            self._hand_over()
-        self._disk.finish()
-        try:
-            self._note_end(status, cause)
-            problem = self._settle()
-        finally:
-            self._disk.close()
+        with shielded():
+            self._closed = True
+            if self._block.count:
+                self._hand_over()
+            self._disk.finish()
+            try:
+                self._note_end(status, cause)
+                problem = self._settle()
+            finally:
+                self._disk.close()
         if problem is not None and not self._told:
             raise RecordingError(problem)
 
@@ -159,12 +174,16 @@ class RunWriter:
     ) -> None:
         if error is None:
             self.close()
-        elif isinstance(error, KeyboardInterrupt):
-            self.close(INTERRUPTED, "KeyboardInterrupt")
+            return
+        fault = _fault_in(error)
+        if fault is not None:
+            self.close(FAULT, fault.cause)
+        elif isinstance(error, KeyboardInterrupt | GeneratorExit):
+            # The second where a generator that writes a run is given up for an interruption.
+            error.add_note(f"{self.path} holds {self.rows} rows")
+            self.close(INTERRUPTED, type(error).__name__)
         else:
-            self.close(
-                FAULT, error.cause if isinstance(error, PlantFault) else type(error).__name__
-            )
+            self.close(FAULT, type(error).__name__)
 
     def _hand_over(self) -> None:
         self._handed += self._block.count
@@ -175,25 +194,27 @@ class RunWriter:
         if self._closed:
             return RecordingError(f"{self.path} is closed; a new run needs a new RunWriter")
         self._told = True
-        if self._disk.error is not None:
-            return RecordingError(self._loss(reason(self._disk.error)))
+        if self._disk.kept.error is not None:
+            return RecordingError(self._loss(reason(self._disk.kept.error)))
         return RecordingError(self._loss("the disk is too slow, 60 s of rows wait for it"))
 
     def _loss(self, why: str) -> str:
         return (
-            f"{self.path}: recording failed: {why}; {self._disk.rows} rows are safe on disk;"
+            f"{self.path}: recording failed: {why}; {self._disk.kept.rows} rows are safe on disk;"
             f" make room, then `legbench recover {self.path}`, or record elsewhere with --out"
         )
 
     def _note_end(self, status: str, cause: str | None) -> None:
-        disk = self._disk
-        lost = self._handed - disk.rows
-        if disk.error is not None:
+        kept = self._disk.kept
+        lost = self._handed - kept.rows
+        if kept.error is not None:
             status = FAULT if status == COMPLETE else status
             cause = cause or "recording"
-            self._manifest |= {"recording_error": reason(disk.error), "rows_lost": lost}
-        self._manifest |= {"status": status, "cause": cause, "rows": disk.rows}
-        self._manifest["duration"] = disk.last - disk.first
+            self._manifest |= {"recording_error": reason(kept.error), "rows_lost": lost}
+        if kept.events_error is not None:
+            self._manifest["events_error"] = reason(kept.events_error)
+        self._manifest |= {"status": status, "cause": cause, "rows": kept.rows}
+        self._manifest["duration"] = kept.last - kept.first
 
     def _settle(self) -> str | None:
         """Make the archive and update `run.json`; return what the caller must hear, if anything.
@@ -204,7 +225,7 @@ class RunWriter:
         archived = False
         try:
             rows = write_archive(self.path, WholeBatches(stream), self._manifest)
-            archived = rows == self._disk.rows
+            archived = rows == self._disk.kept.rows
         except OSError as error:
             self._manifest["archive_error"] = reason(error)
         try:
@@ -214,7 +235,21 @@ class RunWriter:
         except OSError as error:
             return self._loss(f"run.json was not updated: {reason(error)}")
         why = self._manifest.get("recording_error")
-        return None if why is None else self._loss(why)
+        if why is not None:
+            return self._loss(why)
+        if (why := self._manifest.get("events_error")) is not None:
+            return (
+                f"{self.path}: events were lost: {why}; its {self._disk.kept.rows} rows are whole"
+            )
+        return None
+
+
+def _fault_in(error: BaseException) -> PlantFault | None:
+    """The fault that ended a run, also where a ^C came while it was dealt with."""
+    link: BaseException | None = error
+    while link is not None and not isinstance(link, PlantFault):
+        link = link.__context__
+    return link
 
 
 def _fresh_folder(parent: Path, stem: str) -> Path:
@@ -229,7 +264,7 @@ def _fresh_folder(parent: Path, stem: str) -> Path:
         attempt += 1
 
 
-def _open(run: Path, manifest: Manifest) -> Disk:
+def _open(run: Path, manifest: Manifest, *, realtime: bool) -> AbstractDisk:
     """Create the files of `run`, locked, or remove the folder and raise OSError."""
     with ExitStack() as undo:
         undo.callback(shutil.rmtree, run, ignore_errors=True)
@@ -239,7 +274,8 @@ def _open(run: Path, manifest: Manifest) -> Disk:
         events = append_to(run / EVENTS)
         undo.callback(events.close)
         write_manifest(run, manifest)
+        kind = ProcessDisk if realtime and sys.platform == "linux" else Disk
         rows = RowLayout(layout_of(manifest))
-        disk = Disk(samples, events, schema_for(manifest), rows)
+        disk = kind(samples, events, schema_for(manifest), rows)
         undo.pop_all()
     return disk

@@ -13,6 +13,7 @@ from typing import Any, TextIO, final
 import numpy as np
 
 from legbench.errors import ConfigError
+from legbench.reading import UnreadableError, parse_json
 from legbench.recording.files import write_whole
 from legbench.signals import Floats, Ints
 
@@ -128,7 +129,7 @@ def _whole(lines: list[str]) -> list[Any]:
     entries: list[Any] = []
     for line in lines:
         try:
-            entries.append(json.loads(line))
-        except json.JSONDecodeError:
+            entries.append(parse_json(line))
+        except UnreadableError:
             break
     return entries

@@ -18,7 +18,12 @@ def draft_of(path: Path) -> Iterator[Path]:
     """
     draft = path.with_name(f".{path.stem}.draft{path.suffix}")
     try:
-        draft.touch()
+        # Made anew: whatever lies there, such as a link, is not written through.
+        draft.unlink(missing_ok=True)
+        draft.touch(exist_ok=False)
+    except OSError as error:
+        raise RecordingError(f"cannot write {path}: {error.strerror}") from error
+    try:
         yield draft
         put_in_place(draft, path)
     except RecordingError:

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,17 +12,12 @@ from legbench.kinematics import modal_to_joint
 from legbench.metrics.summary import Summary
 from legbench.recording.description import RunDescription
 
-MODEL = "leg.xml"
-"""File of a run's own MJCF, next to its manifest."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Facts:
     """What pictures say of a run: its description, and the model that it keeps."""
 
     run: RunDescription
-    model: Path | None = None
-    """MJCF of the run, where there is one."""
 
     @property
     def rest(self) -> tuple[float, float] | None:
@@ -46,10 +40,9 @@ class Facts:
         return " · ".join(filter(None, dict.fromkeys(words)))
 
 
-def facts_of(run: RunDescription, folder: Path) -> Facts:
-    """What pictures need of a run and its folder."""
-    model = folder / MODEL
-    return Facts(run=run, model=model if model.is_file() else None)
+def facts_of(run: RunDescription) -> Facts:
+    """What pictures need of a run."""
+    return Facts(run=run)
 
 
 def _shown(value: object) -> str:

@@ -1,34 +1,20 @@
 """From joint angles to poses of a run's own MuJoCo model."""
 
-from pathlib import Path
 from typing import final
 
 import mujoco
 import numpy as np
 
-from legbench.errors import RecordingError
 from legbench.signals import Floats
 
 
 @final
 class Puppet:
-    """A run's model, moved by its recorded angles; no physics runs.
+    """A run's model, moved by its recorded angles; no physics runs."""
 
-    Raises:
-        RecordingError: there is no model, or MuJoCo refuses it.
-    """
-
-    def __init__(self, path: Path) -> None:
-        if not path.is_file():
-            raise RecordingError(
-                f"{path} does not exist: the run keeps no model to draw; "
-                "write the run again with this version"
-            )
-        try:
-            self.model = mujoco.MjModel.from_xml_path(str(path))
-        except ValueError as error:
-            raise RecordingError(f"{path}: MuJoCo refuses the model: {error}") from error
-        self.data = mujoco.MjData(self.model)
+    def __init__(self, model: mujoco.MjModel) -> None:
+        self.model = model
+        self.data = mujoco.MjData(model)
         self._places = {
             self.model.joint(index).name: int(self.model.jnt_qposadr[index])
             for index in range(self.model.njnt)

@@ -1,5 +1,6 @@
 """The CiA 402 half of an emulated drive: controlword, modes, motion, statusword; pure."""
 
+from collections import deque
 from typing import final
 
 from legbench.drives.cia402 import DriveState, Mode, StatusBit
@@ -11,6 +12,7 @@ from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.homing import Homing, HomingState
 from legbench.drives.emulated.motion import Motion
 from legbench.drives.emulated.power import HALT, PowerStage
+from legbench.drives.emulated.sensors import Sensors
 from legbench.drives.objects import LINK_SHORT, Key
 from legbench.drives.units import wrap
 
@@ -28,6 +30,8 @@ class Axis:
         power: the state machine.
         motion: the motor.
         alarms: what is wrong.
+        sensors: what the encoders make of the positions.
+        warning: bit 7 of the statusword is set.
     """
 
     def __init__(self, node: NodeConfig, behaviour: Behaviour, values: dict[Key, int]) -> None:
@@ -35,11 +39,15 @@ class Axis:
         self.power = PowerStage(values)
         self.motion = Motion(node.motor, behaviour, values)
         self.alarms = Alarms(node.node_id, values)
+        self.sensors = Sensors(node)
+        self.warning = False
         self._homing = Homing(values, node.motor.counts_per_rev)
         self._link_counts = node.link.to_counts(behaviour.start_pos)
         self._torque = 0
         self._mode_due_ns: int | None = None
         self._waiting_word: int | None = None
+        self._now_ns = 0
+        self._late_words: deque[tuple[int, int]] = deque()
         self._out: list[Frame] = []
         self.publish()
 
@@ -49,6 +57,7 @@ class Axis:
         self.power.stopping = None
         self.alarms = Alarms(self._node.node_id, self._values)
         self._waiting_word = self._mode_due_ns = None
+        self._late_words.clear()
         self.motion.hold(0)
 
     def take(self) -> list[Frame]:
@@ -79,11 +88,12 @@ class Axis:
 
     def _command(self, controlword: int, now_ns: int) -> None:
         was_enabled = self.power.state is _ENABLED
-        if self.power.command(controlword, cause_gone=not self.alarms.standing):
+        obeyed = controlword not in self._behaviour.ignores
+        if obeyed and self.power.command(controlword, cause_gone=not self.alarms.standing):
             self._say(self.alarms.reset())
         if self.power.state is _ENABLED and not was_enabled:
             self.motion.hold(now_ns)
-        if self.power.state is _ENABLED and self._values[0x6061, 0] == Mode.HOMING:
+        if obeyed and self.power.state is _ENABLED and self._values[0x6061, 0] == Mode.HOMING:
             self._homing.command(controlword)
         self._status()
 
@@ -110,12 +120,14 @@ class Axis:
 
     def tick(self, now_ns: int, step_ns: int) -> float:
         """Move for `step_ns` until now; true motor position [rad]."""
+        self._now_ns = now_ns
         if self._waiting_word is not None:
             word, self._waiting_word = self._waiting_word, None
             self._command(word, now_ns)
         if self._mode_due_ns is not None and now_ns >= self._mode_due_ns:
             self._values[0x6061, 0], self._mode_due_ns = self._values[0x6060, 0], None
             self.motion.hold(now_ns)
+        self.sensors.tick(step_ns)
         before = self.motion.actual
         self._move(now_ns, step_ns)
         self._values[0x606C, 0] = round((self.motion.actual - before) * 1e9 / step_ns)
@@ -156,17 +168,20 @@ class Axis:
     def publish(self) -> None:
         """Bring the actual values of the object dictionary up to date."""
         values, motion = self._values, self.motion
-        actual = round(motion.actual)
+        actual = self.sensors.motor.show(round(motion.actual))
+        link = self.sensors.link.show(self._link_counts)
         values[0x6064, 0] = wrap(actual)
         values[0x6062, 0] = wrap(round(motion.demand))
         values[0x60F4, 0] = wrap(round(motion.demand) - actual)
-        values[0x60E4, 1] = wrap(self._link_counts)
-        values[LINK_SHORT, 0] = wrap(self._link_counts, 16)
+        values[0x60E4, 1] = wrap(link)
+        values[LINK_SHORT, 0] = wrap(link, 16)
         values[0x6077, 0] = min(max(self._torque, -32768), 32767)
         self._status()
 
     def _status(self) -> None:
         word = self.power.low_byte | _STATUS
+        if self.warning:
+            word |= StatusBit.WARNING
         mode = self._values[0x6061, 0]
         if mode == Mode.CYCLIC_SYNCHRONOUS_POSITION:
             if self.power.state is _ENABLED and self.power.stopping is None:
@@ -182,7 +197,18 @@ class Axis:
                 HomingState.FAILED: StatusBit.TARGET_REACHED | StatusBit.FOLLOWING_ERROR,
                 HomingState.IDLE: StatusBit.TARGET_REACHED,
             }.get(self._homing.state, 0)
-        self._values[0x6041, 0] = int(word)
+        self._show(int(word))
+
+    def _show(self, word: int) -> None:
+        """Publish a statusword, once its time has come."""
+        lag_ns = 1000 * self._behaviour.status_lag_us
+        if lag_ns:
+            late = self._late_words
+            late.append((self._now_ns + lag_ns, word))
+            while late and late[0][0] <= self._now_ns:
+                self._values[0x6041, 0] = late.popleft()[1]
+        else:
+            self._values[0x6041, 0] = word
 
     def _say(self, frame: Frame | None) -> None:
         if frame is not None:

@@ -28,6 +28,10 @@ class Behaviour:
     """More communication cycles (1006h) than this without SYNC while enabled are a fault."""
     slow_loop: bool = False
     """Controlwords are looked at once a body step: two within it leave only the second."""
+    ignores: frozenset[int] = frozenset()
+    """Controlwords that it does not obey, such as 02h of a drive without a quick stop."""
+    status_lag_us: int = 0
+    """Statuswords are shown this much late, whole motion cycles at a time [us]."""
     bandwidth: float | None = None
     """Corner frequency of the position loop [Hz]; none: the motor is where it should be."""
     mode_lag_us: int = 2000

@@ -181,6 +181,10 @@ class EmulatedDrive:
         self.axis.power.connection_lost()
         self._out.clear()
 
+    def repeat_process_data(self, repeat: bool) -> None:
+        """Repeat the last process data to the bit, while everything else goes on."""
+        self._pdos.repeats = repeat
+
     def mute_heartbeat(self, mute: bool = True) -> None:
         """Stop producing heartbeats, while everything else goes on."""
         self._mute = mute

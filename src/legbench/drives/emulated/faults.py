@@ -50,6 +50,17 @@ class NodeFaultKind(Enum):
     BUS_OFF = "bus-off"
     SILENT = "silent"
     """Its plug is pulled: it neither hears nor speaks, and does not know."""
+    WARNING = "warning"
+    """Bit 7 of its statusword."""
+    JAMMED = "jammed motor"
+    MOTOR_FROZEN = "frozen motor encoder"
+    LINK_FROZEN = "frozen link encoder"
+    REPEATING = "process data repeated"
+    """Its process data repeat themselves to the bit, the statusword included."""
+    MOTOR_STEP = "step of the motor encoder"
+    LINK_STEP = "step of the link encoder"
+    MOTOR_DRIFT = "drift of the motor encoder"
+    LINK_DRIFT = "drift of the link encoder"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,6 +73,8 @@ class NodeFault:
     start_ns: int
     end_ns: int = FOREVER_NS
     """When its cause is gone; a reset happens once."""
+    size: float = 0.0
+    """Of a step [rad] or a drift [rad/s]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,13 +13,37 @@ from legbench.drives.emulated.faults import (
     NodeFault,
     NodeFaultKind,
 )
+from legbench.drives.emulated.sensors import Ailment
 
 _TRIPS = {
     NodeFaultKind.UNDER_VOLTAGE: UNDER_VOLTAGE,
     NodeFaultKind.OVER_TEMPERATURE: OVER_TEMPERATURE,
 }
+_ENCODERS = {
+    NodeFaultKind.MOTOR_FROZEN: ("motor", Ailment.FROZEN),
+    NodeFaultKind.MOTOR_STEP: ("motor", Ailment.STEP),
+    NodeFaultKind.MOTOR_DRIFT: ("motor", Ailment.DRIFT),
+    NodeFaultKind.LINK_FROZEN: ("link", Ailment.FROZEN),
+    NodeFaultKind.LINK_STEP: ("link", Ailment.STEP),
+    NodeFaultKind.LINK_DRIFT: ("link", Ailment.DRIFT),
+}
 Fate = tuple[tuple[int, Frame], ...]
 """What arrives of a frame: delay [ns] and content of each copy."""
+
+
+def _strike_parts(drive: EmulatedDrive, fault: NodeFault, *, begins: bool) -> None:
+    """Break or mend what a drive moves, senses and tells."""
+    axis = drive.axis
+    if fault.kind is NodeFaultKind.WARNING:
+        axis.warning = begins
+    elif fault.kind is NodeFaultKind.JAMMED:
+        axis.motion.jammed = begins
+    elif fault.kind is NodeFaultKind.REPEATING:
+        drive.repeat_process_data(begins)
+    elif fault.kind in _ENCODERS:
+        which, ailment = _ENCODERS[fault.kind]
+        encoder = axis.sensors.motor if which == "motor" else axis.sensors.link
+        encoder.fail(ailment if begins else None, fault.size)
 
 
 @final
@@ -125,3 +149,5 @@ class Injector:
             drive.reset(now_ns)
         elif fault.kind is NodeFaultKind.BUS_OFF and begins:
             drive.bus_off(now_ns)
+        else:
+            _strike_parts(drive, fault, begins=begins)

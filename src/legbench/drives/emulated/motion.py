@@ -20,6 +20,7 @@ class Motion:
         speed: of the demand [counts/s].
         limited: the target was cut to the software limits (607Dh).
         missing: SYNCs in a row without a new target.
+        jammed: the motor stands, whatever the position loop does.
     """
 
     def __init__(self, units: AxisUnits, behaviour: Behaviour, values: dict[Key, int]) -> None:
@@ -31,6 +32,7 @@ class Motion:
         self.speed = 0.0
         self.limited = False
         self.missing = 0
+        self.jammed = False
         self._from = self._to = self.actual
         self._since_ns = 0
         self._late_ms = 0.0
@@ -108,6 +110,8 @@ class Motion:
 
     def drive(self, step_ns: int) -> None:
         """The position loop moves the motor towards the demand."""
+        if self.jammed:
+            return
         move = self.demand - self.actual
         step = step_ns / SECOND_NS
         if self._behaviour.bandwidth is not None:

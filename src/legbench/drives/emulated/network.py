@@ -142,6 +142,10 @@ class Network:
             self._strangers.remove(station)
         self._pending = [entry for entry in self._pending if entry[3] is not station]
 
+    def alone(self, station: Station) -> bool:
+        """Whether a master is the only one, and nothing but drives takes part besides."""
+        return set(self._nodes) == {station, *self.drives}
+
     def inject(self, fault: Fault) -> None:
         """Add a fault."""
         self._injector.add(fault)

@@ -37,12 +37,14 @@ class ProcessData:
     Attributes:
         rpdos: those that exist, by COB-ID.
         tpdos: those that exist, in order.
+        repeats: every TPDO repeats itself to the bit.
     """
 
     def __init__(self, store: ObjectStore) -> None:
         self._store = store
         self.rpdos: dict[int, Pdo] = {}
         self.tpdos: list[Pdo] = []
+        self.repeats = False
 
     @staticmethod
     def owns(key: Key) -> bool:
@@ -128,6 +130,8 @@ class ProcessData:
 
     def sample(self, pdo: Pdo) -> bytes:
         """The bytes of a TPDO right now."""
+        if self.repeats and pdo.last is not None:
+            return pdo.last
         values = self._store.values
         pdo.last = pdo.layout.pack([values[key] for key in pdo.keys])
         return pdo.last

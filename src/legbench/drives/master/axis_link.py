@@ -31,6 +31,7 @@ class AxisLink:
         machine: leads it through its states.
         statusword: as last received.
         target_counts: what its next RPDO says, not wrapped.
+        sent_counts: what its last RPDO said, none before the first.
         fresh: whether all its TPDOs have come in this cycle.
         motor_pos, link_pos: measured angles of motor and link [rad].
     """
@@ -40,6 +41,7 @@ class AxisLink:
         self.machine = PowerMachine()
         self.statusword = 0
         self.target_counts = 0
+        self.sent_counts: int | None = None
         self.motor_counts = 0
         self.link_counts = 0
         self._motor_rad, self._link_rad = node.motor.to_rad, node.link.to_rad
@@ -84,6 +86,10 @@ class AxisLink:
     def missing_ids(self) -> tuple[int, ...]:
         """COB-IDs that have not come in this cycle."""
         return tuple(cob for cob, (bit, _, _) in self._tpdos.items() if bit & self._missing)
+
+    def received(self, cob_id: int) -> bool:
+        """Whether one of its TPDOs has come in this cycle."""
+        return not self._tpdos[cob_id][0] & self._missing
 
     def begin_cycle(self) -> None:
         """SYNC goes out: everything is expected again."""
@@ -144,8 +150,14 @@ class AxisLink:
         """Set the target to where the motor is."""
         self.target_counts = self.motor_counts
 
+    def hold(self) -> None:
+        """Set the target to the last one that was sent: a stop moves no target."""
+        if self.sent_counts is not None:
+            self.target_counts = self.sent_counts
+
     def frames(self, controlword: int) -> list[tuple[int, bytes]]:
         """RPDOs of this cycle: COB-ID and data."""
+        self.sent_counts = self.target_counts
         target = wrap(self.target_counts)
         if self._plain:
             cob_id, layout = self._rpdos[0]

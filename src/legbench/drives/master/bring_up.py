@@ -6,13 +6,7 @@ from typing import final
 
 import can
 
-from legbench.drives.cia402 import (
-    POWERED,
-    Controlword,
-    Mode,
-    decode_state,
-    describe_statusword,
-)
+from legbench.drives.cia402 import POWERED, Mode, decode_state
 from legbench.drives.codec.datatypes import DataType
 from legbench.drives.codec.emcy import MEANINGS
 from legbench.drives.codec.nmt import NmtCommand, nmt_frame
@@ -21,16 +15,18 @@ from legbench.drives.config import BusConfig, Identity, NodeConfig, Parameter
 from legbench.drives.configuration import configuration
 from legbench.drives.errors import BusError, DriveError, SdoAbortError
 from legbench.drives.master.first_contact import first_contact
+from legbench.drives.master.lookout import Lookout
+from legbench.drives.master.parking import is_parked
 from legbench.drives.master.port import Port
 from legbench.drives.master.sdo_port import SdoPort
+from legbench.drives.master.sdo_stop import SdoStop
 from legbench.drives.objects import name_of
+from legbench.interrupts import shielded
 
 PROFILE_402 = 0x0192
 """Low word of 1000h."""
 CSP_BIT = 1 << 7
 """Of 6502h: cyclic synchronous position mode."""
-STOP_PATIENCE, OFF_PATIENCE = 100, 20
-"""Reads of 6041h until a drive that is found with power has stopped, 10 ms apart."""
 MODE_PATIENCE = 50
 """Reads of 6061h until the mode must be there, 10 ms apart."""
 _MISSING = (Abort.NO_OBJECT, Abort.NO_SUB_INDEX)
@@ -47,17 +43,46 @@ class BringUp:
     """Talks to the drives by SDO, before and between cyclic operation."""
 
     def __init__(self, port: Port, bus: BusConfig, on_other: Callable[[can.Message], None]) -> None:
-        self._port, self._bus = port, bus
+        self._port, self._bus, self._on_other = port, bus, on_other
+        self.lookout = Lookout(port, bus)
         self._sdo = {
             node.node_id: SdoPort(
                 port,
                 node.node_id,
                 timeout_ms=bus.sdo_timeout_ms,
                 retries=bus.sdo_retries,
-                on_other=on_other,
+                on_other=self._hear,
+                before_write=self.glance,
             )
             for node in bus.nodes
         }
+
+    def listen(self) -> None:
+        """Listen before anything but questions is sent, then ask the drives whom they watch.
+
+        From here until `lookout.rest` another master ends the bring-up with the next frame that is
+        heard of it, before the next object is written.
+
+        Raises:
+            PlantFault: somebody else leads these drives, or asks them.
+            BusError: the bus has failed, or nobody can be talked to.
+        """
+        with self.contact():
+            self.lookout.listen()
+            if not self.lookout.beats:
+                return
+            for node in self._bus.nodes:
+                if node.heartbeat_consumer:
+                    self.lookout.watched(node, self.sdo(node).get_int(0x1016, 1, U32))
+
+    def glance(self) -> None:
+        """Hear what has come by now; raises PlantFault if another master has spoken."""
+        for message in self.lookout.glance():
+            self._on_other(message)
+
+    def _hear(self, message: can.Message) -> None:
+        self._on_other(message)
+        self.lookout.hear(message)
 
     def sdo(self, node: NodeConfig) -> SdoPort:
         """Access to the objects of a node."""
@@ -158,10 +183,15 @@ class BringUp:
     def refuse_differences(self) -> None:
         """For a master that may not configure; raises DriveError for the first drive that differs.
 
-        Process data that is mapped otherwise would be read as what it is not.
+        Process data that is mapped otherwise would be read as what it is not. Command frames
+        that are switched off, as after every run, change nothing for those who only look.
         """
         for node in self._bus.nodes:
-            different = self.differences(node)
+            different = [
+                (parameter, there)
+                for parameter, there in self.differences(node)
+                if not is_parked(node, parameter, there)
+            ]
             if different:
                 parameter, there = different[0]
                 raise DriveError(
@@ -177,6 +207,19 @@ class BringUp:
         Raises:
             DriveError: the drive refuses, or holds another value afterwards.
         """
+        try:
+            count = self._configure(node)
+        except KeyboardInterrupt as error:
+            error.add_note(
+                f"drive '{node.name}' (node {node.node_id}) has no power, and holds its "
+                "configuration in part: every run writes it anew, `legbench drives configure "
+                "--write` does, too"
+            )
+            raise
+        self._await_mode(node)
+        return count
+
+    def _configure(self, node: NodeConfig) -> int:
         sdo, count = self.sdo(node), 0
         for parameter in configuration(self._bus, node):
             if not self._write(node, parameter):
@@ -189,7 +232,6 @@ class BringUp:
                     f"{there}; the drive does not take this value"
                 )
             count += 1
-        self._await_mode(node)
         return count
 
     def _write(self, node: NodeConfig, parameter: Parameter) -> bool:
@@ -257,7 +299,7 @@ class BringUp:
             )
 
     def temperature(self, node: NodeConfig) -> int | None:
-        """What the drive's sensor shows [0.1 deg C]; none where the bus file names no object."""
+        """What the drive's sensor shows [counts]; none where the bus file names no object."""
         entry = node.temperature_object
         return None if entry is None else self.sdo(node).get_int(entry.index, entry.sub, entry.kind)
 
@@ -268,19 +310,13 @@ class BringUp:
             DriveError: one keeps its power.
         """
         powered = [node for node in self._bus.nodes if self.powered(node)]
-        for word, patience in ((Controlword.QUICK_STOP, STOP_PATIENCE), (0, OFF_PATIENCE)):
-            for node in powered:
-                self.sdo(node).put(0x6040, 0, U16, word)
-            for _ in range(patience):
-                powered = [node for node in powered if self.powered(node)]
-                if not powered:
-                    break
-                self._port.timebase.wait_until(self._port.timebase.now_ns() + 10_000_000)
-        for node in powered:
-            state = describe_statusword(self.sdo(node).get_int(0x6041, 0, U16))
+        if not powered:
+            return
+        with shielded() as shield:
+            report = SdoStop(self._port, powered, shield.hold).run()
+        if report.trouble is not None:
             raise DriveError(
-                f"node {node.node_id} ('{node.name}') is found with power and keeps it: {state}; "
-                "end the program that leads it, or switch its power off"
+                f"found with power: {report.trouble}; or end the program that leads it"
             )
 
     def powered(self, node: NodeConfig) -> bool:

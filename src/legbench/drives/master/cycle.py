@@ -16,12 +16,14 @@ from legbench.drives.codec.frame import (
     LAST_NODE,
     NMT_ID,
     SDO_REPLY_BASE,
+    SDO_REQUEST_BASE,
     SYNC_ID,
 )
 from legbench.drives.codec.nmt import NmtState, heartbeat_frame
 from legbench.drives.config import BusConfig
 from legbench.drives.errors import BusError
 from legbench.drives.master.axis_link import AxisLink
+from legbench.drives.master.notices import Notices
 from legbench.drives.master.port import Port
 from legbench.drives.master.temperature import TemperaturePoll
 from legbench.drives.master.watch import NodeWatch
@@ -58,6 +60,7 @@ class Cycle:
         error_frames: heard so far.
         late_frames: process data that came after its deadline.
         silent_total: ticks that were left out to find late answers.
+        notices: what a run has to tell though it ends nothing.
         stopping: from now on SYNC goes out at every tick, because a stop waits for it.
     """
 
@@ -73,6 +76,7 @@ class Cycle:
         self.error_frames = 0
         self.late_frames = 0
         self.silent_total = 0
+        self.notices = Notices()
         self.stopping = False
         self._tpdos = {cob: axis for axis in self.axes for cob in axis.tpdo_ids}
         self._expected = len(self._tpdos)
@@ -264,6 +268,8 @@ class Cycle:
             watch.hear_emergency(bytes(message.data))
         elif base == SDO_REPLY_BASE:
             self._polls[node_id].feed(bytes(message.data))
+        elif base == SDO_REQUEST_BASE and self._port.foreign(message):
+            self.notices.sdo_request(message, node_id, self._port.timebase.now_ns())
 
     def _gather(self, until_ns: int) -> int:
         """Take frames until all process data is there or the deadline; how many are missing."""
@@ -282,6 +288,8 @@ class Cycle:
                         break
                     continue
                 before = axis.fresh
+                if axis.received(cob_id):
+                    self.notices.answered_twice(message, self._port.timebase.now_ns())
                 if not axis.feed(cob_id, message.data):
                     garbled.add(cob_id)
                     self._by_node[axis.node.node_id].bad_total += 1
@@ -311,13 +319,20 @@ class Cycle:
                     )
                 if message.arbitration_id in self._tpdos and not message.is_error_frame:
                     self.late_frames += 1
-                    self._owed.discard(message.arbitration_id)
+                    self._late(message)
                 else:
                     self.other(message)
         except BusError as error:
             self._failed(error)
             # What is still unread may be an answer to an earlier SYNC.
             self._owed.update(self._tpdos)
+
+    def _late(self, message: can.Message) -> None:
+        """Process data between two cycles: an answer that was missed, or one too many."""
+        cob_id = message.arbitration_id
+        if cob_id not in self._owed and self._tpdos[cob_id].fresh:
+            self.notices.answered_twice(message, self._port.timebase.now_ns())
+        self._owed.discard(cob_id)
 
     def _failed(self, error: BusError) -> None:
         self.bus_error = error

@@ -28,6 +28,7 @@ class Port:
         timebase: of the bus.
         bus: for those who need the driver itself.
         listener: sees every frame, if there is one.
+        listener_error: what the listener raised, in one line; it is not called any more.
         error_frames: heard so far.
         may_send: asked before every frame, where not all may go out.
     """
@@ -37,6 +38,7 @@ class Port:
     ) -> None:
         self.bus, self.timebase = bus, timebase
         self.listener = listener
+        self.listener_error: str | None = None
         self.error_frames = 0
         self.may_send: MaySend | None = None
         self._echoes = _echoes(bus)
@@ -133,15 +135,15 @@ class Port:
         return now - age if 0.0 <= age < OLDEST_S else now
 
     def _tell(self, message: can.Message) -> None:
-        """A listener that fails hears nothing more: no stop may depend on it."""
+        """Show a frame to the listener; one that fails hears nothing more, and ends nothing."""
         listener = self.listener
         if listener is None:
             return
         try:
             listener(message)
-        except Exception as error:
+        except Exception as error:  # Whatever a listener does wrong, the cycle goes on.
             self.listener = None
-            raise BusError(f"{self.bus.channel_info}: a listener failed: {error}") from error
+            self.listener_error = f"{type(error).__name__}: {error}"
 
     @property
     def off_bus(self) -> bool:

@@ -18,6 +18,10 @@ def _ignore(_message: can.Message) -> None:
     """Frames that are nobody's."""
 
 
+def _nothing() -> None:
+    """Nothing to look at before a write."""
+
+
 @final
 class SdoPort:
     """Reads and writes the object dictionary of one node."""
@@ -30,11 +34,12 @@ class SdoPort:
         timeout_ms: int = 200,
         retries: int = 3,
         on_other: Callable[[can.Message], None] = _ignore,
+        before_write: Callable[[], None] = _nothing,
     ) -> None:
         self._port, self.node_id = port, node_id
         self._timeout_ns, self._retries = 1_000_000 * timeout_ms, retries
         self._timeout_ms = timeout_ms
-        self._on_other = on_other
+        self._on_other, self._before_write = on_other, before_write
 
     def read(self, index: int, sub: int = 0) -> bytes:
         """Bytes of an object.
@@ -97,6 +102,8 @@ class SdoPort:
         """Whether the transfer came to its end in time."""
         port, timebase = self._port, self._port.timebase
         reply_id = SDO_REPLY_BASE + self.node_id
+        if isinstance(transfer, Download):
+            self._before_write()
         port.send(SDO_REQUEST_BASE + self.node_id, transfer.request)
         until_ns = timebase.now_ns() + self._timeout_ns
         while timebase.now_ns() < until_ns:

@@ -112,7 +112,8 @@ class StartUp:
             refused = [axis for axis in axes if axis.machine.refused]
             if refused:
                 break
-        slow = (refused or list(axes))[0]
+        behind = [axis for axis in axes if not _there(axis.machine.goal, axis.statusword)]
+        slow = (refused or behind or list(axes))[0]
         raise DriveError(
             f"drive '{slow.node.name}' (node {slow.node.node_id}) does not {words}: "
             f"{describe_statusword(slow.statusword)}"

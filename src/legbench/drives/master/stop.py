@@ -1,81 +1,120 @@
-"""The stop ladder: quick stop of all drives, disable voltage for one that does not obey."""
+"""The stop ladder: quick stop of all drives, no voltage for slow ones, a look at what is left."""
 
+from collections.abc import Callable
 from typing import final
 
-from legbench.drives.cia402 import POWERED, DriveState, Goal, decode_state
+from legbench.drives.cia402 import POWERED, Goal, decode_state, describe_statusword
 from legbench.drives.master.axis_link import AxisLink
 from legbench.drives.master.cycle import Cycle
-from legbench.drives.master.watch import NodeWatch
+from legbench.drives.master.stop_report import StopReport
 
-OBEY_CYCLES = 50
-"""A drive that is still enabled so long after quick stop loses its voltage."""
-RAMP_CYCLES = 1000
-"""Longest that a quick-stop ramp is waited for."""
-LAST_CYCLES = 3
-"""With no voltage, so that the drives have seen the word."""
+RAMP_CYCLES = 40
+"""Longest that a quick-stop ramp is waited for. A drive that still has power then loses its
+voltage, and obeys two cycles later: at 1 kHz every drive is without power after 50 ms."""
+OFF_CYCLES = 100
+"""Longest that drives without voltage are looked at until they show it."""
+SURE_CYCLES = 3
+"""A drive that has shown no power in so many cycles in a row has seen the last word."""
+SILENT_CYCLES = 20
+"""A drive that has sent no process data for so many cycles in a row no longer answers."""
+FAILED_CYCLES = 3
+"""So many cycles in a row that raise something end the wait for a ramp: no time passes in them."""
 
 
 @final
 class StopLadder:
-    """One stop of all drives of a cycle; never raises.
+    """One stop of all drives of a cycle; raises nothing.
 
-    Attributes:
-        cut_off: names of drives that lost their voltage because they did not obey.
-        errors: what failed on the way.
+    Whatever a step raises, a KeyboardInterrupt out of a driver included, the next step is taken.
     """
 
-    def __init__(self, cycle: Cycle) -> None:
-        self._cycle = cycle
-        self.cut_off: list[str] = []
-        self.errors: list[Exception] = []
+    def __init__(self, cycle: Cycle, hold: Callable[[BaseException], None]) -> None:
+        """Prepare to stop the drives of a cycle.
 
-    def run(self) -> None:
-        """Send quick stop to all drives now, then lead them to switch on disabled."""
+        Args:
+            cycle: led from now on by this alone.
+            hold: told what was raised, such as `Shield.hold`.
+        """
+        self._cycle, self._hold = cycle, hold
+        self._cut_off: list[str] = []
+        self._errors: dict[str, None] = {}
+        self._quiet = dict.fromkeys(cycle.axes, 0)
+        self._failed = 0
+
+    def run(self) -> StopReport:
+        """Send quick stop to all drives now, lead them to switch on disabled, look if they are."""
         cycle = self._cycle
         cycle.stopping = True
         for axis in cycle.axes:
+            axis.hold()
             axis.machine.seek(Goal.QUICK_STOP)
         self._send()
-        failed = 0
-        for count in range(RAMP_CYCLES):
-            failed = 0 if self._tick() else failed + 1
-            standing = all(map(self._standing, cycle.axes, cycle.watches))
-            if standing or cycle.bus_off or failed == LAST_CYCLES:
+        for _ in range(RAMP_CYCLES):
+            self._tick()
+            if all(map(self._standing, cycle.axes)) or self._failed == FAILED_CYCLES:
                 break
-            if count == OBEY_CYCLES:
-                self._cut_off()
             self._send()
         for axis in cycle.axes:
+            if not self._standing(axis):
+                self._cut_off.append(axis.node.name)
             axis.machine.seek(Goal.DISABLED)
-        for _ in range(LAST_CYCLES):
+        self._lead_to_rest()
+        return self._report()
+
+    def _lead_to_rest(self) -> None:
+        """Disable the voltage until every drive has shown for a while that it has no power."""
+        sure, self._failed = 0, 0
+        for _ in range(OFF_CYCLES):
             self._send()
             self._tick()
+            sure = sure + 1 if all(map(self._standing, self._cycle.axes)) else 0
+            if sure == SURE_CYCLES or self._failed == FAILED_CYCLES:
+                break
 
     def _send(self) -> None:
-        """One word to every drive; whatever fails, the next step is still taken."""
-        try:
-            self._cycle.send(
-                [axis.machine.step(axis.statusword).controlword for axis in self._cycle.axes]
-            )
-        except Exception as error:
-            self.errors.append(error)
+        """One word to every drive; once more if something else than the bus gets in between."""
+        for _ in range(2):
+            try:
+                self._cycle.send(
+                    [axis.machine.step(axis.statusword).controlword for axis in self._cycle.axes]
+                )
+                break
+            except BaseException as error:  # Until the drives have been told nothing else counts.
+                self._note(error)
 
-    def _tick(self) -> bool:
-        """One cycle; false if it failed, such as with the body of an emulated leg."""
+    def _tick(self) -> None:
+        """One cycle; what it raises, such as the body of an emulated leg, is counted."""
         try:
             self._cycle.tick()
-        except Exception as error:
-            self.errors.append(error)
-            return False
-        return True
-
-    @staticmethod
-    def _standing(axis: AxisLink, watch: NodeWatch) -> bool:
-        """Without power, or out of reach: then its own watchdogs stop it."""
-        return decode_state(axis.statusword) not in POWERED or watch.missed > OBEY_CYCLES
-
-    def _cut_off(self) -> None:
+            self._failed = 0
+        except BaseException as error:  # As above.
+            self._failed += 1
+            self._note(error)
         for axis in self._cycle.axes:
-            if decode_state(axis.statusword) in (None, DriveState.OPERATION_ENABLED):
-                axis.machine.seek(Goal.DISABLED)
-                self.cut_off.append(axis.node.name)
+            self._quiet[axis] = 0 if axis.fresh else self._quiet[axis] + 1
+
+    def _note(self, error: BaseException) -> None:
+        self._hold(error)
+        self._errors[f"{type(error).__name__}: {error}".rstrip(": ")] = None
+
+    def _standing(self, axis: AxisLink) -> bool:
+        """Whether a drive is seen without power, or out of reach: its watchdogs stop it then."""
+        return self._off(axis) or self._silent(axis)
+
+    def _off(self, axis: AxisLink) -> bool:
+        return axis.fresh and decode_state(axis.statusword) not in POWERED
+
+    def _silent(self, axis: AxisLink) -> bool:
+        return self._quiet[axis] > SILENT_CYCLES or (self._cycle.bus_off and not axis.fresh)
+
+    def _report(self) -> StopReport:
+        left = [axis for axis in self._cycle.axes if not self._off(axis)]
+        silent = [axis for axis in left if not axis.fresh]
+        powered = [axis for axis in left if axis.fresh]
+        return StopReport(
+            powered=tuple(axis.node.name for axis in powered),
+            states=tuple(describe_statusword(axis.statusword) for axis in powered),
+            silent=tuple(axis.node.name for axis in silent),
+            cut_off=tuple(self._cut_off),
+            errors=tuple(self._errors),
+        )

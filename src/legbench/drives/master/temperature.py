@@ -21,7 +21,7 @@ class TemperaturePoll:
     """
 
     def __init__(self, node: NodeConfig) -> None:
-        self._object = node.temperature_object
+        self._object, self._scale = node.temperature_object, node.temperature_scale
         self._request_id = SDO_REQUEST_BASE + node.node_id
         self._upload: Upload | None = None
         self._waiting = False
@@ -54,6 +54,6 @@ class TemperaturePoll:
             self.take(value)
 
     def take(self, value: int) -> None:
-        """A reading of the object [0.1 deg C]."""
-        self.celsius = 0.1 * value
+        """A reading of the object [counts]."""
+        self.celsius = self._scale * value
         self._waiting, self.unanswered = False, 0

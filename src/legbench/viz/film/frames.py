@@ -7,15 +7,15 @@ from typing import final
 import mujoco
 import numpy as np
 
-from legbench.errors import RecordingError
 from legbench.kinematics import leg_points
 from legbench.recording.reader import Recording
 from legbench.signals import Floats, Ints
 from legbench.viz.drafts import require_rows
-from legbench.viz.facts import MODEL, facts_of
+from legbench.viz.facts import facts_of
 from legbench.viz.film.offscreen import Image, OffScreen
 from legbench.viz.hip import hip_of
 from legbench.viz.pose import Puppet
+from legbench.viz.run_model import model_of
 
 CAMERA = "side"
 CALM = 0.5
@@ -39,17 +39,15 @@ class Film:
     """A run's model, ready to be photographed from the side.
 
     Raises:
-        RecordingError: the run has no rows, or no model with a camera.
+        RecordingError: the run has no rows.
+        FormatError: its manifest describes no model that can be drawn.
     """
 
     def __init__(self, recording: Recording) -> None:
         require_rows(recording)
-        facts = facts_of(recording.description, recording.path)
-        self._puppet = Puppet(recording.path / MODEL)
-        model = self._puppet.model
-        self._camera = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_CAMERA, CAMERA)
-        if self._camera < 0:
-            raise RecordingError(f"{recording.path / MODEL} has no camera {CAMERA!r}")
+        facts = facts_of(recording.description)
+        self._puppet = Puppet(model_of(recording.description))
+        self._camera = self._puppet.model.camera(CAMERA).id
         self._hip = self._puppet.hip(hip_of(recording, facts))
         self._joint = recording["joint_pos"]
         self._time = recording.time

@@ -47,7 +47,7 @@ def render(
 
     Raises:
         ConfigError: another suffix, or a `time` that is outside the run or not for a .png.
-        RecordingError: the run has no rows or no model, or nothing can be written there.
+        RecordingError: the run has no rows, or nothing can be written there.
         MissingExtraError: the machine has no OpenGL that works.
     """
     kind = path.suffix.lower()

@@ -27,7 +27,7 @@ def blueprint(
         others: keys of the other runs that are shown in the same views.
     """
     plots = {name: plot_view(spec, others) for name, spec in plot_specs(facts).items()}
-    pictures = [leg_view(room), *([scene_view(room)] if facts.model else [])]
+    pictures = [leg_view(room), scene_view(room)]
     left = rrb.Vertical(
         rrb.Tabs(*pictures),
         states_view(),

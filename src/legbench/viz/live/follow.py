@@ -45,7 +45,7 @@ def follow(folder: Path, stream: rr.RecordingStream, pace: Pace) -> int:
     if manifest is None:
         raise RecordingError(f"{folder} is no run folder: it has no manifest")
     description = describe(manifest, folder.name)
-    publisher = Publisher(stream, facts_of(description, folder), live=True)
+    publisher = Publisher(stream, facts_of(description), live=True)
     count = 0
     try:
         tail = Tail(folder / STREAM)
@@ -80,4 +80,4 @@ def _conclude(folder: Path, publisher: Publisher, pace: Pace) -> None:
         pace.wait()
     recording = load(folder)
     publisher.finish()
-    publisher.describe(facts_of(recording.description, folder), summarise(recording))
+    publisher.describe(facts_of(recording.description), summarise(recording))

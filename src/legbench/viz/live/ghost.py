@@ -62,7 +62,7 @@ def other_of(recording: Recording, place: int, facts: Facts) -> Other:
     Raises:
         FormatError: it describes no leg.
     """
-    own = facts_of(recording.description, recording.path)
+    own = facts_of(recording.description)
     run = replace(own.run, convention=facts.run.convention)
     return Other(recording=recording, facts=replace(own, run=run), place=place)
 

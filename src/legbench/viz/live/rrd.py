@@ -21,12 +21,12 @@ def write_rrd(recording: Recording, path: Path, against: Sequence[Recording] = (
         against: other runs, shown in the same views from the same t = 0, in its modal convention.
 
     Raises:
-        FormatError: a run describes no leg.
-        RecordingError: a run has no rows or a damaged model, or nothing can be written there.
+        FormatError: a run describes no leg that can be drawn.
+        RecordingError: a run has no rows, or nothing can be written there.
     """
     for run in (recording, *against):
         require_rows(run)
-    facts = facts_of(recording.description, recording.path)
+    facts = facts_of(recording.description)
     others = [other_of(run, place, facts) for place, run in enumerate(against)]
     with draft_of(path) as draft:
         stream = rr.RecordingStream(APPLICATION, recording_id=facts.run.id)

@@ -10,6 +10,7 @@ from legbench.viz.hip import hip_of
 from legbench.viz.live._rerun import rr, rrb
 from legbench.viz.live.leg2d import FREQ
 from legbench.viz.pose import Puppet
+from legbench.viz.run_model import model_of
 from legbench.viz.style import Colours
 from legbench.viz.trace import Thinner, TracedRows
 
@@ -29,21 +30,24 @@ Shape = rr.Boxes3D | rr.Capsules3D | rr.Cylinders3D | rr.Ellipsoids3D
 
 @final
 class ModelScene:
-    """Publishes the model's bodies; nothing at all for a run without a model."""
+    """Publishes the bodies of a run's model.
+
+    Raises:
+        FormatError: the run describes no model that can be drawn.
+    """
 
     def __init__(self, stream: rr.RecordingStream, facts: Facts) -> None:
         self._stream = stream
         self._facts = facts
         self._thinner = Thinner(FREQ)
-        self._puppet = None if facts.model is None else Puppet(facts.model)
-        if self._puppet is not None:
-            stream.log("/scene", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-            _draw_shapes(stream, self._puppet.model)
+        self._puppet = Puppet(model_of(facts.run))
+        stream.log("/scene", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        _draw_shapes(stream, self._puppet.model)
 
     def push(self, trace: TracedRows) -> None:
         """Add poses of some of these rows."""
         kept = self._thinner.pick(trace.time)
-        if self._puppet is None or len(kept) == 0:
+        if len(kept) == 0:
             return
         puppet = self._puppet
         hip = hip_of(trace.rows, self._facts)[kept]

@@ -56,7 +56,7 @@ def phase_figure(recording: Recorded, against: Sequence[Recorded] = ()) -> Figur
     run, *others = (analysed(each) for each in (recording, *against))
     for each in (run, *others):
         require_rows(each)
-    facts, colouring = facts_of(run.description, run.path), colouring_of(run)
+    facts, colouring = facts_of(run.description), colouring_of(run)
     points = planes_of(run, facts.run.convention)
     with styled():
         figure = Figure(figsize=TALL if against else SIZE, layout="constrained")

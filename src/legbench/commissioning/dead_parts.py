@@ -1,0 +1,279 @@
+"""Dead motors and encoders: how soon the limits find them, and that they find none that lives."""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from pathlib import Path
+
+import numpy as np
+
+from legbench.commissioning.broken_plant import BrokenPlant, Part
+from legbench.control import AbstractController, BangBangConfig, JumpConfig, PositionJumpConfig
+from legbench.design import LegDesign
+from legbench.design.setup import Setup
+from legbench.drives.bus import LockstepBus
+from legbench.drives.bus_file import load_bus
+from legbench.drives.config import BusConfig
+from legbench.drives.emulated.behaviour import Behaviour
+from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.faults import NodeFault, NodeFaultKind
+from legbench.drives.emulated.network import Network
+from legbench.drives.limits import SafetyLimits
+from legbench.drives.session import Session
+from legbench.errors import PlantFault
+from legbench.experiment import (
+    USUAL_SETUP,
+    ControllerConfig,
+    Experiment,
+    make_controller,
+    start_of,
+    targets_of,
+)
+from legbench.plant.abstract import AbstractPlant
+from legbench.plant.analytic import AnalyticPlant
+from legbench.plant.can import CanPlant
+from legbench.plant.emulated_leg import EmulatedLeg
+from legbench.plant.limited import LimitedPlant
+from legbench.plant.sim import SimPlant
+from legbench.plants import LIMITS_NAME, limits_for
+from legbench.servo import ServoConfig
+
+EXCITATION = 0.03
+"""A dead part counts as contradicted from this difference to a healthy one on [rad]."""
+BOUND, DRIFT_BOUND = 0.05, 0.15
+"""Longest times from the contradiction to the end of the run, and for a drift [s]."""
+PATIENCE = 1.5
+"""A part that is not found so long after it died is missed [s]."""
+CONTROLLERS: dict[str, ControllerConfig] = {
+    "jump": JumpConfig(),
+    "bang-bang": BangBangConfig(),
+    "position-jump": PositionJumpConfig(),
+}
+
+
+class Emulation(StrEnum):
+    """What stands in for the leg."""
+
+    CAN = "can"
+    """Emulated drives on an emulated bus, with the simulated leg on their shafts."""
+    SIM = "sim"
+    """MuJoCo behind the limits."""
+    ANALYTIC = "analytic"
+    """The paper's equations behind the limits."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bench:
+    """Where trials are made."""
+
+    design: LegDesign
+    bus_file: Path
+
+    @property
+    def limits(self) -> SafetyLimits:
+        """Limits beside the bus file, completed by the design's."""
+        return limits_for(self.bus_file.parent / LIMITS_NAME, self.design)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Death:
+    """A part that dies in mid-run."""
+
+    part: Part
+    drive: int
+    """0 or 1."""
+    onset: float
+    """Time since the beginning of the run [s]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Found:
+    """What came of a run."""
+
+    cause: str | None
+    """Why the run ended; None if nothing ended it."""
+    time: float | None
+    """From the contradiction to the end of the run, 0 if the end came before; None if nothing
+    ended it [s]. Steps and drifts contradict a healthy leg from the moment on in which they
+    begin, other parts once they differ from healthy ones by `EXCITATION`."""
+    since_death: float | None
+    """From the moment on in which the part died [s]."""
+    excited: bool
+    """Whether there ever was a contradiction."""
+
+    def within(self, part: Part) -> bool:
+        """Whether it was found in time; a part that shows nothing wrong need not be found."""
+        if self.time is None:
+            return not self.excited
+        return self.time <= (DRIFT_BOUND if part.drifts else BOUND)
+
+
+@dataclass(slots=True)
+class _Stage:
+    plant: AbstractPlant
+    controller: AbstractController
+    kill: Callable[[], None]
+    contradiction: Callable[[], float]
+
+
+def try_dead_part(
+    bench: Bench, emulation: Emulation, controller: str, death: Death, servo: ServoConfig
+) -> Found:
+    """Run a controller, let a part die, see when the limits end the run.
+
+    Raises:
+        PlantFault: the run ended before the part died.
+    """
+    with _staged(bench, emulation, controller, servo, death) as stage:
+        observation = stage.plant.reset()
+        stage.controller.reset(observation)
+        onset = round(death.onset / stage.plant.period)
+        contradicted = onset if death.part.shows_at_once else None
+        for cycle in range(onset + round(PATIENCE / stage.plant.period)):
+            if cycle == onset:
+                stage.kill()
+            try:
+                observation = stage.plant.step(stage.controller.step(observation))
+            except PlantFault as error:
+                if cycle < onset:
+                    raise
+                cycles = 0 if contradicted is None else cycle - contradicted
+                return Found(
+                    cause=error.cause,
+                    time=cycles * stage.plant.period,
+                    since_death=(cycle - onset) * stage.plant.period,
+                    excited=contradicted is not None,
+                )
+            if contradicted is None and cycle >= onset and stage.contradiction() > EXCITATION:
+                contradicted = cycle
+    return Found(cause=None, time=None, since_death=None, excited=contradicted is not None)
+
+
+def watch_healthy(
+    bench: Bench, emulation: Emulation, controller: str, servo: ServoConfig, seconds: float
+) -> str | None:
+    """Run a controller on a leg that is well; what ended the run before its time, if anything."""
+    with _staged(bench, emulation, controller, servo, None) as stage:
+        observation = stage.plant.reset()
+        stage.controller.reset(observation)
+        for _ in range(round(seconds / stage.plant.period)):
+            try:
+                observation = stage.plant.step(stage.controller.step(observation))
+            except PlantFault as error:
+                return f"{error.cause} at {observation.time:.3f} s: {error}"
+    return None
+
+
+@contextmanager
+def _staged(
+    bench: Bench, emulation: Emulation, controller: str, servo: ServoConfig, death: Death | None
+) -> Iterator[_Stage]:
+    config = CONTROLLERS[controller]
+    chosen = Experiment(
+        design=bench.design, controller=config, setup=Setup(kind=USUAL_SETUP[type(config)])
+    )
+    stage = (_on_bus if emulation is Emulation.CAN else _alone)(
+        bench, emulation, chosen, servo, death
+    )
+    with stage.plant:
+        yield stage
+
+
+def _alone(
+    bench: Bench,
+    emulation: Emulation,
+    chosen: Experiment,
+    servo: ServoConfig,
+    death: Death | None,
+) -> _Stage:
+    start = start_of(chosen)
+    if emulation is Emulation.SIM:
+        plant: AbstractPlant = SimPlant(bench.design, chosen.options, start, servo)
+    else:
+        plant = AnalyticPlant(bench.design, chosen.setup, start, servo)
+    controller = make_controller(chosen.controller, targets_of(chosen))
+    part, drive = (Part.JAMMED, 0) if death is None else (death.part, death.drive)
+    broken = BrokenPlant(plant, np.asarray(bench.design.stiffness), part, drive)
+    limited = LimitedPlant(broken, bench.limits, delay_cycles=servo.delay_cycles)
+    return _Stage(limited, controller, broken.break_part, lambda: broken.contradiction)
+
+
+class _Witness:
+    """The leg on the shafts, which remembers where its links truly are."""
+
+    def __init__(self, leg: EmulatedLeg) -> None:
+        self._leg = leg
+        self.links: Sequence[float] = (0.0, 0.0)
+
+    def __call__(
+        self, motor_positions: tuple[float, ...]
+    ) -> tuple[Sequence[float], Sequence[float]]:
+        self.links, torques = self._leg(motor_positions)
+        return self.links, torques
+
+
+def _on_bus(
+    bench: Bench,
+    emulation: Emulation,
+    chosen: Experiment,
+    servo: ServoConfig,
+    death: Death | None,
+) -> _Stage:
+    config, start = _with_encoders(load_bus(bench.bus_file), servo), start_of(chosen)
+    witness = _Witness(EmulatedLeg(bench.design, chosen.options, start))
+    behaviours = [
+        Behaviour(start_pos=float(value), bandwidth=servo.bandwidth) for value in start.motor_pos
+    ]
+    network = emulate(config, behaviours, body=witness)
+    session = Session(LockstepBus("leg", network=network), config)
+    plant = CanPlant(session, session.link(bench.limits, bench.design.stiffness), start)
+    controller = make_controller(chosen.controller, targets_of(chosen))
+
+    def kill() -> None:
+        if death is not None:
+            network.inject(_fault(config, network, death))
+
+    def contradiction() -> float:
+        sample = plant.sample
+        if death is None or sample is None:
+            return 0.0
+        motion = network.drives[death.drive].axis.motion
+        if death.part is Part.JAMMED:
+            scale = abs(config.nodes[death.drive].motor.counts_per_rad)
+            return abs(motion.demand - motion.actual) / scale
+        return max(
+            abs(sample.motor_pos[death.drive] - motion.angle),
+            abs(sample.link_pos[death.drive] - witness.links[death.drive]),
+        )
+
+    return _Stage(plant, controller, kill, contradiction)
+
+
+def _fault(config: BusConfig, network: Network, death: Death) -> NodeFault:
+    return NodeFault(
+        kind=NodeFaultKind[death.part.name],
+        node_id=config.nodes[death.drive].node_id,
+        start_ns=network.now_ns,
+        size=death.part.size,
+    )
+
+
+def _with_encoders(config: BusConfig, servo: ServoConfig) -> BusConfig:
+    """Give both encoders of every drive the counts of a servo, if it has any.
+
+    The bench's motor encoders sit before the gear; the counts of a servo are those of the axis.
+    """
+    counts = servo.encoder_counts
+    if counts is None:
+        return config
+    nodes = tuple(
+        replace(
+            node,
+            motor=replace(node.motor, counts_per_rev=counts, gear=1.0),
+            link=replace(node.link, counts_per_rev=min(counts, 1 << 16)),
+            parameters=(),
+        )
+        for node in config.nodes
+    )
+    return replace(config, nodes=nodes)

@@ -1,0 +1,72 @@
+"""What the two encoders of an emulated axis show, and how they may fail; pure."""
+
+from enum import Enum
+from typing import final
+
+from legbench.drives.config import NodeConfig
+
+SECOND_NS = 1_000_000_000
+
+
+class Ailment(Enum):
+    """How an encoder may fail."""
+
+    FROZEN = "frozen"
+    """It shows for ever what it showed last."""
+    STEP = "step"
+    """It is off by an angle from one sample to the next [rad]."""
+    DRIFT = "drift"
+    """It runs away at a speed [rad/s]."""
+
+
+@final
+class Encoder:
+    """One encoder: true counts in, shown counts out.
+
+    The position loop of the emulated drive goes on with the true position: what fails is what is
+    told, not what the motor does.
+    """
+
+    def __init__(self, counts_per_rad: float) -> None:
+        """Begin healthy."""
+        self._counts_per_rad = counts_per_rad
+        self._ailment: Ailment | None = None
+        self._size = self._offset = 0.0
+        self._shown = 0
+
+    def fail(self, ailment: Ailment | None, size: float = 0.0) -> None:
+        """Fail from now on, by an angle [rad] or a speed [rad/s]; None heals."""
+        self._ailment, self._size, self._offset = ailment, size, 0.0
+
+    def tick(self, step_ns: int) -> None:
+        """Let time pass [ns]."""
+        if self._ailment is Ailment.DRIFT:
+            self._offset += self._size * step_ns / SECOND_NS
+        elif self._ailment is Ailment.STEP:
+            self._offset = self._size
+
+    def show(self, counts: int) -> int:
+        """Return what is told of a true position [counts]."""
+        if self._ailment is not Ailment.FROZEN:
+            self._shown = counts + round(self._offset * self._counts_per_rad)
+        return self._shown
+
+
+@final
+class Sensors:
+    """Both encoders of an axis.
+
+    Attributes:
+        motor: encoder of the motor.
+        link: encoder of the link.
+    """
+
+    def __init__(self, node: NodeConfig) -> None:
+        """Take the resolutions from the bus file."""
+        self.motor = Encoder(node.motor.counts_per_rad)
+        self.link = Encoder(node.link.counts_per_rad)
+
+    def tick(self, step_ns: int) -> None:
+        """Let time pass [ns]."""
+        self.motor.tick(step_ns)
+        self.link.tick(step_ns)

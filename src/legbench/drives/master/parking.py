@@ -1,0 +1,87 @@
+"""What a link leaves behind: drives that no recorded command moves again.
+
+A log that is played back holds NMT start, SYNC, controlwords and targets. A drive that keeps its
+configuration obeys all of them. One whose command frames are switched off does not, operational
+or not, until it is configured again or has been without its logic supply.
+"""
+
+from collections.abc import Callable, Collection
+
+import can
+
+from legbench.drives.codec.datatypes import DataType
+from legbench.drives.codec.frame import COB_INVALID
+from legbench.drives.config import BusConfig, NodeConfig, Parameter
+from legbench.drives.errors import BusError, DriveError
+from legbench.drives.master.port import Port
+from legbench.drives.master.sdo_port import SdoPort
+
+RPDO_COMMUNICATION = 0x1400
+"""First of the objects whose sub-index 1 is the COB-ID of a command frame."""
+
+
+def parked(node: NodeConfig) -> list[Parameter]:
+    """Objects that switch the command frames of a drive off (CiA 301, 7.5.2.33)."""
+    return [
+        Parameter(
+            index=RPDO_COMMUNICATION + pdo.number - 1,
+            sub=1,
+            kind=DataType.UNSIGNED32,
+            value=COB_INVALID | node.rpdo_id(pdo),
+        )
+        for pdo in node.rpdos
+    ]
+
+
+def is_parked(node: NodeConfig, parameter: Parameter, there: int) -> bool:
+    """Whether an object differs from the configuration only because its drive is parked.
+
+    Args:
+        node: the drive.
+        parameter: what the configuration wants.
+        there: what the drive holds.
+    """
+    return any(
+        (parameter.key, there) == (rest.key, rest.value) and there == parameter.value | COB_INVALID
+        for rest in parked(node)
+    )
+
+
+def park(
+    port: Port,
+    bus: BusConfig,
+    on_other: Callable[[can.Message], None],
+    powered: Collection[str] = (),
+) -> list[str]:
+    """Park all drives, reading every object back; what went wrong, one line a drive.
+
+    No stop waits for this, nothing is tried twice, and nothing is raised. A drive that has kept its
+    power is left out: the deadline of its command frames may be what stops it.
+
+    Args:
+        port: of the bus.
+        bus: whose drives.
+        on_other: gets the frames that are no answers.
+        powered: names of drives that have kept their power.
+    """
+    failed: list[str] = []
+    for node in bus.nodes:
+        who = f"drive '{node.name}' (node {node.node_id})"
+        if node.name in powered:
+            failed.append(f"{who} is not parked, because it has kept its power")
+            continue
+        sdo = SdoPort(
+            port, node.node_id, timeout_ms=bus.sdo_timeout_ms, retries=1, on_other=on_other
+        )
+        try:
+            for rest in parked(node):
+                sdo.put(rest.index, rest.sub, rest.kind, rest.value)
+                there = sdo.get_int(rest.index, rest.sub, rest.kind)
+                if there != rest.value:
+                    failed.append(
+                        f"{who} keeps its commands switched on: {rest.index:04X}h:01 is "
+                        f"{there:08X}h"
+                    )
+        except (BusError, DriveError) as error:
+            failed.append(f"{who} is not parked: {error}")
+    return failed

@@ -1,0 +1,96 @@
+"""What a stop has achieved, and who leads drives and so has to stop them."""
+
+from abc import abstractmethod
+from dataclasses import dataclass, replace
+from types import TracebackType
+
+from legbench.closing import Closing
+from legbench.drives.errors import StopError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StopReport:
+    """How a stop of all drives of one master has ended; drives by their names in the bus file."""
+
+    powered: tuple[str, ...] = ()
+    """Drives that still show a state with power."""
+    states: tuple[str, ...] = ()
+    """Statusword in words, one for every drive that still shows power."""
+    silent: tuple[str, ...] = ()
+    """Drives that no longer answer, so that nobody knows whether they have power."""
+    cut_off: tuple[str, ...] = ()
+    """Drives whose voltage was disabled before their quick-stop ramp had ended."""
+    errors: tuple[str, ...] = ()
+    """What went wrong on the way, such as a frame that could not be sent."""
+
+    @property
+    def verified(self) -> bool:
+        """Whether every drive has been seen without power."""
+        return not (self.powered or self.silent)
+
+    @property
+    def trouble(self) -> str | None:
+        """What a person beside the leg has to know, in one line; none after a verified stop."""
+        parts = [
+            f"drive '{name}' keeps its power after the stop ({state}): switch its power off"
+            for name, state in zip(self.powered, self.states, strict=True)
+        ]
+        parts += [
+            f"drive '{name}' no longer answers, so whether it has power is not known: its own "
+            "watchdogs have to stop it; switch its power off before you touch the leg"
+            for name in self.silent
+        ]
+        return "; ".join(parts) or None
+
+    def after(self, earlier: "StopReport | None") -> "StopReport":
+        """This report of a stop that repeats an earlier one, with what that had to tell."""
+        if earlier is None:
+            return self
+        return replace(
+            self,
+            cut_off=tuple(dict.fromkeys(earlier.cut_off + self.cut_off)),
+            errors=tuple(dict.fromkeys(earlier.errors + self.errors)),
+        )
+
+
+class Lead(Closing):
+    """Whoever may give drives power, and takes it away when its `with` ends.
+
+    Attributes:
+        stopped: how its last stop has ended; none if it never had to stop anything.
+    """
+
+    stopped: StopReport | None = None
+
+    @abstractmethod
+    def close(self) -> None:
+        """Take the power away, check that it is gone; may be called twice, raises no error."""
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Close.
+
+        Raises:
+            StopError: a drive keeps its power or does not answer. If an exception is on its way
+                already, it gets that as a note.
+        """
+        try:
+            self.close()
+        except BaseException as late:
+            add_trouble(late, self.stopped)
+            raise
+        if error is not None:
+            add_trouble(error, self.stopped)
+        elif self.stopped is not None and self.stopped.trouble is not None:
+            raise StopError(self.stopped.trouble)
+
+
+def add_trouble(error: BaseException, report: StopReport | None) -> None:
+    """Give an exception the trouble of a stop as a note, once."""
+    trouble = None if report is None else report.trouble
+    if trouble is not None and trouble not in getattr(error, "__notes__", ()):
+        error.add_note(trouble)

@@ -1,0 +1,58 @@
+"""What a run on drives has to tell in the end: stop, rest, parking, notices, frames."""
+
+from dataclasses import asdict
+from typing import Any
+
+from legbench.drives.link import Link
+from legbench.drives.master.stop_report import StopReport
+from legbench.drives.upper_ends import LIMIT_ENDS
+from legbench.plant.can import CanPlant
+
+
+def bus_events(plant: CanPlant) -> dict[str, dict[str, Any]]:
+    """Events of a run on drives by name, those that happened and the count of frames."""
+    link, log = plant.link, plant.session.log
+    events: dict[str, dict[str, Any]] = {}
+    if log is not None and log.error is not None:
+        events["bus log not written"] = {"error": log.error}
+    if link.listener_error is not None:
+        events["onlooker failed"] = {"who": "listener", "error": link.listener_error}
+    if link.stopped is not None and link.stopped != StopReport():
+        events["stop"] = asdict(link.stopped)
+    if plant.landing is not None:
+        events["rest"] = asdict(plant.landing)
+    if link.not_parked:
+        events["not parked"] = {"drives": link.not_parked}
+    return {**events, **link.cycle.notices.events, "bus": _frames(plant)}
+
+
+def _frames(plant: CanPlant) -> dict[str, Any]:
+    """Count of what came, was late or was lost on the bus during a run."""
+    link, cycle = plant.link, plant.link.cycle
+    return {
+        "skipped_cycles": link.skipped_total,
+        "silent_cycles": cycle.silent_total,
+        "late_frames": cycle.late_frames,
+        "error_frames": cycle.error_frames,
+        "lost_cycles": [watch.lost_total for watch in cycle.watches],
+        "emergencies": [str(text) for watch in cycle.watches for text in watch.history],
+        "state": link.state.name.lower(),
+        "began": plant.began,
+    }
+
+
+def gone_drive(link: Link) -> str | None:
+    """Why a run that has lasted its time was none to its end; none if every drive was there.
+
+    A waived `lost_frames` may bridge seconds; a run that is shorter would end complete though its
+    drives have been gone since its beginning.
+    """
+    longest, _, _ = LIMIT_ENDS["lost_frames"]
+    for axis, watch in zip(link.cycle.axes, link.cycle.watches, strict=True):
+        if watch.missed > longest:
+            return (
+                f"drive '{axis.node.name}' (node {axis.node.node_id}) had not answered for the "
+                f"last {watch.missed} cycles when the run ended, the limit is {longest:g}; look at "
+                "its supply and the wiring, and at lost_frames in the limits file"
+            )
+    return None

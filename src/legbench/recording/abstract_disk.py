@@ -1,0 +1,55 @@
+"""What a `RunWriter` hands its rows to."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+from legbench.recording.rows import BATCH_ROWS, Block
+
+MAX_WAITING = 60_000 // BATCH_ROWS
+"""Blocks that may wait for the disk: 60 s at 1 kHz, 14 MB."""
+
+
+@dataclass(slots=True)
+class Kept:
+    """What the operating system has of a run, as far as is known."""
+
+    rows: int = 0
+    first: float = 0.0
+    """Time of the first row [s]."""
+    last: float = 0.0
+    """Time of the last row [s]."""
+    error: Exception | None = None
+    """First failure of the samples, after which no more rows are written."""
+    events_error: Exception | None = None
+    """First failure of the events; rows are written all the same."""
+
+
+class AbstractDisk(ABC):
+    """Takes blocks and events of one run, and writes them beside the control loop.
+
+    Attributes:
+        kept: what has been written.
+    """
+
+    kept: Kept
+
+    @property
+    @abstractmethod
+    def lagging(self) -> bool:
+        """Whether more rows wait than a run may have in memory, or nobody writes any more."""
+
+    @abstractmethod
+    def swap(self, block: Block) -> Block:
+        """Take a block to write and give an empty one; never waits."""
+
+    @abstractmethod
+    def event(self, line: bytes) -> None:
+        """Take one whole line for the events; never waits."""
+
+    @abstractmethod
+    def finish(self) -> None:
+        """Write what waits and the end mark, and end; `kept` is final then."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Close both files, which releases the lock on the run."""

@@ -1,0 +1,33 @@
+"""Whether a run that has lasted its time has ended well; its plant may know better."""
+
+from dataclasses import replace
+
+from legbench.loop import Outcome
+
+STOP_FAILED = "stop failed"
+"""Cause of a run whose drives could not be shown to be without power in the end."""
+GONE = "process data lost"
+"""Cause of a run whose plant had not answered for long when its time was over."""
+
+
+def answered(outcome: Outcome, gone: str | None) -> Outcome:
+    """Return how a run ended, as a fault if its plant had been gone by then.
+
+    Args:
+        outcome: what the loop says.
+        gone: why the plant was gone, none if it was there.
+    """
+    if gone is None or outcome.status == "fault":
+        return outcome
+    return replace(outcome, status="fault", cause=GONE, message=gone)
+
+
+def stopped_well(outcome: Outcome, trouble: str | None) -> Outcome:
+    """Return how a run ended, as a fault if its drives could not be shown to be without power.
+
+    The first cause stays the cause; what the stop has to tell is added to the message.
+    """
+    if trouble is None:
+        return outcome
+    message = trouble if outcome.message is None else f"{outcome.message}; {trouble}"
+    return replace(outcome, status="fault", cause=outcome.cause or STOP_FAILED, message=message)

@@ -1,0 +1,110 @@
+"""A run goes on whatever becomes of the terminal it was started from."""
+
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from commands import CALL, DESIGN
+
+from legbench.recording.reader import load
+
+TERMINAL = """
+import sys
+class Gone:
+    def isatty(self): return True
+    def fileno(self): return 2
+    def write(self, text): raise {error}
+    def flush(self): pass
+sys.stderr = Gone()
+"""
+"""A stderr that calls itself a terminal and takes nothing."""
+
+
+def ran(
+    tmp_path: Path, *arguments: str, before: str = "pass", redirect: str
+) -> "subprocess.CompletedProcess[str]":
+    """A run in a process of its own, started by a shell with a redirection."""
+    code = CALL.format(before=before)
+    command = [sys.executable, "-c", code, "run", "jump", *DESIGN, "--json", *arguments]
+    command += ["--duration", "0.6", "--out", str(tmp_path / "runs")]
+    line = f"{shlex.join(command)} {redirect}"
+    return subprocess.run(
+        ["sh", "-c", line], capture_output=True, text=True, timeout=60, cwd=tmp_path, check=False
+    )
+
+
+@pytest.mark.parametrize(
+    ("before", "redirect"),
+    [
+        ("pass", "2>&-"),
+        ("pass", "0<&- 2>&-"),
+        ("pass", "2>/dev/full"),
+        (TERMINAL.format(error="BrokenPipeError(32, 'Broken pipe')"), ""),
+        (TERMINAL.format(error="ValueError('I/O operation on closed file')"), ""),
+        (TERMINAL.format(error="AttributeError('write')"), ""),
+    ],
+    ids=["closed", "all closed", "full", "broken pipe", "closed file", "no write"],
+)
+def test_a_stderr_that_takes_nothing_ends_no_run(
+    tmp_path: Path, before: str, redirect: str
+) -> None:
+    done = ran(tmp_path, before=before, redirect=redirect)
+    assert done.returncode == 0
+    assert done.stdout.startswith("{")
+    assert done.stdout.count("\n") == 1
+    (run,) = (tmp_path / "runs").iterdir()
+    recording = load(run)
+    assert recording.complete
+    assert len(recording.time) == 600
+
+
+@pytest.mark.parametrize("redirect", ["2>&-", "2>/dev/full"])
+def test_a_note_that_nobody_can_read_is_dropped(tmp_path: Path, redirect: str) -> None:
+    """Without a stderr, `print` would put the note into the JSON."""
+    done = ran(
+        tmp_path, "--view", redirect="2>&-", before="import os; os.environ.pop('DISPLAY', 0)"
+    )
+    assert done.returncode == 0
+    assert done.stdout.startswith("{")
+    assert done.stdout.count("\n") == 1
+
+
+def test_a_controller_that_fails_is_a_message_with_its_lines_and_no_traceback(
+    tmp_path: Path,
+) -> None:
+    before = """
+from legbench.control import Jump
+def step(self, observation, usual=Jump.step):
+    if observation.time > 0.2: raise LookupError('no such phase')
+    return usual(self, observation)
+Jump.step = step
+"""
+    done = ran(tmp_path, before=before, redirect="")
+    assert done.returncode == 1
+    assert "Traceback" not in done.stderr
+    assert "legbench: the controller failed at t = 0.201 s: LookupError: no such" in done.stderr
+    assert "in step" in done.stderr
+    (run,) = (tmp_path / "runs").iterdir()
+    manifest = load(run).manifest
+    assert (manifest["status"], manifest["cause"]) == ("fault", "controller failed")
+
+
+@pytest.mark.parametrize("where", ["reset", "step"])
+def test_a_plant_that_fails_otherwise_is_a_message_and_no_traceback(
+    tmp_path: Path, where: str
+) -> None:
+    before = f"""
+from legbench.plant.sim import SimPlant
+def broken(*arguments): raise RuntimeError('no such body')
+SimPlant.{where} = broken
+"""
+    done = ran(tmp_path, before=before, redirect="")
+    assert done.returncode == 1
+    assert "Traceback" not in done.stderr
+    assert "legbench: the plant failed" in done.stderr
+    assert "RuntimeError: no such body" in done.stderr
+    (run,) = (tmp_path / "runs").iterdir()
+    manifest = load(run).manifest
+    assert (manifest["status"], manifest["cause"]) == ("fault", "plant failed")
