@@ -102,18 +102,16 @@ def test_events_of_drives_are_in_the_recording(tmp_path: Path) -> None:
     assert result.cause is None
 
 
-@pytest.mark.parametrize(
-    "choice", [SimChoice(limits=load_limits(LIMITS)), AnalyticChoice(limits=load_limits(LIMITS))]
-)
+@pytest.mark.parametrize("kind", [SimChoice, AnalyticChoice])
 def test_a_run_beyond_the_limits_says_that_it_ran_something_else(
-    tmp_path: Path, choice: SimChoice | AnalyticChoice
+    tmp_path: Path, kind: type[SimChoice | AnalyticChoice]
 ) -> None:
     chosen = Experiment(
         design=load_design(ROOT / "models" / "optimal.toml"),
         controller=BangBangConfig(z2=1.8, dz2=0.2),
         setup=Setup(kind=SetupKind.HFTS),
         duration=0.6,
-        plant=choice,
+        plant=kind(limits=load_limits(LIMITS)),
     )
     recording = load(record(chosen, tmp_path).path)
     (event,) = [event for event in recording.events if event["name"] == "limited"]
