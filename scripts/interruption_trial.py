@@ -26,15 +26,15 @@ from legbench.cli.drives_reading import Bench
 from legbench.cli.drives_timing import Jitter
 from legbench.cli.run import RunArguments
 from legbench.control import BangBangConfig
-from legbench.drives.bus import LockstepBus
-from legbench.drives.bus_file import load_bus, load_limits
-from legbench.drives.config import BusConfig
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.emulated.network import Network, stiff_body
+from legbench.drives.emulated.network_time import NetworkTime
 from legbench.drives.emulated.power import POWERED
-from legbench.drives.session import Session
-from legbench.drives.timebase import NetworkTime
+from legbench.drives.master.session import Session
+from legbench.drives.setup.bus_file import load_bus, load_limits
+from legbench.drives.setup.config import BusConfig
 from legbench.interrupts import STOP_SIGNALS
 from legbench.plant import can as can_plant
 

@@ -3,7 +3,8 @@ from collections import Counter
 
 import pytest
 
-from legbench.drives.cia402 import (
+from legbench.drives.emulated.power import PowerStage
+from legbench.drives.protocol.cia402 import (
     HOLD_CYCLES,
     PATTERNS,
     RESET_PATIENCE,
@@ -16,7 +17,6 @@ from legbench.drives.cia402 import (
     describe_statusword,
     next_controlword,
 )
-from legbench.drives.emulated.power import PowerStage
 
 BITS_OF_STATE = 0b0110_1111
 

@@ -17,14 +17,14 @@ from drives_rig import MS, START, Rig, config, rig
 
 from legbench import plants
 from legbench.cli import main
-from legbench.drives.bus import LockstepBus
-from legbench.drives.cia402 import POWERED, DriveState
-from legbench.drives.codec.datatypes import DataType
-from legbench.drives.config import Parameter
+from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.emulated.drive import EmulatedDrive
 from legbench.drives.emulated.network import Network
 from legbench.drives.errors import StopError
-from legbench.drives.link import LinkState
+from legbench.drives.master.link import LinkState
+from legbench.drives.protocol.cia402 import POWERED, DriveState
+from legbench.drives.protocol.datatypes import DataType
+from legbench.drives.setup.config import Parameter
 from legbench.recording.reader import load
 
 SO, OE = DriveState.SWITCH_ON_DISABLED, DriveState.OPERATION_ENABLED

@@ -7,13 +7,13 @@ from typing import Any, cast
 import pytest
 from drives_rig import LIMITS, config, node
 
-from legbench.drives.cia402 import Goal
-from legbench.drives.config import BusConfig
-from legbench.drives.limits import SafetyLimits
 from legbench.drives.master.axis_link import AxisLink
 from legbench.drives.master.cycle import Tick
 from legbench.drives.master.supervisor import Supervisor
+from legbench.drives.protocol.cia402 import Goal
+from legbench.drives.setup.config import BusConfig
 from legbench.errors import PlantFault
+from legbench.limits.safety import SafetyLimits
 
 ENABLED, FOLLOWS = 0x0237, 1 << 12
 

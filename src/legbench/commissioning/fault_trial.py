@@ -10,10 +10,7 @@ from typing import Protocol
 
 from legbench.control import JumpConfig
 from legbench.design import LegDesign
-from legbench.drives.bus import LockstepBus
-from legbench.drives.bus_file import load_bus, load_limits
-from legbench.drives.cia402 import DriveState
-from legbench.drives.config import BusConfig
+from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.emulated.faults import (
     FOREVER_NS,
     Babble,
@@ -25,10 +22,13 @@ from legbench.drives.emulated.faults import (
 )
 from legbench.drives.emulated.network import Network
 from legbench.drives.errors import DriveError
-from legbench.drives.limits import SafetyLimits
+from legbench.drives.protocol.cia402 import DriveState
+from legbench.drives.setup.bus_file import load_bus, load_limits
+from legbench.drives.setup.config import BusConfig
 from legbench.errors import ConfigError
 from legbench.experiment import Experiment, make_controller, start_of, targets_of
 from legbench.interrupts import StopFlag
+from legbench.limits.safety import SafetyLimits
 from legbench.loop import Outcome, run
 from legbench.plant.can import CanPlant
 from legbench.plant.landing import End
