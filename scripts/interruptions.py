@@ -20,11 +20,21 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from interruption_trial import Injector, Point, Theatre
+from interruption_points import Injector, Point
+from interruption_trial import Theatre
 
 from legbench.interrupts import STOP_SIGNALS, stop_on_interrupt
 
-WEIGHTS = {"run": 6, "jog": 9, "home": 9, "script": 4, "zero": 1, "configure": 2, "jitter": 2}
+WEIGHTS = {
+    "run": 4,
+    "rest": 4,
+    "jog": 9,
+    "home": 9,
+    "script": 4,
+    "zero": 1,
+    "configure": 2,
+    "jitter": 2,
+}
 """Share of each command among the points."""
 KINDS = ("call",) * 9 + ("line",) * 9 + ("driver",) * 2
 """Where a signal comes from, and how often."""
