@@ -35,11 +35,12 @@ STEPS, DRIFTS = (0.005, 0.5), (0.1, 5.0)
 """Sizes of an encoder's step [rad] and drift [rad/s], of either sign."""
 TOGETHER = 0.6
 """Share of further faults that strike near the first one, so also while the drives stop [-]."""
-AFTER_NS = 120 * MS
-"""Longest time from a fault to one near it: a stop takes 50 ms, its end a little more."""
-PHASES = ("open", "start", "run", "rest")
-"""Of a run without faults: the bus is opened and configured; drives are enabled and go to the start
-posture; the run; the way to rest. A stop comes when a fault brings it."""
+AFTER_MS = (0.0, 2.2)
+"""Decimal logarithms of the shortest and the longest time from a fault to one near it [ms]: it is
+found after some milliseconds, the stop takes 50 ms at most."""
+PHASES = ("open", "start", "run", "rest", "stop")
+"""The bus is opened and drives are configured; they are enabled and go to the start posture; the
+run; the way to rest; the stop, which faults bring at other times, too."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,27 +109,22 @@ def _words(strike: Strike) -> str:
     return f"{at}, {cob_id}, delay {strike.delay_ns / MS:.2f} ms, length {strike.length}"
 
 
-def draw(
-    number: int, seed: int, schedules: dict[tuple[str, bool], Schedule], kinds: tuple[str, ...] = ()
-) -> Sequence:
+def draw(number: int, seed: int, schedules: dict[tuple[str, bool], Schedule]) -> Sequence:
     """Draw a sequence; the same number and seed give the same one.
 
     Args:
         number: of the sequence.
         seed: of the series.
         schedules: of healthy runs, by controller and by whether they end at rest.
-        kinds: names that the first strike may have; any by default.
     """
     artist = _Artist(random.Random(f"{seed}/{number}"))
     controller, rests = artist.chance.choice(sorted(schedules))
     schedule = schedules[controller, rests]
     first = artist.strike(artist.moment(schedule))
-    while kinds and name_of(first) not in kinds:
-        first = artist.strike(artist.moment(schedule))
     strikes = [first]
     for _ in range(artist.chance.randrange(3)):
         near = artist.chance.random() < TOGETHER
-        at_ns = first.start_ns + artist.chance.randrange(AFTER_NS)
+        at_ns = first.start_ns + round(MS * 10 ** artist.chance.uniform(*AFTER_MS))
         strikes.append(artist.strike(at_ns if near else artist.moment(schedule)))
     ordered = tuple(sorted(strikes, key=lambda strike: strike.start_ns))
     return Sequence(number=number, controller=controller, rests=rests, strikes=ordered)

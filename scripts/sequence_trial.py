@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
-import can
 from sequence_draw import Interrupt, Schedule, Sequence
 
 from legbench import loop, plants
@@ -36,8 +35,8 @@ from legbench.recording.reader import load
 ROOT = Path(__file__).parents[1]
 BUS = ROOT / "hardware" / "leg.toml"
 CONTROLLERS: dict[str, tuple[ControllerConfig, float]] = {
-    "jump": (JumpConfig(), 0.4),
-    "bang-bang": (BangBangConfig(), 0.3),
+    "jump": (JumpConfig(), 0.25),
+    "bang-bang": (BangBangConfig(), 0.2),
     "position-jump": (PositionJumpConfig(), 0.2),
 }
 """Controller and duration of its run [s], by kind."""
@@ -57,6 +56,7 @@ class Seen:
         network: the bus.
         marks: when each phase began [ns], in order.
         edges: drives that got power after the first stop had begun.
+        lost_ns: when a drive has lost its power [ns].
         ended_ns: when the command was over.
         left: whether each drive had power then.
         power_ns: when a drive had power last.
@@ -70,6 +70,7 @@ class Seen:
     network: Network | None = None
     marks: list[tuple[int, str]] = field(default_factory=lambda: [(0, "open")])
     edges: list[str] = field(default_factory=list)
+    lost_ns: list[int] = field(default_factory=list)
     powered: tuple[bool, ...] = ()
     ended_ns: int = 0
     left: tuple[bool, ...] = ()
@@ -107,11 +108,14 @@ class Seen:
         powered = tuple(drive.axis.power.state in POWERED for drive in self.network.drives)
         if any(powered):
             self.power_ns = self.now_ns
+        self.lost_ns += [
+            self.now_ns
+            for before, now in zip(self.powered or powered, powered, strict=True)
+            if before and not now
+        ]
         stop_ns = self.stop_ns()
         if stop_ns is not None and self.now_ns > stop_ns + LATE_NS and self.powered:
-            for drive, before, now in zip(
-                self.network.drives, self.powered, powered, strict=True
-            ):
+            for drive, before, now in zip(self.network.drives, self.powered, powered, strict=True):
                 if now and not before:
                     late_ms = (self.now_ns - stop_ns) / MS
                     self.edges.append(
@@ -267,12 +271,9 @@ def healthy() -> dict[tuple[str, bool], Schedule]:
             if seen.status != "complete" or seen.violations:
                 raise RuntimeError(f"a healthy run: {seen}")
             ends = [at_ns for at_ns, _ in seen.marks[1:]]
-            spans = {
-                phase: (at_ns, end_ns)
-                for (at_ns, phase), end_ns in zip(seen.marks, ends, strict=False)
-                if end_ns > at_ns
-            }
             schedules[controller, rests] = {
-                phase: span for phase, span in spans.items() if phase != "stop"
+                phase: (at_ns, end_ns)
+                for (at_ns, phase), end_ns in zip(seen.marks, [*ends, seen.ended_ns], strict=True)
+                if end_ns > at_ns
             }
     return schedules
