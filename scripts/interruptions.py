@@ -47,7 +47,7 @@ def points(found: dict[str, Injector], count: int, seed: int) -> Iterator[Point]
     """Draw moments: every phase of a command, and every line, is as likely as another."""
     chance = random.Random(seed)
     for _ in range(count):
-        (command,) = chance.choices(list(WEIGHTS), list(WEIGHTS.values()))
+        (command,) = chance.choices(list(found), [WEIGHTS[name] for name in found])
         injector, kind = found[command], chance.choice(KINDS)
         # A user's own program has Python's handler for ^C, and none for the others.
         number = STOP_SIGNALS[-1] if command == "script" else chance.choice(STOP_SIGNALS)
@@ -96,13 +96,16 @@ def main() -> int:
     )
     parser.add_argument("--points", type=int, default=3000, help="how many")
     parser.add_argument("--seed", type=int, default=0, help="of the choice of moments")
+    parser.add_argument(
+        "--commands", nargs="+", choices=list(WEIGHTS), default=list(WEIGHTS), help="which; all"
+    )
     chosen = parser.parse_args()
     seen, bad, missed = Counter[tuple[str, str, bool]](), 0, 0
     began = time.monotonic()
     with tempfile.TemporaryDirectory() as name:
         theatre = Theatre(Path(name))
         found: dict[str, Injector] = {}
-        for command in WEIGHTS:
+        for command in chosen.commands:
             theatre.play(command)  # What is imported late is there afterwards.
             found[command] = theatre.play(command, lines=True).injector
         with stop_on_interrupt() as stop, contextlib.suppress(KeyboardInterrupt):
