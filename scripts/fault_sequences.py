@@ -23,7 +23,7 @@ from multiprocessing import get_context
 
 from sequence_draw import PHASES, Schedule, Sequence, describe, draw, name_of
 from sequence_judge import judge
-from sequence_trial import MS, healthy, play
+from sequence_trial import CONTROLLERS, MS, healthy, play
 
 ENDS = ("complete", "fault", "refused", "interrupted")
 
@@ -43,6 +43,8 @@ class Verdict:
     """How long after the beginning of its stop a drive had power [ms], if it had any by the end."""
     stop_ms: float
     """How long after the beginning of the stop a drive had power [ms]."""
+    alone_ms: int
+    """For how long one drive had power and the other had none [ms]."""
 
 
 def strike(sequence: Sequence) -> Verdict:
@@ -60,6 +62,7 @@ def strike(sequence: Sequence) -> Verdict:
         violations=tuple(judge(sequence, seen)),
         deaf_ms=stop_ms if any(seen.left) else None,
         stop_ms=stop_ms,
+        alone_ms=seen.alone_ms,
     )
 
 
@@ -83,7 +86,7 @@ def table(verdicts: list[Verdict]) -> str:
 
 def sequences(chosen: argparse.Namespace) -> Iterator[Sequence]:
     """Draw the sequences that the flags ask for."""
-    schedules: dict[tuple[str, bool], Schedule] = healthy()
+    schedules: dict[tuple[str, bool], Schedule] = healthy(chosen.controllers)
     numbers = range(chosen.sequences) if chosen.only is None else [chosen.only]
     for number in numbers:
         yield draw(number, chosen.seed, schedules)
@@ -107,6 +110,13 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0, help="of the faults")
     parser.add_argument("--jobs", type=int, default=1, help="processes")
     parser.add_argument("--only", type=int, help="this one of them alone, and what came of it")
+    parser.add_argument(
+        "--controllers",
+        nargs="+",
+        choices=list(CONTROLLERS),
+        default=list(CONTROLLERS),
+        help="of the runs; all",
+    )
     chosen = parser.parse_args()
     began = time.monotonic()
     verdicts: list[Verdict] = []
@@ -123,8 +133,9 @@ def main() -> int:
     print(table(verdicts))
     deaf = [verdict.deaf_ms for verdict in verdicts if verdict.deaf_ms is not None]
     print(
-        f"longest power after the beginning of a stop: "
-        f"{max((verdict.stop_ms for verdict in verdicts), default=0.0):.1f} ms; "
+        "longest power after the beginning of a stop: "
+        f"{max((verdict.stop_ms for verdict in verdicts), default=0.0):.1f} ms, in one drive alone "
+        f"{max((verdict.alone_ms for verdict in verdicts), default=0)} ms; "
         f"{len(deaf)} runs ended with power in a drive that its own watchdogs took"
     )
     print(f"{len(verdicts)} sequences, {bad} violations, {time.monotonic() - began:.0f} s")

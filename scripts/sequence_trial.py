@@ -3,7 +3,7 @@
 import json
 import signal
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from functools import cache
@@ -60,6 +60,7 @@ class Seen:
         ended_ns: when the command was over.
         left: whether each drive had power then.
         power_ns: when a drive had power last.
+        alone_ms: for how long one drive had power and the other had none.
         interrupted: whether ^C has come.
         status: "complete", "interrupted", "fault", or "refused" before there was a recording.
         cause: its cause; of a refusal the type of the error.
@@ -75,6 +76,7 @@ class Seen:
     ended_ns: int = 0
     left: tuple[bool, ...] = ()
     power_ns: int = 0
+    alone_ms: int = 0
     interrupted: bool = False
     status: str = ""
     cause: str | None = None
@@ -108,6 +110,7 @@ class Seen:
         powered = tuple(drive.axis.power.state in POWERED for drive in self.network.drives)
         if any(powered):
             self.power_ns = self.now_ns
+            self.alone_ms += not all(powered)
         self.lost_ns += [
             self.now_ns
             for before, now in zip(self.powered or powered, powered, strict=True)
@@ -258,14 +261,17 @@ def _watched(seen: Seen, interrupts: list[Interrupt]) -> Iterator[None]:
         yield
 
 
-def healthy() -> dict[tuple[str, bool], Schedule]:
+def healthy(controllers: Iterable[str]) -> dict[tuple[str, bool], Schedule]:
     """Make the runs without faults, and return when their phases begin and end.
+
+    Args:
+        controllers: their kinds; each runs once to rest, and once to a stop.
 
     Raises:
         RuntimeError: one of them does not end complete.
     """
     schedules: dict[tuple[str, bool], Schedule] = {}
-    for controller in CONTROLLERS:
+    for controller in controllers:
         for rests in (True, False):
             seen = play(Sequence(number=-1, controller=controller, rests=rests, strikes=()))
             if seen.status != "complete" or seen.violations:
