@@ -16,14 +16,17 @@ import argparse
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from multiprocessing import get_context
 
 from sequence_draw import PHASES, Schedule, Sequence, describe, draw, name_of
 from sequence_judge import judge
 from sequence_trial import CONTROLLERS, MS, healthy, play
+
+from legbench.interrupts import ignore_interrupts, stop_on_interrupt
 
 ENDS = ("complete", "fault", "refused", "interrupted")
 
@@ -92,13 +95,14 @@ def sequences(chosen: argparse.Namespace) -> Iterator[Sequence]:
         yield draw(number, chosen.seed, schedules)
 
 
-def played(chosen: argparse.Namespace) -> Iterator[Verdict]:
+def played(chosen: argparse.Namespace) -> Generator[Verdict, None, None]:
     """Play all sequences, in processes of their own where there are to be several."""
     if chosen.jobs == 1:
         yield from map(strike, sequences(chosen))
         return
-    with ProcessPoolExecutor(chosen.jobs, mp_context=get_context("spawn")) as pool:
-        yield from pool.map(strike, sequences(chosen), chunksize=10)
+    spawn = get_context("spawn")
+    with ProcessPoolExecutor(chosen.jobs, spawn, initializer=ignore_interrupts) as pool:
+        yield from pool.map(strike, sequences(chosen), chunksize=4)
 
 
 def main() -> int:
@@ -121,15 +125,22 @@ def main() -> int:
     began = time.monotonic()
     verdicts: list[Verdict] = []
     bad = 0
-    for verdict in played(chosen):
-        verdicts.append(verdict)
-        if verdict.violations:
-            bad += 1
-            print(f"{describe(verdict.sequence)} -> {'; '.join(verdict.violations)}", flush=True)
-        if chosen.only is not None:
-            print(f"{describe(verdict.sequence)} -> {verdict}")
-        if len(verdicts) % 50 == 0:
-            print(f"{len(verdicts)} of {chosen.sequences}, {bad} bad", file=sys.stderr, flush=True)
+    wanted = chosen.sequences if chosen.only is None else 1
+    with (
+        stop_on_interrupt(raises=True),
+        suppress(KeyboardInterrupt),
+        closing(played(chosen)) as found_so_far,
+    ):
+        for verdict in found_so_far:
+            verdicts.append(verdict)
+            if verdict.violations:
+                bad += 1
+                found = "; ".join(verdict.violations)
+                print(f"{describe(verdict.sequence)} -> {found}", flush=True)
+            if chosen.only is not None:
+                print(f"{describe(verdict.sequence)} -> {verdict}")
+            if len(verdicts) % 50 == 0:
+                print(f"{len(verdicts)} of {wanted}, {bad} bad", file=sys.stderr, flush=True)
     print(table(verdicts))
     deaf = [verdict.deaf_ms for verdict in verdicts if verdict.deaf_ms is not None]
     print(
@@ -139,7 +150,7 @@ def main() -> int:
         f"{len(deaf)} runs ended with power in a drive that its own watchdogs took"
     )
     print(f"{len(verdicts)} sequences, {bad} violations, {time.monotonic() - began:.0f} s")
-    return 1 if bad or not verdicts else 0
+    return 1 if bad or len(verdicts) < wanted else 0
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ from legbench.drives.emulated.faults import (
     NodeFault,
     NodeFaultKind,
 )
+from legbench.drives.master.stop_report import CAUSE
 from legbench.plant.start import PERIOD
 
 WITHIN_NS = 50 * MS
@@ -28,7 +29,7 @@ _LOSSES = {
     "drive not enabled",
     "drive left operational",
     "temperature",
-    "stop failed",
+    CAUSE,
 }
 _WIRE = _LOSSES | {"bus off", "command not sent", "command ignored", "following error"}
 _MOTOR = {"following error", "moved while enabling", "motor range", "spring torque"}
@@ -49,7 +50,7 @@ _CAUSES = {
     _K.LINK_FROZEN: _LINK,
     _K.LINK_STEP: _LINK,
     _K.LINK_DRIFT: _LINK,
-    _K.REPEATING: _MOTOR | _LINK | {"command ignored", "stop failed"},
+    _K.REPEATING: _MOTOR | _LINK | {"command ignored", CAUSE},
 }
 """Causes by which a run may name each fault of a drive."""
 _TALK = (None, 0x000, 0x080, 0x201, 0x202)
@@ -116,7 +117,8 @@ def _power(sequence: Sequence, seen: Seen) -> list[str]:
 def _naming(sequence: Sequence, seen: Seen) -> list[str]:
     """What is told of the end must be true: its first cause is something that has struck."""
     _, duration = CONTROLLERS[sequence.controller]
-    until_ns = seen.stop_ns() or seen.ended_ns
+    # A stop can fail of what strikes while it lasts; everything else has its cause before it.
+    until_ns = seen.ended_ns if seen.cause == CAUSE else seen.stop_ns() or seen.ended_ns
     struck = [strike for strike in sequence.strikes if strike.start_ns <= until_ns]
     names = ", ".join(map(name_of, struck)) or "nothing"
     if seen.status == "complete":

@@ -133,7 +133,11 @@ def _design() -> LegDesign:
 
 
 def play(sequence: Sequence) -> Seen:
-    """Make the run of a sequence, and look at what is left of it."""
+    """Make the run of a sequence, and look at what is left of it.
+
+    Raises:
+        KeyboardInterrupt: somebody else has interrupted.
+    """
     seen = Seen()
     controller, duration = CONTROLLERS[sequence.controller]
     interrupts = [one for one in sequence.strikes if isinstance(one, Interrupt)]
@@ -150,6 +154,8 @@ def play(sequence: Sequence) -> Seen:
     with tempfile.TemporaryDirectory() as name, _watched(seen, interrupts):
         out = Path(name)
         _record(experiment, out, seen)
+        if seen.status == "interrupted" and not seen.interrupted:
+            raise KeyboardInterrupt
         seen.ended_ns, seen.left = seen.now_ns, seen.powered
         if seen.network is not None:
             seen.network.advance(seen.now_ns + SILENCE_NS)

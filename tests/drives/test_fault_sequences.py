@@ -158,6 +158,15 @@ def test_a_fault_that_comes_after_the_stop_has_begun_is_no_cause() -> None:
     assert judge(sequence(late), ended("refused", "DriveError")) == ["refused for nothing"]
 
 
+def test_a_stop_may_fail_of_what_strikes_while_it_lasts() -> None:
+    late = NodeFault(kind=NodeFaultKind.SILENT, node_id=1, start_ns=501 * MS)
+    assert judge(sequence(late), ended("fault", "stop failed")) == []
+    later = NodeFault(kind=NodeFaultKind.SILENT, node_id=1, start_ns=601 * MS)
+    assert judge(sequence(later), ended("fault", "stop failed")) == [
+        "nothing was called 'stop failed': what it was"
+    ]
+
+
 def test_a_drive_that_does_not_hear_its_master_has_longer() -> None:
     away = NodeFault(kind=NodeFaultKind.SILENT, node_id=1, start_ns=495 * MS)
     seen = ended("fault", "process data lost", power_ns=649 * MS)
