@@ -47,7 +47,7 @@ class Verdict:
     stop_ms: float
     """How long after the beginning of the stop a drive had power [ms]."""
     alone_ms: int
-    """For how long one drive had power and the other had none [ms]."""
+    """For how long one drive had power and the other had none, since the first row [ms]."""
 
 
 def strike(sequence: Sequence) -> Verdict:
@@ -145,10 +145,15 @@ def main() -> int:
     deaf = [verdict.deaf_ms for verdict in verdicts if verdict.deaf_ms is not None]
     print(
         "longest power after the beginning of a stop: "
-        f"{max((verdict.stop_ms for verdict in verdicts), default=0.0):.1f} ms, in one drive alone "
-        f"{max((verdict.alone_ms for verdict in verdicts), default=0)} ms; "
+        f"{max((verdict.stop_ms for verdict in verdicts), default=0.0):.1f} ms; "
         f"{len(deaf)} runs ended with power in a drive that its own watchdogs took"
     )
+    alone = max(verdicts, key=lambda verdict: verdict.alone_ms, default=None)
+    if alone is not None:
+        print(
+            f"longest power in one drive alone after the first row: {alone.alone_ms} ms; "
+            f"{describe(alone.sequence)}"
+        )
     print(f"{len(verdicts)} sequences, {bad} violations, {time.monotonic() - began:.0f} s")
     return 1 if bad or len(verdicts) < wanted else 0
 

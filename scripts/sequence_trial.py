@@ -60,7 +60,7 @@ class Seen:
         ended_ns: when the command was over.
         left: whether each drive had power then.
         power_ns: when a drive had power last.
-        alone_ms: for how long one drive had power and the other had none.
+        alone_ms: for how long one drive had power and the other had none, since the first row.
         interrupted: whether ^C has come.
         status: "complete", "interrupted", "fault", or "refused" before there was a recording.
         cause: its cause; of a refusal the type of the error.
@@ -110,7 +110,8 @@ class Seen:
         powered = tuple(drive.axis.power.state in POWERED for drive in self.network.drives)
         if any(powered):
             self.power_ns = self.now_ns
-            self.alone_ms += not all(powered)
+            ran = any(phase == "run" for _, phase in self.marks)
+            self.alone_ms += ran and not all(powered)
         self.lost_ns += [
             self.now_ns
             for before, now in zip(self.powered or powered, powered, strict=True)
