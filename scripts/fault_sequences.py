@@ -82,7 +82,7 @@ def table(verdicts: list[Verdict]) -> str:
     for name in sorted({name for name, _ in counts}):
         lines.append(f"{name:<28}" + "".join(f"{counts[name, one]:>12}" for one in columns))
     lines.append(f"{'all':<28}" + "".join(f"{sums[one]:>12}" for one in columns))
-    ends = Counter(f"{one.status}: {one.cause or 'bridged'}" for one in verdicts)
+    ends = Counter(one.status + (f": {one.cause}" if one.cause else "") for one in verdicts)
     lines += ["", *(f"{count:>6}  {end}" for end, count in ends.most_common())]
     return "\n".join(lines)
 
