@@ -270,7 +270,7 @@ def try_fault(
         cause=outcome.cause,
         cycles=(reaction_ns - strike_ns) // MS + 1 if ended else None,
         drives=tuple(drive.axis.power.state for drive in network.drives),
-        excess=_excess(writer.path / BUS_LOG, config, limits),
+        excess=excess_of(writer.path / BUS_LOG, config, limits),
         intact=intact and found.manifest["cause"] == outcome.cause,
         lost_cycles=max(opened.events()["bus"]["lost_cycles"]),
         run=writer.path,
@@ -323,7 +323,7 @@ def _wait_for_drives(network: Network) -> int:
     return network.now_ns
 
 
-def _excess(log: Path, config: BusConfig, limits: SafetyLimits) -> float:
+def excess_of(log: Path, config: BusConfig, limits: SafetyLimits) -> float:
     """From the raw frames: how far a command to an enabled drive went beyond the limits [rad]."""
     worst = -1.0
     step_max = limits.command_speed * config.period
