@@ -17,7 +17,7 @@ from legbench.drives.setup.config import BusConfig
 from legbench.drives.transport.lock import ChannelLock
 from legbench.drives.transport.realtime import Granted
 from legbench.plant import can_open
-from legbench.plants import IDLE_POS
+from legbench.plant.can_open import IDLE_POS
 from legbench.recording.reader import load
 
 HARDWARE = Path(__file__).parents[2] / "hardware"

@@ -114,8 +114,12 @@ def stage(
     limits: SafetyLimits | None = None,
     behaviours: Sequence[Behaviour] | None = None,
     ideal: bool = False,
+    lands: bool = True,
 ) -> Iterator[Stage]:
-    """An emulated leg for an experiment, drives at its start posture."""
+    """An emulated leg for an experiment, drives at its start posture.
+
+    Without `lands` a run ends at its last row, which is quicker where its end is not the matter.
+    """
     bus = config or load_bus(BUS)
     controller, start = staged(chosen)
     motors = [float(value) for value in start.motor_pos]
@@ -124,7 +128,7 @@ def stage(
     network = emulate(bus, behaviours or usual, body=body, keep_log=True)
     session = Session(LockstepBus("leg", network=network), bus)
     link = session.link(limits or load_limits(LIMITS), chosen.design.stiffness)
-    plant = CanPlant(session, link, start)
+    plant = CanPlant(session, link, start, lands=lands)
     with plant:
         yield Stage(
             plant=plant,

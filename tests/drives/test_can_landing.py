@@ -15,7 +15,7 @@ from legbench.design.setup import Setup, SetupKind
 from legbench.drives.emulated.faults import NodeFault, NodeFaultKind
 from legbench.drives.protocol.cia402 import DriveState
 from legbench.drives.setup.bus_file import load_bus, load_limits
-from legbench.experiment import ControllerConfig, record
+from legbench.experiment import ControllerSettings, record
 from legbench.limits.safety import SafetyLimits
 from legbench.loop import Outcome, StopFlag, run
 from legbench.plant.landing import PATIENCE, STILL_RANGE, STILL_TIME, End, StillWatch, land, towards
@@ -139,7 +139,7 @@ def test_a_run_that_is_to_stop_stops_in_mid_flight(tmp_path: Path) -> None:
 @pytest.mark.parametrize("kind", [SetupKind.HFTS, SetupKind.VFTS, SetupKind.FFS])
 @pytest.mark.parametrize("config", [PositionJumpConfig(), BangBangConfig()])
 def test_a_leg_that_is_held_ends_in_its_rest_posture(
-    kind: SetupKind, config: ControllerConfig
+    kind: SetupKind, config: ControllerSettings
 ) -> None:
     chosen = replace(experiment(config), setup=Setup(kind=kind))
     with stage(chosen) as it:

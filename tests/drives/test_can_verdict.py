@@ -17,6 +17,10 @@ GONE_NS = 1700 * MS
 """On the bus's time, about half a second into the run."""
 
 
+OTHERS = ("following_error", "standing", "sway")
+"""Limits that would find a drive without answers, too, and sooner than 50 cycles."""
+
+
 def silent_run(folder: Path, limits: str) -> Experiment:
     """A jump whose second drive answers no more from the middle on."""
     (folder / "leg.toml").write_bytes(BUS.read_bytes())
@@ -51,6 +55,7 @@ def test_answers_that_are_gone_for_ever_are_a_fault(
     text = LIMITS.read_text(encoding="utf-8")
     assert "lost_frames = 3 " in text
     text = text.replace("lost_frames = 3 ", f"lost_frames = {lost_frames} ") + waive
+    text = re.sub(rf"^({'|'.join(OTHERS)}) = .*\n", "", text, flags=re.MULTILINE)
     finished = record(silent_run(tmp_path, text), tmp_path / "runs")
     outcome = finished.outcome
     assert (outcome.status, outcome.cause) == ("fault", "process data lost")

@@ -30,7 +30,14 @@ from legbench.errors import LegbenchError, PlantFault
 
 U32 = DataType.UNSIGNED32
 RAMP = Parameter(index=0x6085, sub=0, kind=U32, value=1 << 31)
-FULL = replace(LIMITS, joint_range=LIMITS.motor_range, command_step=0.5)
+FULL = replace(
+    LIMITS,
+    joint_range=LIMITS.motor_range,
+    command_step=0.5,
+    joint_speed=60.0,
+    standing=0.02,
+    sway=0.05,
+)
 CYCLES = 300
 FOREIGN = 5
 """A node that the bus file does not name."""

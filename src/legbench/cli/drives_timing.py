@@ -90,7 +90,7 @@ class Jitter:
                 note(f"wrote {writer.path}")
 
     def _draw(self, timing: "Timing", path: Path) -> None:
-        from legbench.viz.timing import draw_timing
+        from legbench.viz.print.timing import draw_timing
 
         draw_timing(timing.late_us, timing.exchange_us, path)
         note(f"wrote {path}")

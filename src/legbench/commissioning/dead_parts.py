@@ -22,8 +22,7 @@ from legbench.drives.setup.bus_file import load_bus
 from legbench.drives.setup.config import BusConfig
 from legbench.errors import PlantFault
 from legbench.experiment import (
-    USUAL_SETUP,
-    ControllerConfig,
+    ControllerSettings,
     Experiment,
     make_controller,
     start_of,
@@ -45,7 +44,7 @@ BOUND, DRIFT_BOUND = 0.05, 0.15
 """Longest times from the contradiction to the end of the run, and for a drift [s]."""
 PATIENCE = 1.5
 """A part that is not found so long after it died is missed [s]."""
-CONTROLLERS: dict[str, ControllerConfig] = {
+CONTROLLERS: dict[str, ControllerSettings] = {
     "jump": JumpConfig(),
     "bang-bang": BangBangConfig(),
     "position-jump": PositionJumpConfig(),
@@ -171,7 +170,7 @@ def _staged(
 ) -> Iterator[_Stage]:
     config = CONTROLLERS[controller]
     chosen = Experiment(
-        design=bench.design, controller=config, setup=Setup(kind=USUAL_SETUP[type(config)])
+        design=bench.design, controller=config, setup=Setup(kind=config.usual_setup)
     )
     stage = (_on_bus if emulation is Emulation.CAN else _alone)(
         bench, emulation, chosen, servo, death
