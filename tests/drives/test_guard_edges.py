@@ -1,0 +1,284 @@
+"""The guard at both sides of each of its edges, on either axis, from wherever a step begins."""
+
+import itertools
+import math
+from typing import Any
+
+import pytest
+
+from legbench.drives.guard import Guard
+from legbench.drives.limits import SafetyLimits
+from legbench.errors import PlantFault
+
+PERIOD = 0.25
+"""So long that steps, ranges and speeds are exact binary numbers [s]."""
+STEP = 0.125
+REST = (-0.5, 0.5)
+LIMITS = SafetyLimits(
+    motor_range=((-2.0, 1.0), (-1.0, 2.0)),
+    joint_range=((-1.0, 1.0), (-0.5, 1.5)),
+    motor_knee_range=(0.25, 3.0),
+    joint_knee_range=(0.125, 2.5),
+    command_speed=STEP / PERIOD,
+    command_step=0.5,
+    spring_torque=8.0,
+    temperature=80.0,
+)
+FREE = SafetyLimits(command_speed=STEP / PERIOD)
+"""Slewed, and nothing else."""
+
+
+def started(limits: SafetyLimits, place: tuple[float, float] = REST) -> Guard:
+    guard = Guard(limits, PERIOD)
+    guard.start_at(place)
+    return guard
+
+
+def pair(axis: int, value: float, other: float) -> tuple[float, float]:
+    """A value for one axis, and one for the other."""
+    return (value, other) if axis == 0 else (other, value)
+
+
+def fault(act: Any, *args: Any, **kwargs: Any) -> str | None:
+    """Cause and text of the fault that is raised, if one is."""
+    try:
+        act(*args, **kwargs)
+    except PlantFault as error:
+        return f"{error.cause}: {error}"
+    return None
+
+
+# --- commands --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_wish_is_let_through_by_no_more_than_one_step_wherever_it_begins(axis: int) -> None:
+    places = [-1.0, -0.625, -0.125, 0.0, 0.0625, 0.125, 0.75, 1.0]
+    for start, wish in itertools.product(places, places):
+        guard = started(FREE, pair(axis, start, 0.25))
+        step = math.copysign(min(abs(wish - start), STEP), wish - start)
+        assert guard.command(pair(axis, wish, 0.25)) == pair(axis, start + step, 0.25)
+        slewed = abs(wish - start) > STEP
+        told = guard.shortfall.told()
+        assert (told is not None) is slewed
+        if told is not None:
+            assert told["clamped"] == [0, 0]
+            assert told["slewed"] == [1 - axis, axis]
+            assert told["worst"][axis] == abs(wish - start) - STEP
+        # It gets there in the end, and stays.
+        for _ in range(16):
+            guard.command(pair(axis, wish, 0.25))
+        assert guard.applied == pair(axis, wish, 0.25)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_the_ends_of_a_range_are_within_it_and_clamp_what_is_beyond(axis: int) -> None:
+    ranges = ((-1.0, 1.0), (-0.5, 1.5))
+    limits = SafetyLimits(motor_range=ranges)
+    low, high = ranges[axis]
+    for wish, given in ((low, low), (high, high), (low - 0.1, low), (high + 0.1, high)):
+        guard = started(limits, (0.0, 0.0))
+        assert guard.command(pair(axis, wish, 0.0)) == pair(axis, given, 0.0)
+        assert guard.reachable(pair(axis, wish, 0.0)) == pair(axis, given, 0.0)
+        assert (guard.shortfall.told() is None) is (wish == given)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_motor_outside_its_range_goes_no_farther_and_comes_back_as_wished(
+    axis: int, side: float
+) -> None:
+    limits = SafetyLimits(motor_range=((-1.0, 1.0), (-1.0, 1.0)), command_speed=STEP / PERIOD)
+    guard = started(limits, pair(axis, 1.5 * side, 0.0))
+    assert guard.command(pair(axis, 1.75 * side, 0.0)) == pair(axis, 1.5 * side, 0.0)
+    assert guard.command(pair(axis, 1.4375 * side, 0.0)) == pair(axis, 1.4375 * side, 0.0)
+    # What has been won is not given up again.
+    assert guard.command(pair(axis, 1.5 * side, 0.0)) == pair(axis, 1.4375 * side, 0.0)
+
+
+def test_both_motors_give_way_to_the_knee_within_their_step() -> None:
+    limits = SafetyLimits(motor_knee_range=(0.25, 3.0), command_speed=STEP / PERIOD)
+    for wish, end in (((0.5, -0.5), (-0.125, 0.125)), ((-2.0, 2.0), (-1.5, 1.5))):
+        guard = started(limits)
+        path = [guard.command(wish) for _ in range(12)]
+        for (first, second), (before, after) in itertools.pairwise(path):
+            assert 0.25 <= second - first <= 3.0
+            assert max(abs(before - first), abs(after - second)) <= STEP
+        assert path[0] != end
+        assert path[-1] == end == guard.reachable(wish)
+    # Straight along the edge where one motor is nearly there and the other one is not.
+    guard = started(limits, (0.0, 0.25))
+    assert guard.command((1.0, 1.25)) == (STEP, 0.25 + STEP)
+    assert guard.command((0.25, 0.25)) == pytest.approx((0.125, 0.375))
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_wish_may_jump_by_its_limit_and_no_further(axis: int, side: float) -> None:
+    limits = SafetyLimits(command_step=0.5)
+    guard = started(limits, (0.0, 0.0))
+    # Twice, as the second jump is measured from the first wish.
+    guard.command(pair(axis, 0.5 * side, 0.0))
+    guard.command(pair(axis, 1.0 * side, 0.0))
+    applied = guard.applied
+    told = fault(guard.command, pair(axis, 1.5625 * side, 0.0))
+    assert told is not None
+    assert told.startswith(f"command step: the command of motor {axis + 1} jumps by 0.562 rad")
+    assert guard.applied == applied
+    for nothing in (math.nan, math.inf, -math.inf):
+        told = fault(guard.command, pair(axis, nothing, 0.0))
+        assert told is not None
+        assert told.startswith(f"command not finite: the command of motor {axis + 1} is {nothing}")
+
+
+def test_a_jump_is_measured_from_the_last_wish_until_that_is_forgotten() -> None:
+    limits = SafetyLimits(command_speed=STEP / PERIOD, command_step=0.5)
+    for forgets in (False, True):
+        guard = started(limits, (0.0, 0.0))
+        assert guard.command((0.5, 0.0)) == (STEP, 0.0)
+        if forgets:
+            guard.forget_wish()
+        # From the wish it is 0.25, from what was applied 0.625.
+        assert (fault(guard.command, (0.75, 0.0)) is None) is not forgets
+        guard.start_at((-1.0, 0.0))
+        assert guard.applied == (-1.0, 0.0)
+        assert fault(guard.command, (-0.75, 0.0)) is None
+        assert fault(guard.command, (0.75, 0.0)) is not None
+
+
+# --- what a cycle shows ----------------------------------------------------------------------
+
+
+def seen(guard: Guard, **changes: Any) -> str | None:
+    usual = {"motor_pos": REST, "joint_pos": REST, "spring_torque": (0.0, 0.0)}
+    return fault(guard.check, **{**usual, **changes})
+
+
+def beyond(value: float) -> float:
+    """The next number away from zero."""
+    return math.nextafter(value, math.copysign(math.inf, value))
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_each_limit_is_allowed_itself_and_what_is_next_to_it_is_not(axis: int) -> None:
+    guard = started(LIMITS)
+    number = axis + 1
+    for torque in (-8.0, 8.0):
+        assert seen(guard, spring_torque=pair(axis, torque, 0.0)) is None
+        told = seen(guard, spring_torque=pair(axis, beyond(torque), 0.0))
+        assert told is not None
+        assert told.startswith(f"spring torque: spring {number} carries")
+    assert seen(guard, temperature=pair(axis, 80.0, 20.0)) is None
+    assert seen(guard, temperature=(None, None)) is None
+    told = seen(guard, temperature=[None, beyond(80.0)] if axis else [beyond(80.0), None])
+    assert told is not None
+    assert told.startswith(f"temperature: drive {number} is at 80.0 deg C")
+    other = -0.5 if axis else 1.0
+    for end in LIMITS.joint_range[axis]:
+        if not 0.125 <= (end - other if axis else other - end) <= 2.5:
+            continue
+        assert seen(guard, joint_pos=pair(axis, end, other)) is None
+        told = seen(guard, joint_pos=pair(axis, beyond(end), other))
+        assert told is not None
+        assert told.startswith(f"joint range: joint {number} is at")
+
+
+@pytest.mark.parametrize(
+    ("links", "further"),
+    [((-0.5, -0.375), (-0.5, -0.376)), ((-1.0, 1.5), (-1.0, 1.501))],
+)
+def test_the_ends_of_the_knee_range_of_the_links(
+    links: tuple[float, float], further: tuple[float, float]
+) -> None:
+    limits = SafetyLimits(joint_knee_range=(0.125, 2.5))
+    guard = started(limits)
+    assert seen(guard, joint_pos=links) is None
+    told = seen(guard, joint_pos=further)
+    assert told is not None
+    assert told.startswith("joint range: q2 - q1 is at")
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_motors_may_stand_2_mrad_outside_their_range_before_they_are_enabled(axis: int) -> None:
+    limits = SafetyLimits(motor_range=((-2.0, 1.0), (-1.0, 2.0)))
+    guard = started(limits)
+    for side, end in zip((-1.0, 1.0), limits.motor_range[axis], strict=True):
+        for inside in (end - 0.5 * side, end, end + 0.0019 * side):
+            assert fault(guard.check_start, pair(axis, inside, 0.0)) is None
+        told = fault(guard.check_start, pair(axis, end + 0.0021 * side, 0.0))
+        assert told is not None
+        assert told.startswith(f"motor range: motor {axis + 1} stands at")
+
+
+def test_the_knee_may_stand_2_mrad_outside_its_range_before_motors_are_enabled() -> None:
+    guard = started(SafetyLimits(motor_knee_range=(0.25, 3.0)))
+    for side, end in ((-1.0, 0.25), (1.0, 3.0)):
+        for inside in (end - 0.1 * side, end, end + 0.0019 * side):
+            assert fault(guard.check_start, (-0.5, inside - 0.5)) is None
+        told = fault(guard.check_start, (-0.5, end + 0.0021 * side - 0.5))
+        assert told is not None
+        assert told.startswith("motor range: the motors stand with q2 - q1 at")
+
+
+# --- encoders --------------------------------------------------------------------------------
+
+WATCHED = SafetyLimits(following_error=0.25, following_cycles=2, joint_speed=1.0)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_motor_away_from_its_command_is_found_after_its_cycles_and_no_other(axis: int) -> None:
+    guard = started(WATCHED)
+    away = pair(axis, REST[axis] + 0.5, REST[1 - axis])
+    # As long as nothing is commanded a motor may be moved by hand.
+    for _ in range(5):
+        assert seen(guard, motor_pos=away) is None
+    for _ in range(2):
+        assert seen(guard, motor_pos=away, expected_pos=REST) is None
+    told = seen(guard, motor_pos=away, expected_pos=REST)
+    assert told is not None
+    assert told.startswith(f"following error: motor {axis + 1} shows")
+    # Wherever the motors are led from: none is suspected of what was before.
+    guard.start_at(away)
+    for _ in range(5):
+        assert seen(guard, motor_pos=away, expected_pos=away) is None
+
+
+def test_of_two_motors_that_are_away_one_is_named_though_both_are() -> None:
+    guard = started(WATCHED)
+    away = (REST[0] + 0.5, REST[1] + 0.5)
+    told = [seen(guard, motor_pos=away, expected_pos=REST) for _ in range(3)]
+    assert told[:2] == [None, None]
+    assert str(told[2]).startswith("following error: motor ")
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("elapsed", [None, 1, 2, 3])
+def test_a_link_may_turn_by_its_speed_in_the_time_that_has_passed(
+    axis: int, elapsed: int | None
+) -> None:
+    # 1 rad/s for periods of 0.25 s; one period where nothing is said.
+    most = 0.25 * (elapsed or 1)
+    more = {} if elapsed is None else {"elapsed": elapsed}
+    for turn, allowed in ((most, True), (-most, True), (most + 0.01, False)):
+        guard = started(WATCHED)
+        assert seen(guard, expected_pos=REST, **more) is None
+        links = pair(axis, REST[axis] + turn, REST[1 - axis])
+        told = seen(guard, joint_pos=links, expected_pos=REST, **more)
+        assert (told is None) is allowed
+        if told is not None:
+            assert told.startswith(f"joint speed: joint {axis + 1} moved by")
+        # It is news that count, and where the links are led from is no step.
+        guard = started(WATCHED)
+        assert seen(guard, expected_pos=REST, **more) is None
+        old = (bool(axis), not axis)
+        assert seen(guard, joint_pos=links, expected_pos=REST, fresh=old, **more) is None
+        guard.start_at(REST)
+        assert seen(guard, joint_pos=links, expected_pos=REST, **more) is None
+
+
+def test_a_motor_that_is_suspected_is_named_before_the_link_that_it_makes_doubtful() -> None:
+    guard = started(WATCHED)
+    assert seen(guard, expected_pos=REST) is None
+    told = seen(guard, motor_pos=(0.0, 0.5), joint_pos=(0.0, 0.5), expected_pos=REST)
+    assert told is not None
+    assert told.startswith("following error: motor 1 shows")
