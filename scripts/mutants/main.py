@@ -108,11 +108,13 @@ def main() -> int:
     parser.add_argument("files", nargs="*", default=[f"src/legbench/{room}" for room in ROOMS])
     parser.add_argument("--per-file", type=int, default=40, metavar="N", help="faults a file")
     parser.add_argument("--seed", type=int, default=1, help="of the sample")
+    parser.add_argument("--tests", nargs="+", type=Path, help="files of tests; all of the room")
     parser.add_argument("--jobs", type=int, default=1, help="processes at a time")
     chosen = parser.parse_args()
     prepare()
     files = _files(chosen.files)
-    suites = {path: _tests_of(path) for path in files}
+    named = [(ROOT / file).resolve() for file in chosen.tests or ()]
+    suites = {path: named or _tests_of(path) for path in files}
     needed = sorted({file for suite in suites.values() for file in suite})
     short = False
     with ProcessPoolExecutor(chosen.jobs, get_context("fork")) as pool:

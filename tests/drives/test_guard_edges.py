@@ -55,9 +55,9 @@ def fault(act: Any, *args: Any, **kwargs: Any) -> str | None:
 def test_a_wish_is_let_through_by_no_more_than_one_step_wherever_it_begins(axis: int) -> None:
     places = [-1.0, -0.625, -0.125, 0.0, 0.0625, 0.125, 0.75, 1.0]
     for start, wish in itertools.product(places, places):
-        guard = started(FREE, pair(axis, start, 0.25))
+        guard = started(FREE, pair(axis, start, 0.0))
         step = math.copysign(min(abs(wish - start), STEP), wish - start)
-        assert guard.command(pair(axis, wish, 0.25)) == pair(axis, start + step, 0.25)
+        assert guard.command(pair(axis, wish, 0.0)) == pair(axis, start + step, 0.0)
         slewed = abs(wish - start) > STEP
         told = guard.shortfall.told()
         assert (told is not None) is slewed
@@ -67,8 +67,8 @@ def test_a_wish_is_let_through_by_no_more_than_one_step_wherever_it_begins(axis:
             assert told["worst"][axis] == abs(wish - start) - STEP
         # It gets there in the end, and stays.
         for _ in range(16):
-            guard.command(pair(axis, wish, 0.25))
-        assert guard.applied == pair(axis, wish, 0.25)
+            guard.command(pair(axis, wish, 0.0))
+        assert guard.applied == pair(axis, wish, 0.0)
 
 
 @pytest.mark.parametrize("axis", [0, 1])
@@ -81,6 +81,9 @@ def test_the_ends_of_a_range_are_within_it_and_clamp_what_is_beyond(axis: int) -
         assert guard.command(pair(axis, wish, 0.0)) == pair(axis, given, 0.0)
         assert guard.reachable(pair(axis, wish, 0.0)) == pair(axis, given, 0.0)
         assert (guard.shortfall.told() is None) is (wish == given)
+    # Both at a time, too.
+    for both, given in (((-1.1, -0.6), (-1.0, -0.5)), ((1.1, 1.6), (1.0, 1.5))):
+        assert started(limits, (0.0, 0.0)).command(both) == given
 
 
 @pytest.mark.parametrize("axis", [0, 1])
@@ -106,7 +109,14 @@ def test_both_motors_give_way_to_the_knee_within_their_step() -> None:
             assert max(abs(before - first), abs(after - second)) <= STEP
         assert path[0] != end
         assert path[-1] == end == guard.reachable(wish)
-    # Straight along the edge where one motor is nearly there and the other one is not.
+    # Each motor by its own step, even where one is nearly there and the other one is not.
+    guard = started(limits, (0.0, 1.0))
+    assert guard.command((0.5, 1.0625)) == (STEP, 1.0625)
+    # The ends of the knee's range are let through as they are.
+    for wish in ((0.0, 0.25), (-1.5, 1.5)):
+        assert started(limits, wish).command(wish) == wish
+    for edge, beyond_it in (((-0.125, 0.125), (-0.0625, 0.0625)), ((-1.5, 1.5), (-1.5625, 1.5625))):
+        assert started(limits, edge).command(beyond_it) == edge
     guard = started(limits, (0.0, 0.25))
     assert guard.command((1.0, 1.25)) == (STEP, 0.25 + STEP)
     assert guard.command((0.25, 0.25)) == pytest.approx((0.125, 0.375))
@@ -144,6 +154,23 @@ def test_a_jump_is_measured_from_the_last_wish_until_that_is_forgotten() -> None
         assert guard.applied == (-1.0, 0.0)
         assert fault(guard.command, (-0.75, 0.0)) is None
         assert fault(guard.command, (0.75, 0.0)) is not None
+
+
+def test_a_command_for_another_number_of_motors_is_refused() -> None:
+    for wish in ((0.0,), (0.0, 0.25, 0.5)):
+        guard = started(LIMITS)
+        with pytest.raises(ValueError, match="zip"):
+            guard.command(wish)
+        with pytest.raises(ValueError, match="zip"):
+            guard.reachable(wish)
+        with pytest.raises(ValueError, match="zip"):
+            guard.check_start(wish)
+        assert guard.applied == REST
+    alone = Guard(FREE, PERIOD)
+    alone.start_at((0.0,))
+    for wish in (0.0, 1.0):
+        with pytest.raises(ValueError, match="zip"):
+            alone.command((wish,))
 
 
 # --- what a cycle shows ----------------------------------------------------------------------
@@ -203,7 +230,7 @@ def test_motors_may_stand_2_mrad_outside_their_range_before_they_are_enabled(axi
     limits = SafetyLimits(motor_range=((-2.0, 1.0), (-1.0, 2.0)))
     guard = started(limits)
     for side, end in zip((-1.0, 1.0), limits.motor_range[axis], strict=True):
-        for inside in (end - 0.5 * side, end, end + 0.0019 * side):
+        for inside in (end - 0.5 * side, end, end + 0.002 * side):
             assert fault(guard.check_start, pair(axis, inside, 0.0)) is None
         told = fault(guard.check_start, pair(axis, end + 0.0021 * side, 0.0))
         assert told is not None
@@ -213,9 +240,9 @@ def test_motors_may_stand_2_mrad_outside_their_range_before_they_are_enabled(axi
 def test_the_knee_may_stand_2_mrad_outside_its_range_before_motors_are_enabled() -> None:
     guard = started(SafetyLimits(motor_knee_range=(0.25, 3.0)))
     for side, end in ((-1.0, 0.25), (1.0, 3.0)):
-        for inside in (end - 0.1 * side, end, end + 0.0019 * side):
-            assert fault(guard.check_start, (-0.5, inside - 0.5)) is None
-        told = fault(guard.check_start, (-0.5, end + 0.0021 * side - 0.5))
+        for inside in (end - 0.1 * side, end, end + 0.002 * side):
+            assert fault(guard.check_start, (0.0, inside)) is None
+        told = fault(guard.check_start, (0.0, end + 0.0021 * side))
         assert told is not None
         assert told.startswith("motor range: the motors stand with q2 - q1 at")
 
@@ -241,6 +268,22 @@ def test_a_motor_away_from_its_command_is_found_after_its_cycles_and_no_other(ax
     guard.start_at(away)
     for _ in range(5):
         assert seen(guard, motor_pos=away, expected_pos=away) is None
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_new_start_forgets_where_the_motors_and_the_links_were(axis: int) -> None:
+    guard = Guard(WATCHED, 1e-3)
+    guard.start_at(REST)
+    away = pair(axis, REST[axis] + 0.5, REST[1 - axis])
+    for _ in range(2):
+        assert seen(guard, motor_pos=away, expected_pos=REST) is None
+    # The motor that was suspected has its two cycles again, and stands where it is led to.
+    guard.start_at(away)
+    assert [seen(guard, expected_pos=away, joint_pos=away) for _ in range(2)] == [None, None]
+    # Had it been on its way from its former place it would be there eight cycles later.
+    told = seen(guard, expected_pos=away, joint_pos=away)
+    assert told is not None
+    assert told.startswith(f"following error: motor {axis + 1} shows")
 
 
 def test_of_two_motors_that_are_away_one_is_named_though_both_are() -> None:
