@@ -165,7 +165,7 @@ def test_a_command_for_another_number_of_motors_is_refused() -> None:
             guard.reachable(wish)
         with pytest.raises(ValueError, match="zip"):
             guard.check_start(wish)
-        assert guard.applied == REST
+        assert (guard.applied, guard.shortfall.cycles) == (REST, 0)
     alone = Guard(FREE, PERIOD)
     alone.start_at((0.0,))
     for wish in (0.0, 1.0):
