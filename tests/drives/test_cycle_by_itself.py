@@ -9,6 +9,8 @@ import can
 import pytest
 from drives_rig import MS, config, node
 
+from legbench.drives.codec.datatypes import DataType
+from legbench.drives.codec.pdo import Mapped
 from legbench.drives.config import BusConfig
 from legbench.drives.errors import BusError
 from legbench.drives.master.cycle import Cycle, Tick
@@ -190,6 +192,23 @@ def test_what_comes_before_the_next_tick_is_late_and_owed_no_more(place: int) ->
     assert it.notices.events["node answered twice"]["cob_id"] == 0x181 + place
 
 
+@pytest.mark.parametrize("place", [0, 1])
+def test_what_comes_in_a_silent_tick_never_passes_for_new(place: int) -> None:
+    wire = Wire()
+    wire.answers = stale(place, {1})
+    it = cycle(wire)
+    it.tick()
+    it.tick()
+    old = DATA[:2] + (-7).to_bytes(4, "little", signed=True) + DATA[6:]
+    # An answer that takes 1.5 ms, behind the tick that would have had its SYNC.
+    wire.plan(3 * MS + 500 * US, 0x181 + place, old)
+    assert it.tick() == Tick(4 * MS, 0, 1, 1, True)
+    assert wire.time_ns == 4 * MS + BOTH[1][0]
+    assert [axis.motor_counts for axis in it.axes] == [1000, 1000]
+    assert (it.late_frames, it.silent_total) == (1, 1)
+    assert "node answered twice" not in it.notices.events
+
+
 def test_while_a_stop_waits_no_tick_is_silent() -> None:
     wire = Wire()
     wire.answers = lambda number: ()
@@ -262,6 +281,23 @@ def test_a_bus_that_cannot_be_read_owes_all_answers() -> None:
     assert str(it.bus_error) == "deaf"
 
 
+def test_a_bus_that_fails_between_two_answers_is_told() -> None:
+    wire = Wire()
+    it = cycle(wire)
+    wire.off_bus = True
+    real = wire.receive
+
+    def fails(until_ns: int) -> can.Message | None:
+        if until_ns > wire.time_ns and it.axes[0].fresh:
+            raise BusError("deaf")
+        return real(until_ns)
+
+    wire.receive = fails
+    assert not it.tick().complete
+    assert [axis.fresh for axis in it.axes] == [True, False]
+    assert (str(it.bus_error), it.bus_off) == ("deaf", True)
+
+
 def test_frames_that_never_end_hold_up_no_tick_for_longer_than_a_period() -> None:
     wire = Wire()
     it = cycle(wire)
@@ -305,6 +341,25 @@ def test_without_a_word_no_command_goes_out() -> None:
         assert [(cob, data) for _, cob, data in wire.sent] == [
             (0x201 + place, b"\x0f\x00" + targets[place])
         ]
+
+
+def test_words_for_another_number_of_drives_are_refused() -> None:
+    for words in ([0x0F], [0x0F, 0x0F, 0x0F]):
+        with pytest.raises(ValueError, match="zip"):
+            cycle(Wire()).send(words)
+
+
+def test_drives_are_asked_for_their_temperature_in_cycles_200_and_199() -> None:
+    warmth = Mapped(0x2070, 0, DataType.INTEGER16)
+    nodes = tuple(replace(node(place), temperature_object=warmth) for place in (0, 1))
+    wire = Wire()
+    it = cycle(wire, config(nodes=nodes))
+    for _ in range(401):
+        it.tick()
+        it.send_rest()
+    # The first tick is cycle 1, at 1 ms.
+    assert [at // MS for at in wire.when(0x601)] == [200, 400]
+    assert [at // MS for at in wire.when(0x602)] == [199, 399]
 
 
 @pytest.mark.parametrize("beat_ms", [10, 15])
@@ -372,6 +427,18 @@ def test_each_frame_is_heard_for_the_drive_that_sent_it(place: int) -> None:
     event = it.notices.events["foreign SDO write"]
     assert (event["count"], event["node"], event["object"]) == (1, place + 1, "6040h:00")
     assert event["first"] == pytest.approx(0.005)
+
+
+def test_what_comes_before_the_sync_of_another_master_is_heard_as_ever() -> None:
+    wire = Wire()
+    it = cycle(wire)
+    wire.plan(100 * US, 0x701, b"\x04")
+    wire.plan(200 * US, 0x181, bytes(8), error=True)
+    wire.plan(300 * US, 0x080, bytes(8), error=True)
+    wire.plan(400 * US, 0x181, DATA)
+    assert not it.hears_sync(MS)
+    assert [watch.state is not None for watch in it.watches] == [True, False]
+    assert (it.error_frames, it.late_frames) == (2, 1)
 
 
 # --- behind another master -------------------------------------------------------------------
