@@ -34,7 +34,7 @@ class Wire:
         self.refused = 0
         self.timebase = self.bus = self
         self.channel_info = "wire"
-        self._answers: list[can.Message] = []
+        self.answers: list[can.Message] = []
 
     def now_ns(self) -> int:
         return self.time_ns
@@ -52,7 +52,7 @@ class Wire:
             shown = self.scripts[cob_id - 0x601](self.time_ns)
             if shown is not None:
                 answer = b"\x4b\x41\x60\x00" + shown.to_bytes(2, "little") + b"\0\0"
-                self._answers.append(
+                self.answers.append(
                     can.Message(arbitration_id=cob_id - 0x80, data=answer, is_extended_id=False)
                 )
 
@@ -60,11 +60,11 @@ class Wire:
         self.send(frame.cob_id, frame.data)
 
     def receive(self, until_ns: int) -> can.Message | None:
-        if not self._answers:
+        if not self.answers:
             self.time_ns = until_ns
             return None
         self.time_ns += MS // 5
-        return self._answers.pop(0)
+        return self.answers.pop(0)
 
     def stop(self, **more: Any) -> tuple[StopReport, list[str]]:
         """Stop, and what was held on the way."""
@@ -185,6 +185,44 @@ def test_a_bus_that_takes_a_frame_now_and_then_is_not_given_up() -> None:
         assert not report.silent
         assert len(wire.told(1 - deaf, QUICK)) == 7
         assert not wire.told(deaf, QUICK)
+
+
+def test_two_rounds_that_the_bus_refuses_are_no_reason_to_give_up() -> None:
+    wire = Wire(until(30 * MS, BRAKING, OFF), until(30 * MS, BRAKING, OFF))
+
+    def fails(cob_id: int, data: bytes) -> BaseException | None:
+        return BusError("full") if data[0] == 0x2B and 4 * MS < wire.time_ns < 12 * MS else None
+
+    wire.fails = fails
+    report, held = wire.stop()
+    assert report == StopReport(errors=("BusError: full",))
+    # Two rounds, two drives, each tried twice.
+    assert held == ["BusError"] * 8
+
+
+def test_a_clock_that_stands_still_ends_the_looks_after_as_many_as_fit() -> None:
+    wire = Wire(always(ENABLED), always(ENABLED))
+
+    def stands(at_ns: int) -> None:
+        raise KeyboardInterrupt
+
+    wire.wait_until = stands
+    wire.receive = lambda until_ns: wire.answers.pop(0)
+    report, held = wire.stop()
+    assert wire.time_ns == 0
+    # 250 ms at one look every 5 ms.
+    assert len(wire.told(0, ASK)) == len(wire.told(1, ASK)) == 50
+    assert held == ["KeyboardInterrupt"] * 50
+    assert report.powered == NAMES
+
+
+@pytest.mark.parametrize("place", [0, 1])
+def test_a_drive_that_shows_nothing_but_zeros_is_not_ready_and_has_no_power(place: int) -> None:
+    wire = Wire(*pair(place, always(0x0000), always(OFF)))
+    assert wire.stop()[0] == StopReport()
+    assert len(wire.told(place, ASK)) == 1
+    wire = Wire(*pair(place, until(60 * MS, BRAKING, 0x0000), always(OFF)))
+    assert wire.stop()[0] == StopReport(cut_off=(NAMES[place],))
 
 
 def test_what_is_raised_once_keeps_no_word_from_a_drive() -> None:
