@@ -9,14 +9,8 @@ from legbench.drives.units import AxisUnits, Unwrapper, unwrap, wrap
 from legbench.errors import ConfigError
 
 
-def taken(**changes: Any) -> bool:
-    try:
-        AxisUnits(**{"counts_per_rev": 4096, **changes})
-    except ConfigError as error:
-        (name,) = changes
-        assert str(error).startswith(f"{name} is ")
-        return False
-    return True
+def axis(**changes: Any) -> AxisUnits:
+    return AxisUnits(**{"counts_per_rev": 4096, **changes})
 
 
 @pytest.mark.parametrize(
@@ -32,8 +26,11 @@ def taken(**changes: Any) -> bool:
 def test_an_axis_takes_its_numbers_up_to_their_ends(
     name: str, takes: tuple[Any, ...], refuses: tuple[Any, ...]
 ) -> None:
-    assert [taken(**{name: value}) for value in takes] == [True] * len(takes)
-    assert [taken(**{name: value}) for value in refuses] == [False] * len(refuses)
+    for value in takes:
+        assert getattr(axis(**{name: value}), name) == value
+    for value in refuses:
+        with pytest.raises(ConfigError, match=f"^{name} is "):
+            axis(**{name: value})
 
 
 def test_a_plain_axis_turns_with_its_encoder() -> None:
