@@ -33,7 +33,7 @@ class Drives:
         self.stuck: dict[int, int] = {}
         """Place -> statusword that a drive shows whatever it is told."""
         self.incomplete: set[int] = set()
-        self.counts = list(COUNTS)
+        self.counts: list[int] = list(COUNTS)
         self.words: list[int | None] = [0x00, 0x00]
         self._show()
 

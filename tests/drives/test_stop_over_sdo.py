@@ -19,6 +19,8 @@ DISABLE = bytes.fromhex("2B40600000000000")
 ASK = bytes.fromhex("4041600000000000")
 BEAT = Frame(0x77E, b"\x05")
 NAMES = ("hip", "knee")
+SINCE = 7_000_000 * MS
+"""What the clock shows when a test begins [ns]."""
 Script = Callable[[int], int | None]
 """Time since the start [ns] -> statusword; None for no answer."""
 
@@ -37,10 +39,10 @@ class Wire:
         self.answers: list[can.Message] = []
 
     def now_ns(self) -> int:
-        return self.time_ns
+        return SINCE + self.time_ns
 
     def wait_until(self, at_ns: int) -> None:
-        self.time_ns = max(self.time_ns, at_ns)
+        self.time_ns = max(self.time_ns, at_ns - SINCE)
 
     def send(self, cob_id: int, data: bytes) -> None:
         error = self.fails(cob_id, data)
@@ -61,7 +63,7 @@ class Wire:
 
     def receive(self, until_ns: int) -> can.Message | None:
         if not self.answers:
-            self.time_ns = until_ns
+            self.wait_until(until_ns)
             return None
         self.time_ns += MS // 5
         return self.answers.pop(0)
@@ -223,6 +225,15 @@ def test_a_drive_that_shows_nothing_but_zeros_is_not_ready_and_has_no_power(plac
     assert len(wire.told(place, ASK)) == 1
     wire = Wire(*pair(place, until(60 * MS, BRAKING, 0x0000), always(OFF)))
     assert wire.stop()[0] == StopReport(cut_off=(NAMES[place],))
+
+
+def test_at_35_ms_the_ramp_is_over() -> None:
+    wire = Wire(always(BRAKING), always(BRAKING))
+    # Two answers and the rest are 35 ms, to the nanosecond.
+    wire.stop(rest_ns=35 * MS - 2 * (MS // 5))
+    for place in (0, 1):
+        assert wire.told(place, QUICK) == [0]
+        assert wire.told(place, DISABLE)[0] == 35 * MS
 
 
 def test_what_is_raised_once_keeps_no_word_from_a_drive() -> None:
