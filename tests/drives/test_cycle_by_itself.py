@@ -11,7 +11,7 @@ from drives_rig import MS, config, node
 
 from legbench.drives.codec.datatypes import DataType
 from legbench.drives.codec.pdo import Mapped
-from legbench.drives.config import BusConfig
+from legbench.drives.config import CONTROLWORD, TARGET_POSITION, BusConfig, PdoConfig
 from legbench.drives.errors import BusError
 from legbench.drives.master.cycle import Cycle, Tick
 from legbench.drives.master.port import Port
@@ -315,6 +315,39 @@ def test_frames_that_never_end_hold_up_no_tick_for_longer_than_a_period() -> Non
     wire.take = real
 
 
+def test_frames_of_others_hold_up_no_cycle_beyond_its_deadline() -> None:
+    wire = Wire()
+    it = cycle(wire)
+
+    def babble(until_ns: int) -> can.Message | None:
+        wire.wait_until(until_ns)
+        return message(0x555)
+
+    wire.take = lambda: None
+    wire.receive = babble
+    assert not it.tick().complete
+    assert wire.time_ns == MS + 700 * US
+
+
+def test_a_command_in_two_frames_goes_out_whole() -> None:
+    rpdos = (
+        PdoConfig(number=1, objects=(CONTROLWORD,)),
+        PdoConfig(number=2, objects=(TARGET_POSITION,)),
+    )
+    nodes = tuple(replace(node(place), rpdos=rpdos) for place in (0, 1))
+    wire = Wire()
+    it = cycle(wire, config(nodes=nodes))
+    for axis in it.axes:
+        axis.target_counts = 1000
+    assert it.send([0x0F, 0x07])
+    assert [(cob_id, data) for _, cob_id, data in wire.sent] == [
+        (0x201, b"\x0f\x00"),
+        (0x301, b"\xe8\x03\x00\x00"),
+        (0x202, b"\x07\x00"),
+        (0x302, b"\xe8\x03\x00\x00"),
+    ]
+
+
 @pytest.mark.parametrize("refused", [0x201, 0x202])
 def test_a_command_that_is_refused_keeps_no_other_drive_from_its_own(refused: int) -> None:
     wire = Wire()
@@ -473,6 +506,9 @@ def test_the_sync_of_another_master_is_followed_and_nothing_is_sent() -> None:
     assert (gone.complete, gone.skipped) == (False, 0)
     assert wire.time_ns == now + 2 * MS
     assert missed(it) == [1, 1]
+    # It counts for one period; of the SYNC at 12 ms nobody has heard.
+    wire.plan(13 * MS, 0x080)
+    assert it.follow().skipped == 1
 
 
 def test_a_bus_that_fails_while_another_master_is_followed_is_told() -> None:

@@ -1,5 +1,6 @@
 """The start-up by itself, with two drives that obey the words they are told as a test says."""
 
+import math
 from collections.abc import Sequence
 from typing import Any, cast
 
@@ -189,6 +190,35 @@ def test_a_motor_that_moves_by_more_than_20_mrad_while_it_is_enabled_ends_it(
 
 
 @pytest.mark.parametrize("place", [0, 1])
+def test_20_mrad_are_allowed_themselves(place: int) -> None:
+    for angle, fails in ((0.02, False), (math.nextafter(0.02, 1.0), True)):
+        it = Drives()
+        axis, real = it.axes[place], it.tick
+        axis.motor_pos = 0.0
+
+        def tick(_axis: AxisLink = axis, _real: Any = real, _angle: float = angle) -> Tick:
+            told = _real()
+            _axis.motor_pos = _angle
+            return told
+
+        it.tick = tick
+        if not fails:
+            enable(it)
+            continue
+        with pytest.raises(PlantFault, match=r"moved by 0\.020 rad while it was enabled"):
+            enable(it)
+
+
+@pytest.mark.parametrize("place", [0, 1])
+def test_a_drive_that_is_enabled_from_the_first_cycle_on_has_its_5_cycles_too(place: int) -> None:
+    it = Drives()
+    it.stuck = {place: 0x0237}
+    with pytest.raises(PlantFault, match="does not follow its target on enabling"):
+        enable(it)
+    assert it.ticks == 6
+
+
+@pytest.mark.parametrize("place", [0, 1])
 def test_a_drive_that_does_not_follow_for_more_than_5_cycles_ends_it(place: int) -> None:
     for ignored in (5, 6):
         it = Drives()
@@ -262,6 +292,13 @@ def test_after_a_fault_reset_a_drive_is_led_to_rest_and_the_other_one_is_not_ask
     edge = [words for words in it.done if words[place] == 0x80]
     assert len(edge) == 1
     assert it.done[-1] == (0x00, 0x00)
+    # Two of them rest, both.
+    it = Drives()
+    it.stuck = {0: 0x0218, 1: 0x0218}
+    it.tick()
+    start_up, real = it.start_up(), it.tick
+    start_up.seek(Goal.FAULT_RESET, start_up.faulted(), tick, "leave its fault")
+    assert [axis.machine.goal for axis in it.axes] == [Goal.DISABLED, Goal.DISABLED]
     # Motors that are moved by hand meanwhile are no fault: nothing has power.
     it = Drives()
     it.stuck[place] = 0x0218
