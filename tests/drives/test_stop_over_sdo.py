@@ -1,97 +1,22 @@
 """The stop over SDO, write by write on the wire, with two drives that show what a test says."""
 
 import itertools
-from collections.abc import Callable
 from typing import Any, cast
 
-import can
 import pytest
 from drives_rig import MS, node
+from sdo_wire import ASK, Wire, always, pair, until
 
 from legbench.drives.codec.frame import Frame
 from legbench.drives.errors import BusError
-from legbench.drives.master.sdo_stop import SdoStop, leave_operational
+from legbench.drives.master.sdo_stop import leave_operational
 from legbench.drives.master.stop_report import StopReport
 
 ENABLED, BRAKING, OFF, UNKNOWN = 0x1237, 0x0217, 0x0250, 0x0201
 QUICK = bytes.fromhex("2B40600002000000")
 DISABLE = bytes.fromhex("2B40600000000000")
-ASK = bytes.fromhex("4041600000000000")
 BEAT = Frame(0x77E, b"\x05")
 NAMES = ("hip", "knee")
-SINCE = 7_000_000 * MS
-"""What the clock shows when a test begins [ns]."""
-Script = Callable[[int], int | None]
-"""Time since the start [ns] -> statusword; None for no answer."""
-
-
-class Wire:
-    """A port to two drives, in virtual time; an answer takes 0.2 ms."""
-
-    def __init__(self, *scripts: Script) -> None:
-        self.scripts = scripts
-        self.time_ns = 0
-        self.log: list[tuple[int, int, bytes]] = []
-        self.fails: Callable[[int, bytes], BaseException | None] = lambda cob_id, data: None
-        self.refused = 0
-        self.timebase = self.bus = self
-        self.channel_info = "wire"
-        self.answers: list[can.Message] = []
-
-    def now_ns(self) -> int:
-        return SINCE + self.time_ns
-
-    def wait_until(self, at_ns: int) -> None:
-        self.time_ns = max(self.time_ns, at_ns - SINCE)
-
-    def send(self, cob_id: int, data: bytes) -> None:
-        error = self.fails(cob_id, data)
-        if error is not None:
-            self.refused += 1
-            raise error
-        self.log.append((self.time_ns, cob_id, bytes(data)))
-        if bytes(data) == ASK:
-            shown = self.scripts[cob_id - 0x601](self.time_ns)
-            if shown is not None:
-                answer = b"\x4b\x41\x60\x00" + shown.to_bytes(2, "little") + b"\0\0"
-                self.answers.append(
-                    can.Message(arbitration_id=cob_id - 0x80, data=answer, is_extended_id=False)
-                )
-
-    def send_frame(self, frame: Frame) -> None:
-        self.send(frame.cob_id, frame.data)
-
-    def receive(self, until_ns: int) -> can.Message | None:
-        if not self.answers:
-            self.wait_until(until_ns)
-            return None
-        self.time_ns += MS // 5
-        return self.answers.pop(0)
-
-    def stop(self, **more: Any) -> tuple[StopReport, list[str]]:
-        """Stop, and what was held on the way."""
-        held: list[str] = []
-        nodes = [node(0), node(1)]
-        stop = SdoStop(
-            cast(Any, self), nodes, lambda error: held.append(type(error).__name__), **more
-        )
-        return stop.run(), held
-
-    def told(self, place: int, word: bytes) -> list[int]:
-        """When a drive was told something [ns]."""
-        return [at for at, cob_id, data in self.log if (cob_id, data) == (0x601 + place, word)]
-
-
-def until(moment_ns: int, before: int | None, after: int | None) -> Script:
-    return lambda now_ns: before if now_ns < moment_ns else after
-
-
-def always(shown: int | None) -> Script:
-    return lambda now_ns: shown
-
-
-def pair(place: int, odd: Script, usual: Script) -> tuple[Script, Script]:
-    return (odd, usual) if place == 0 else (usual, odd)
 
 
 def test_all_drives_are_told_before_any_is_waited_for_and_no_voltage_comes_last() -> None:
