@@ -108,7 +108,7 @@ def main() -> int:
     parser.add_argument("files", nargs="*", default=[f"src/legbench/{room}" for room in ROOMS])
     parser.add_argument("--per-file", type=int, default=40, metavar="N", help="faults a file")
     parser.add_argument("--seed", type=int, default=1, help="of the sample")
-    parser.add_argument("--tests", nargs="+", type=Path, help="files of tests; all of the room")
+    parser.add_argument("--tests", nargs="+", type=Path, help="these files only, not the room")
     parser.add_argument("--jobs", type=int, default=1, help="processes at a time")
     chosen = parser.parse_args()
     prepare()
