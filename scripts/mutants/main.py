@@ -73,9 +73,10 @@ def _faults(path: Path, tests: Sequence[Passed], seed: int, count: int) -> list[
     keys = [(edit.scope, *edit.lines(source)) for edit in every]
     for key in known.keys() - set(keys):
         sys.exit(f"{EQUIVALENT.name}: no fault of {module} is {key}; mend or remove the entry")
-    kept = [edit for edit, key in zip(every, keys, strict=True) if key not in known]
-    # Shuffled by their own seed, so that a new entry of the list moves no other fault.
-    random.Random(f"{seed} {module}").shuffle(kept)
+    # Shuffled before they are left out, so that a new entry of the list moves no other fault.
+    drawn = list(zip(every, keys, strict=True))
+    random.Random(f"{seed} {module}").shuffle(drawn)
+    kept = [edit for edit, key in drawn if key not in known]
     return [_fault(path, source, edit, _chosen(tests, module, edit)) for edit in kept[:count]]
 
 

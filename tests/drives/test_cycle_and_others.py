@@ -1,4 +1,4 @@
-"""One cycle by itself: a bus that fails, commands, frames of others, another master's SYNC."""
+"""One cycle by itself: a bus that fails, commands, frames of others."""
 
 import itertools
 from dataclasses import replace
@@ -167,6 +167,10 @@ def test_drives_are_asked_for_their_temperature_in_cycles_200_and_199() -> None:
     # The first tick is cycle 1, at 1 ms.
     assert [at // MS for at in wire.when(0x601)] == [200, 400]
     assert [at // MS for at in wire.when(0x602)] == [199, 399]
+    for place, shown in ((0, "3801"), (1, "A201")):
+        it.other(message(0x581 + place, bytes.fromhex(f"4B702000{shown}0000")))
+        told = [poll.celsius for poll in it.polls]
+        assert told == pytest.approx([31.2, 41.8] if place else [31.2, None])
 
 
 @pytest.mark.parametrize("beat_ms", [10, 15])
@@ -248,51 +252,9 @@ def test_what_comes_before_the_sync_of_another_master_is_heard_as_ever() -> None
     assert (it.error_frames, it.late_frames) == (2, 1)
 
 
-# --- behind another master -------------------------------------------------------------------
-
-
-def test_the_sync_of_another_master_is_followed_and_nothing_is_sent() -> None:
+def test_what_comes_between_two_answers_is_heard() -> None:
     wire = Wire()
     it = cycle(wire)
-    assert not it.hears_sync(3 * MS)
-    assert wire.time_ns == 3 * MS
-    for at in (4, 5, 6, 8, 10):
-        wire.plan(at * MS, 0x080)
-        for after_ns, cob_id, data in BOTH:
-            wire.plan(at * MS + after_ns, cob_id, data)
-    assert it.hears_sync(5 * MS)
-    assert wire.time_ns == 4 * MS
-    ticks = [it.follow() for _ in range(4)]
-    assert [tick.time_ns for tick in ticks] == [5 * MS, 6 * MS, 8 * MS, 10 * MS]
-    assert [(tick.skipped, tick.silent, tick.late_ns) for tick in ticks[1:]] == [
-        (0, 0, 0),
-        (1, 1, 0),
-        (1, 1, 0),
-    ]
-    assert all(tick.complete for tick in ticks)
-    # What the drives answered to the first SYNC came before the second one was awaited.
-    assert it.late_frames == 2
-    assert it.stranger is None
-    assert not wire.sent
-    # A master that is heard no more is waited for two periods.
-    now = wire.time_ns
-    gone = it.follow()
-    assert (gone.complete, gone.skipped) == (False, 0)
-    assert wire.time_ns == now + 2 * MS
-    assert missed(it) == [1, 1]
-    # It counts for one period; of the SYNC at 12 ms nobody has heard.
-    wire.plan(13 * MS, 0x080)
-    assert it.follow().skipped == 1
-
-
-def test_a_bus_that_fails_while_another_master_is_followed_is_told() -> None:
-    wire = Wire()
-    it = cycle(wire)
-    wire.deaf = True
-    assert not it.follow().complete
-    assert str(it.bus_error) == "deaf"
-    assert missed(it) == [1, 1]
-    wire.deaf = False
-    wire.plan(wire.time_ns + 100 * US, 0x080)
-    assert not it.follow().complete
-    assert it.bus_error is None
+    wire.plan(MS + 300 * US, 0x702, b"\x04")
+    assert it.tick().complete
+    assert [watch.state is not None for watch in it.watches] == [False, True]
