@@ -1,6 +1,7 @@
 """What motors and links may show, at both sides of each bound, against closed forms."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -249,3 +250,25 @@ def test_a_new_start_forgets_what_the_links_did() -> None:
     it.rest(0)
     for _ in range(5):
         assert it.see((REST[0], REST[1] + 0.5)) is None
+
+
+def test_the_bounds_themselves_are_allowed() -> None:
+    # In binary numbers, so that a reading is exactly at its bound.
+    exact = replace(BOUNDS, period=1.0 / 1024.0, joint_speed=64.0)
+    for turn, found in ((0.0625, False), (math.nextafter(0.0625, 1.0), True)):
+        watch = LinkWatch(exact)
+        assert watch.see((0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (True, True), 1) is None
+        told = watch.see((0.0, 0.0), (turn, -turn), (0.0, 0.0), (True, True), 1)
+        assert (told is not None) is found
+    for band, found in ((0.002, True), (math.nextafter(0.002, 1.0), False)):
+        it, seen = Links(), []
+        for cycle in range(20):
+            seen.append(it.see((band if cycle == 10 else 0.0, 0.0012 * cycle), (0.0, 0.0)))
+        assert (seen[-1] is not None) is found
+
+
+def test_a_motor_that_was_never_started_is_taken_to_stand_at_zero() -> None:
+    for shown, found in ((0.0299, False), (0.5, True), (-0.5, True)):
+        watch = MotorWatch(BOUNDS)
+        watch.see(1, shown, 0.0)
+        assert (watch.suspicion is not None) is found
