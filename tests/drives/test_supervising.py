@@ -184,6 +184,18 @@ def test_a_drive_that_left_operation_enabled_ends_a_run_at_once(place: int) -> N
 
 
 @pytest.mark.parametrize("place", [0, 1])
+def test_a_drive_without_data_hides_nothing_of_the_other_one(place: int) -> None:
+    for shown, limit, found in ((0x0250, 5, "drive not enabled"), (ENABLED, 1, "command ignored")):
+        scene = Scene()
+        enabled(scene)
+        watched = scene.supervisor(following_cycles=limit)
+        scene.axes[1 - place].fresh = False
+        scene.axes[place].statusword = shown
+        told = [cause(watched.states) for _ in range(2)]
+        assert told == ([found] * 2 if shown != ENABLED else [None, found])
+
+
+@pytest.mark.parametrize("place", [0, 1])
 @pytest.mark.parametrize("limit", [1, 4])
 def test_a_drive_that_ignores_its_target_longer_than_allowed_ends_a_run(
     place: int, limit: int
