@@ -209,7 +209,8 @@ def _crank_length(linkage: Table) -> float | None:
 def _setting(settings: Table, key: str) -> float | None:
     """Setting of a controller when it is a number; a guest may mean anything by the word."""
     found = settings.entries.get(key)
-    return None if isinstance(found, bool) or not isinstance(found, int | float) else float(found)
+    number = isinstance(found, int | float) and not isinstance(found, bool)
+    return settings.number(key) if number else None
 
 
 def _initial_state(table: Table) -> InitialState | None:
