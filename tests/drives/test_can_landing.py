@@ -123,11 +123,12 @@ def test_a_run_that_is_to_stop_stops_in_mid_flight(tmp_path: Path) -> None:
         assert seen.complete
         assert seen.manifest["plant"]["bus"]["end"] == end
         names = [event["name"] for event in seen.events]
-        assert names == (["rest", "bus", "end"] if end is End.REST else ["bus", "end"])
+        after = ["rest", "bus", "end"] if end is End.REST else ["bus", "end"]
+        assert names == ["limited", *after]
     # The rows are the same; what came after them is in the bus log and in one event.
     for name in ("command_pos", "joint_pos", "spring_torque", "phase", "t"):
         np.testing.assert_array_equal(ends["rest"][name], ends["stop"][name])
-    event = ends["rest"].events[0]
+    (event,) = [event for event in ends["rest"].events if event["name"] == "rest"]
     assert event["rested"] is True
     assert event["interrupted"] is False
     lines = {
