@@ -9,6 +9,7 @@ from can_rig import BUS, LIMITS, MS, experiment
 from legbench.control import JumpConfig
 from legbench.drives.emulated.faults import FrameFault, FrameFaultKind
 from legbench.experiment import Experiment, record
+from legbench.plant.landing import End
 from legbench.plants import EMULATED, CanChoice
 from legbench.recording.events import read_events
 from legbench.recording.manifest import read_manifest
@@ -27,7 +28,7 @@ def silent_run(folder: Path, limits: str) -> Experiment:
     (folder / "limits.toml").write_text(limits, encoding="utf-8")
     gone = FrameFault(kind=FrameFaultKind.DROP, cob_id=0x182, start_ns=GONE_NS)
     chosen = experiment(JumpConfig(), duration=1.5)
-    plant = CanChoice(bus=folder / "leg.toml", interface=EMULATED, faults=(gone,))
+    plant = CanChoice(bus=folder / "leg.toml", interface=EMULATED, end=End.STOP, faults=(gone,))
     return Experiment(
         design=chosen.design,
         controller=chosen.controller,
