@@ -3,16 +3,10 @@
 from pathlib import Path
 
 from legbench.cli.output import report_error
-<<<<<<< HEAD
-from legbench.drives.setup.bus_file import load_bus, load_limits
-from legbench.drives.setup.waivers import describe_waivers
-from legbench.limits.safety import SafetyLimits
-=======
 from legbench.drives.setup.bus_file import load_bus, load_limits
 from legbench.drives.setup.config import BusConfig
-from legbench.limits.safety import SafetyLimits
 from legbench.drives.setup.waivers import describe_waivers
->>>>>>> mend
+from legbench.limits.safety import SafetyLimits
 from legbench.plants import LIMITS_NAME, CanChoice, PlantSettings
 
 
