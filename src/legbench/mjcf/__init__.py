@@ -1,4 +1,4 @@
-"""From a design to a MuJoCo model; the only writer of MJCF."""
+"""MuJoCo model of a design; the only writer of MJCF."""
 
 from legbench.mjcf.build import BuildOptions, build_spec
 from legbench.mjcf.ground import Ground

@@ -13,7 +13,7 @@ from legbench.mjcf.look import add_table, add_tip
 from legbench.mjcf.numerics import Numerics
 
 HANGING_CLEARANCE = 0.1
-"""Between the ground and the foot of a leg that hangs from a fixed trunk [m]."""
+"""Gap between the ground and the foot of a leg that hangs from a fixed trunk [m]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,7 +30,7 @@ class Ground:
     friction: float = 1.0
     """Sliding friction [-]."""
     tip_radius: float = 1e-4
-    """Of the foot tip that touches the ground [m]; by default a point, near enough."""
+    """Radius of the foot tip [m]; the default is a point, near enough."""
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.friction < math.inf:

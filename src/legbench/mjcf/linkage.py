@@ -49,7 +49,7 @@ class Linkage:
     bar_density: float = 0.006
     """Mass per length of crank and bars [kg/m]: a square PA6 rod of 2.3 mm."""
     crank_length: float = 0.02
-    """Of hip crank and thigh extension [m]."""
+    """Length of hip crank and thigh extension [m]."""
 
     def __post_init__(self) -> None:
         if not MIN_BAR_DENSITY <= self.bar_density < math.inf:
@@ -63,7 +63,7 @@ class Linkage:
             )
 
     def mass(self, design: LegDesign) -> float:
-        """Of everything that the linkage adds to a leg [kg]."""
+        """Mass of everything that the linkage adds to a leg [kg]."""
         if self.kind is LinkageKind.REDUCED:
             return 0.0
         length = self.crank_length + design.thigh.length + design.shank.length

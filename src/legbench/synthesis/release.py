@@ -39,7 +39,7 @@ class Release:
     reference: Reference = Reference.EQUILIBRIUM
     """What eq. (14) measures deflection from: gravity's sag, which flatters, is left out."""
     timestep: float = 0.001
-    """Of the simulation [s]: P^r is then within 5e-5 of that at 0.25 ms."""
+    """Time step of the simulation [s]; P^r is then within 5e-5 of that at 0.25 ms."""
 
     @property
     def options(self) -> BuildOptions:
@@ -124,7 +124,7 @@ def released(
 def _resting(
     legs: Sequence[LegDesign], motor_pos: Floats, near: Floats, support: Support
 ) -> Floats:
-    """Where each leg rests for its motor positions (n, 2), close to `near` (n, 2) [rad].
+    """Rest postures (n, 2) of legs for their motor positions (n, 2), close to `near` (n, 2) [rad].
 
     Raises:
         ConfigError: a leg has no stable equilibrium there.
