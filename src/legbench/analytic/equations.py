@@ -138,7 +138,7 @@ def contact_force(ops: Ops, terms: FloatingTerms, q: Pair, v: Pair, a: Pair) -> 
 
 
 def free_foot_acceleration(ops: Ops, terms: FloatingTerms, q: Pair, v: Pair, a: Pair) -> Pair:
-    """Acceleration of a foot tip that nothing holds (forward, up) [m/s^2], for `a` of the angles."""
+    """Acceleration of a foot tip that nothing holds, angles accelerating by `a` [m/s^2]."""
     trunk = trunk_acceleration(ops, terms, q, v, a)
     inner = sweep_acceleration(ops, q, v, a, (terms.reach, terms.reach))
     return trunk[0] + inner[0], trunk[1] + inner[1]

@@ -10,7 +10,7 @@ from legbench.errors import ConfigError
 from legbench.signals import Floats
 
 STRAIGHT = 1e-9
-"""Smallest |sin(q1 - q2)| for which eq. (19) has an inverse; below it the leg is straight or folded."""
+"""Smallest |sin(q1 - q2)| for which eq. (19) has an inverse: neither straight nor folded [-]."""
 
 
 def pair_mass(terms: PairTerms, joint_pos: Floats) -> Floats:

@@ -101,7 +101,7 @@ class LegModel:
         return self.acceleration(self.hanging, motor, q, v)
 
     def flight_acceleration(self, motor: Pair, q: Pair, v: Pair) -> tuple[Pair, Pair]:
-        """Accelerations of trunk [m/s^2] and of q1, q2 [rad/s^2] while nothing touches the ground."""
+        """Accelerations of trunk [m/s^2] and of q1, q2 [rad/s^2] in flight."""
         a = self.acceleration(self.falling, motor, q, v)
         return trunk_acceleration(self.ops, self.floating, q, v, a), a
 

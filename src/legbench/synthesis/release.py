@@ -12,7 +12,7 @@ import numpy as np
 from legbench.control import LegTargets, PositionJump, PositionJumpConfig
 from legbench.design import LegDesign
 from legbench.design.setup import Setup, SetupKind
-from legbench.design.statics import Support, gravity_load
+from legbench.design.statics import Support, balance, gravity_load, is_stable
 from legbench.errors import ConfigError
 from legbench.kinematics import modal_to_joint
 from legbench.metrics import Reference, alignment
@@ -131,14 +131,8 @@ def _resting(
     """
     stiffness = np.array([leg.stiffness for leg in legs])
     moment = np.array([gravity_load(leg, support).moment for leg in legs])
-    joint_pos = near
-    for _ in range(20):
-        slope = stiffness + moment * np.cos(joint_pos)
-        residual = stiffness * (motor_pos - joint_pos) - moment * np.sin(joint_pos)
-        joint_pos = joint_pos + residual / np.where(np.abs(slope) < 1e-9, 1e-9, slope)
-    slope = stiffness + moment * np.cos(joint_pos)
-    residual = stiffness * (motor_pos - joint_pos) - moment * np.sin(joint_pos)
-    held = np.all((np.abs(residual) < 1e-9) & (slope > 0.0), axis=1)
+    joint_pos = balance(stiffness, moment, motor_pos, near)
+    held = np.all(is_stable(stiffness, moment, motor_pos, joint_pos), axis=1)
     if not held.all():
         raise ConfigError(
             f"{int((~held).sum())} of {len(legs)} scattered legs find no equilibrium at their set "
