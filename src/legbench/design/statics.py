@@ -95,7 +95,8 @@ def is_stable(stiffness: Floats, moment: Floats, motor_pos: Floats, joint_pos: F
 def equilibrium(design: LegDesign, motor_pos: Floats, support: Support) -> Floats:
     """Link posture at which gravity balances the springs for `motor_pos` (..., 2) [rad].
 
-    Newton's method starts at the motor position and follows the branch that continues into it when gravity is turned up from zero.
+    Newton's method starts at the motor position and follows the branch that continues into it when
+    gravity is turned up from zero.
 
     Raises:
         DesignError: the springs are too soft to hold the leg at that motor position.
