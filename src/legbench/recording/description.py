@@ -56,7 +56,7 @@ class RunDescription:
     id: str
     """Name of the run: that of its folder when it was written."""
     created: str | None
-    """When it began, ISO 8601."""
+    """Time at which it began, ISO 8601."""
     design: LegDesign
     setup: Setup
     linkage: str | None
