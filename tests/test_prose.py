@@ -7,9 +7,57 @@ from pathlib import Path
 
 SOURCES = sorted((Path(__file__).parents[1] / "src").rglob("*.py"))
 FIRST_WORDS = frozenset(
-    "of and that with in on at by for from to into onto under over between beside beyond but or so "
-    "like as than then after before until while where when within without through against across "
-    "along among around behind below above if because though although since nor yet".split()
+    [
+        "of",
+        "and",
+        "that",
+        "with",
+        "in",
+        "on",
+        "at",
+        "by",
+        "for",
+        "from",
+        "to",
+        "into",
+        "onto",
+        "under",
+        "over",
+        "between",
+        "beside",
+        "beyond",
+        "but",
+        "or",
+        "so",
+        "like",
+        "as",
+        "than",
+        "then",
+        "after",
+        "before",
+        "until",
+        "while",
+        "where",
+        "when",
+        "within",
+        "without",
+        "through",
+        "against",
+        "across",
+        "along",
+        "among",
+        "around",
+        "behind",
+        "below",
+        "above",
+        "if",
+        "because",
+        "though",
+        "although",
+        "since",
+        "nor",
+        "yet",
+    ]
 )
 """Prepositions and conjunctions: a docstring that begins with one leans on its neighbour."""
 
