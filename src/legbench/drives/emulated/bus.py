@@ -21,7 +21,7 @@ from legbench.drives.transport.virtual_bus import VirtualBus
 from legbench.errors import ConfigError
 
 IDLE_NS = 1_000_000_000
-"""What `recv` without a time-out waits at most: nothing else can happen in lock-step."""
+"""Longest wait of `recv` without a time-out, as nothing else can happen in lock-step [ns]."""
 
 
 @final
@@ -69,7 +69,7 @@ class LockstepBus(VirtualBus):
 
     @property
     def state(self) -> can.BusState:
-        """From the error counters; setting it `ACTIVE` restarts the controller."""
+        """State of the controller by its error counters; setting `ACTIVE` restarts it."""
         errors = max(self.network.errors[self._station], self._station.unread)
         if self.network.off_bus(self._station):
             return can.BusState.ERROR

@@ -17,5 +17,5 @@ class NetworkTime:
         return self._network.now_ns
 
     def wait_until(self, at_ns: int) -> None:
-        """Let the bus go on until then."""
+        """Advance the bus to `at_ns`."""
         self._network.advance(at_ns)

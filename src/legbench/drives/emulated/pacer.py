@@ -6,7 +6,7 @@ from typing import final
 from legbench.drives.emulated.network import Network
 
 FORGIVEN_NS = 3_000_000
-"""Time stands still when this process was away for longer: no drive is blamed for it."""
+"""Longest step of virtual time at once; the rest of a longer pause is left out [ns]."""
 
 
 @final

@@ -21,7 +21,7 @@ CHUNK, FULL = 4096, 1 << 16
 
 
 def _say_nothing(_text: str) -> None:
-    """Nobody wants to know."""
+    """Discard a warning."""
 
 
 @final

@@ -29,7 +29,7 @@ class AxisLink:
     Attributes:
         node: its configuration.
         machine: leads it through its states.
-        statusword: as last received.
+        statusword: statusword last received.
         target_counts: what its next RPDO says, not wrapped.
         sent_counts: what its last RPDO said, none before the first.
         fresh: whether all its TPDOs have come in this cycle.

@@ -45,13 +45,13 @@ from legbench.limits.safety import SafetyLimits
 from legbench.limits.shortfall import Shortfall
 
 LISTEN_NS = 100_000_000
-"""So long read-only listens for the SYNC of another master, and for heartbeats."""
+"""Time that a read-only link listens for another master's SYNC and for heartbeats [ns]."""
 ARRIVED = 1e-9
-"""Of a target that has been reached [rad]."""
+"""Largest distance from a target that counts as reached [rad]."""
 
 
 class LinkState(Enum):
-    """How far a link has come."""
+    """States of a link, from new to stopped."""
 
     NEW = auto()
     CONFIGURED = auto()
@@ -97,8 +97,8 @@ class Link(Lead):
             bus: stays the caller's, who shuts it down after `close`.
             config: what hangs on it.
             limits: enforced here.
-            stiffness: of the series springs, one a drive [N m/rad].
-            timebase: that of the bus by default.
+            stiffness: stiffness of the series springs, one a drive [N m/rad].
+            timebase: time base of the link; by default the bus's.
             listener: sees every frame, such as a `BusLog`.
             read_only: observe; change nothing in a drive, see `master.read_only`.
             lock: taken by `open`; by default one for the bus's channel.
@@ -198,7 +198,7 @@ class Link(Lead):
             self.bring_up.preload(node)
 
     def _prepare_to_look(self) -> None:
-        """Beside another master listen only; without one SYNC has to come from here.
+        """Prepare a read-only link: listen to another master's SYNC, or send SYNC if there is none.
 
         Raises:
             BusError: a master of this computer holds the channel, and sends no SYNC yet.
@@ -360,13 +360,13 @@ class Link(Lead):
         return applied
 
     def forget_wish(self) -> tuple[float, ...]:
-        """Measure the next step of the command from what was applied last; that [rad]."""
+        """Measure the next step of the command from what was applied last; returns that [rad]."""
         self._guard.forget_wish()
         return self._guard.applied
 
     @property
     def shortfall(self) -> Shortfall:
-        """Which wishes were let through otherwise than wished."""
+        """Counts of the commands that the limits changed before they were applied."""
         return self._guard.shortfall
 
     def move_to(self, motor_pos: Sequence[float], speed: float | None = None) -> Sample:

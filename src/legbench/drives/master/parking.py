@@ -59,9 +59,9 @@ def park(
     power is left out: the deadline of its command frames may be what stops it.
 
     Args:
-        port: of the bus.
-        bus: whose drives.
-        on_other: gets the frames that are no answers.
+        port: port of the bus.
+        bus: configuration of the drives.
+        on_other: called with frames that are no answers.
         powered: names of drives that have kept their power.
     """
     failed: list[str] = []

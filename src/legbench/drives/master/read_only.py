@@ -18,7 +18,7 @@ READING = (2, 3, 4)
 
 
 def may_read(cob_id: int, data: bytes | bytearray) -> bool:
-    """Questions only: an SDO upload changes nothing in a drive."""
+    """Whether a frame is a mere question: an SDO upload changes nothing in a drive."""
     asked = SDO_REQUEST_BASE < cob_id <= SDO_REQUEST_BASE + LAST_NODE
     return asked and bool(data) and data[0] >> 5 in READING
 

@@ -15,11 +15,11 @@ from legbench.drives.protocol.sdo_client import Download, Progress, Upload
 
 
 def _ignore(_message: can.Message) -> None:
-    """Frames that are nobody's."""
+    """Discard a frame that is not an answer."""
 
 
 def _nothing() -> None:
-    """Nothing to look at before a write."""
+    """Do nothing before a write."""
 
 
 @final

@@ -20,11 +20,11 @@ drive is without power after 50 ms [ns]."""
 LAST_NS = 250_000_000
 """Longest that a drive is asked whether its power is gone [ns]."""
 REST_NS = 5_000_000
-"""Between two looks [ns]."""
+"""Pause between two rounds of reading all statuswords [ns]."""
 ANSWER_MS = 20
-"""A look waits no longer for its answer: the other drives are to be looked at, too [ms]."""
+"""Longest wait for a statusword, so that the other drives are read in time, too [ms]."""
 FAILED_LOOKS = 3
-"""A bus that has taken no frame in so many looks is given up: nobody can be told anything."""
+"""Number of rounds in a row without a frame sent after which the stop gives up."""
 STATUSWORD, CONTROLWORD = 0x6041, 0x6040
 
 
@@ -106,7 +106,7 @@ class SdoStop:
         self._refused = 0 if told else self._refused + 1
 
     def _look(self, node: NodeConfig) -> int:
-        """The statusword; -1 if the drive does not answer."""
+        """Read the statusword of a drive; -1 if it does not answer."""
         try:
             return self._sdo[node.node_id].get_int(STATUSWORD, 0, DataType.UNSIGNED16)
         except BaseException as error:  # The stop goes on, whatever a driver raises.

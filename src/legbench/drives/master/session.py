@@ -46,8 +46,8 @@ class Session(Closing):
         Args:
             bus: shut down in the end.
             config: what hangs on it.
-            timebase: that of the bus by default.
-            lock: of its channel, which this session releases if it is held already.
+            timebase: time base of the session; by default the bus's.
+            lock: lock of the bus's channel, which this session releases if it is held already.
         """
         self.bus, self.config = bus, config
         self.timebase = timebase or timebase_of(bus)

@@ -64,12 +64,12 @@ class StatusBit(IntEnum):
     WARNING = 1 << 7
     REMOTE = 1 << 9
     TARGET_REACHED = 1 << 10
-    """In homing: finished. In cyclic synchronous position vendors differ: never look at it."""
+    """Bit 10. Homing: finished. Cyclic synchronous position: vendors differ, so it is not used."""
     INTERNAL_LIMIT = 1 << 11
     FOLLOWS_COMMAND = 1 << 12
-    """Cyclic synchronous position: the drive follows the target. Homing: attained."""
+    """Bit 12. Cyclic synchronous position: the drive follows the target. Homing: attained."""
     FOLLOWING_ERROR = 1 << 13
-    """Cyclic synchronous position: following error. Homing: homing error."""
+    """Bit 13. Cyclic synchronous position: following error. Homing: homing error."""
 
 
 _BIT_WORDS = (
@@ -91,7 +91,7 @@ class Controlword(IntEnum):
     SWITCH_ON = 0x07
     ENABLE_OPERATION = 0x0F
     FAULT_RESET = 0x80
-    """Acts on its rising edge."""
+    """Fault reset, which acts on the rising edge of bit 7."""
 
 
 def decode_state(statusword: int) -> DriveState | None:
@@ -108,24 +108,24 @@ def describe_statusword(statusword: int) -> str:
 
 
 class Goal(Enum):
-    """Where a master wants a drive to be."""
+    """State that a master wants a drive to reach."""
 
     DISABLED = "switch on disabled"
     READY = "ready to switch on"
     SWITCHED_ON = "switched on"
     ENABLED = "operation enabled"
     QUICK_STOP = "quick stop"
-    """Stopped by the drive's own ramp; without power it is reached at once."""
+    """The drive stops on its own quick-stop ramp; without power the goal is reached at once."""
     FAULT_RESET = "fault reset"
 
 
 class Way(Enum):
-    """How a goal looks from a state."""
+    """Whether a goal is reached, is being approached, or cannot be reached from a state."""
 
     REACHED = "reached"
     MOVING = "on the way"
     REFUSED = "refused"
-    """This state cannot be left for this goal by the machine itself."""
+    """The state machine cannot leave the present state for this goal by itself."""
 
 
 HOLD = {
@@ -138,7 +138,7 @@ HOLD = {
     _S.FAULT_REACTION_ACTIVE: Controlword.DISABLE_VOLTAGE,
     _S.FAULT: Controlword.DISABLE_VOLTAGE,
 }
-"""The controlword that changes nothing."""
+"""Controlword that keeps a drive in its state, by state."""
 _LADDER = (_S.SWITCH_ON_DISABLED, _S.READY_TO_SWITCH_ON, _S.SWITCHED_ON, _S.OPERATION_ENABLED)
 _RUNG = {
     Goal.DISABLED: 0,
@@ -152,8 +152,8 @@ _FAULTY = (_S.FAULT, _S.FAULT_REACTION_ACTIVE)
 def next_controlword(state: DriveState, goal: Goal) -> tuple[Controlword, Way]:
     """One step from a state towards a goal (transitions 2 to 12 and 15 of CiA 402-2, fig. 9).
 
-    Up the ladder it takes one rung; down it goes at once. Out of quick stop the only way leads
-    to switch on disabled; out of a fault only a fault reset.
+    Towards operation enabled it takes one transition a call; away from it, all at once. Quick stop
+    is left for switch on disabled alone, a fault by a fault reset alone.
     """
     hold = HOLD[state]
     if goal is Goal.FAULT_RESET:
@@ -184,14 +184,14 @@ _BLIND = {
     Goal.QUICK_STOP: Controlword.QUICK_STOP,
     Goal.DISABLED: Controlword.DISABLE_VOLTAGE,
 }
-"""A stop is sent whatever the drive shows; nothing else is, when its state is unknown."""
+"""Controlwords of the goals that stop a drive: they alone are sent when its state is unknown."""
 HOLD_CYCLES = 2
-"""A controlword stands this many cycles: drives with a 1 ms loop may miss a shorter one."""
+"""Number of cycles that a controlword is held: a drive with a 1 ms loop may miss a shorter one."""
 
 
 @dataclass(frozen=True, slots=True)
 class PowerStep:
-    """What one cycle of the machine decided."""
+    """Decision of one cycle of the state machine."""
 
     controlword: int
     state: DriveState | None
@@ -203,7 +203,7 @@ class PowerMachine:
     """Leads one drive to a goal, a step a cycle, each step only after the last is confirmed.
 
     Attributes:
-        goal: where to; after a drive has left operation enabled unasked it falls to `DISABLED`.
+        goal: state to reach; `DISABLED` after a drive has left operation enabled unasked.
         lost: the drive left operation enabled unasked; cleared by the next `seek`.
         refused: the last step could not be taken from the drive's state.
     """
@@ -222,7 +222,7 @@ class PowerMachine:
 
     @property
     def controlword(self) -> int:
-        """As last decided."""
+        """Controlword that the last step decided."""
         return self._controlword
 
     def seek(self, goal: Goal) -> None:
@@ -264,7 +264,7 @@ class PowerMachine:
         return step
 
     def _edge(self) -> tuple[Controlword, Way]:
-        """Bit 7 low for two cycles, high for two, low again: one edge a request."""
+        """Fault reset with one rising edge of bit 7 a request: low, high, low, two cycles each."""
         if self._controlword & Controlword.FAULT_RESET:
             if self._age < HOLD_CYCLES:
                 return Controlword.FAULT_RESET, Way.MOVING

@@ -39,9 +39,9 @@ class Emergency:
 
     node_id: int
     code: int
-    """603Fh"""
+    """Error code (603Fh); 0 when all errors have gone."""
     register: int
-    """1001h"""
+    """Error register (1001h)."""
     vendor: bytes = bytes(5)
 
     @property

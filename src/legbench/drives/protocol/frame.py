@@ -9,9 +9,9 @@ TIME_ID = 0x100
 TPDO_BASES = (0x180, 0x280, 0x380, 0x480)
 RPDO_BASES = (0x200, 0x300, 0x400, 0x500)
 SDO_REPLY_BASE = 0x580
-"""Drive to master."""
+"""Base of the COB-IDs of SDO replies, from drive to master; the node id is added."""
 SDO_REQUEST_BASE = 0x600
-"""Master to drive."""
+"""Base of the COB-IDs of SDO requests, from master to drive; the node id is added."""
 HEARTBEAT_BASE = 0x700
 LAST_NODE = 127
 COB_MASK = 0x7FF

@@ -17,7 +17,7 @@ class NmtCommand(IntEnum):
 
 
 class NmtState(IntEnum):
-    """What a heartbeat says of its producer; 0 is the boot-up message."""
+    """NMT states as a heartbeat reports them; 0 is the boot-up message."""
 
     BOOT_UP = 0
     STOPPED = 4
@@ -30,7 +30,7 @@ _STATES = {int(state): state for state in NmtState}
 
 
 def nmt_frame(command: NmtCommand, node_id: int = 0) -> Frame:
-    """Order a node, or all of them (0)."""
+    """Frame of an NMT command to one node, or to all of them (0)."""
     return Frame(NMT_ID, bytes((command, node_id)))
 
 
@@ -62,9 +62,9 @@ class HeartbeatWatch:
         self.last_ns = now_ns
 
     def feed(self, now_ns: int) -> None:
-        """A heartbeat has come."""
+        """Restart the time-out at a heartbeat."""
         self.last_ns = now_ns
 
     def lost(self, now_ns: int) -> bool:
-        """Whether it is overdue."""
+        """Whether the heartbeat is overdue."""
         return now_ns - self.last_ns > self.timeout_ns

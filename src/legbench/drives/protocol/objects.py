@@ -13,7 +13,7 @@ from legbench.drives.protocol.frame import COB_INVALID, RPDO_BASES, TPDO_BASES
 Key = tuple[int, int]
 """Index and sub-index."""
 PDO_COUNT = 4
-"""RPDOs and TPDOs of a drive, each."""
+"""Number of RPDOs, and of TPDOs, of a drive."""
 MAX_MAPPED = 8
 LINK_SHORT = 0x2064
 """Link position in 16 bits, manufacturer specific: with 6041h and 6064h it fills one TPDO."""

@@ -71,7 +71,7 @@ class PdoMap:
             raise CodecError(f"a PDO of {names} has {self.size} bytes; it must have 1 to 8")
 
     def place(self, index: int, sub: int = 0) -> int | None:
-        """Where an object stands among the values; none if it is not mapped."""
+        """Place of an object among the values of the PDO; none if it is not mapped."""
         for place, entry in enumerate(self.entries):
             if entry.key == (index, sub):
                 return place

@@ -9,11 +9,11 @@ MUX = struct.Struct("<BHB")
 """Command specifier, index, sub-index."""
 SIZE = struct.Struct("<I")
 FRAME = 8
-"""Every SDO frame has eight bytes."""
+"""Length of every SDO frame [bytes]."""
 SEGMENT = 7
-"""Bytes of data in a segment."""
+"""Largest amount of data in a segment [bytes]."""
 EXPEDITED = 4
-"""Bytes of data that need no segments."""
+"""Largest amount of data in an expedited transfer, which needs no segments [bytes]."""
 MAX_TRANSFER = 1 << 16
 """Longest object that either side takes [bytes]; a stray size must not fill the memory."""
 

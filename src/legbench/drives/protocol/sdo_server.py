@@ -34,7 +34,7 @@ class SdoServer:
         self._size: int | None = None
 
     def feed(self, data: bytes) -> bytes | None:
-        """The answer to a request; none where the protocol has none."""
+        """Take a request; returns the answer, none where the protocol has none."""
         if len(data) != FRAME:
             return None
         command = data[0] >> 5

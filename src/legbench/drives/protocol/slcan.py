@@ -1,7 +1,7 @@
 """Lines of a CAN adapter on a serial line (LAWICEL's ASCII protocol, `slcan`) <-> frames; pure.
 
-As LAWICEL's manual of the CAN232 says, but for S7 and S9, which mean what python-can and newer
-adapters mean by them.
+The format is that of LAWICEL's manual of the CAN232, except for S7 and S9, which mean what
+python-can and newer adapters mean by them.
 """
 
 from legbench.drives.protocol.frame import Frame
@@ -16,7 +16,7 @@ BITRATES = dict(
     )
 )
 BTR_CLOCK = 8_000_000
-"""Half the crystal of an SJA1000, which `s` writes the bit timing registers of [Hz]."""
+"""Clock of the bit timing of an SJA1000, half its crystal's frequency, for the command `s` [Hz]."""
 STANDARD, EXTENDED = 3, 8
 """Hexadecimal digits of an identifier."""
 

@@ -33,7 +33,7 @@ _PLAIN_TYPES: dict[str, tuple[type, ...]] = {
     "bool": (bool,),
 }
 LARGEST = 1e18
-"""No number of a file reaches it."""
+"""Bound that the magnitude of every number of a file stays below."""
 AXES = 2
 """Axes of a leg, and so pairs of a range."""
 

@@ -20,8 +20,9 @@ def check_together(
 
     Args:
         config: the bus.
-        limits: of the leg, ranges of the design included.
-        stops: where the links can be at all; the range of the limits by default [rad].
+        limits: limits of the leg, ranges of the design included.
+        stops: ranges that the mechanical stops leave the links; by default those of the limits
+            [rad].
         leads: drives are commanded, and so have to notice when their master dies.
 
     Raises:

@@ -1,4 +1,4 @@
-"""What is on the bus: nodes, their identity, process data, units; one frozen value each."""
+"""Configuration of a bus: nodes, their identity, process data and units, as frozen values."""
 
 import math
 from dataclasses import dataclass, field, replace
@@ -23,7 +23,7 @@ TARGET_POSITION = Mapped(0x607A, 0, DataType.INTEGER32)
 LINK_POSITION_SHORT = Mapped(LINK_SHORT, 0, DataType.INTEGER16)
 LINK_POSITION = Mapped(0x60E4, 1, DataType.INTEGER32)
 LARGEST_COUNT = (1 << 31) - 1
-"""Of a position object of 32 bits."""
+"""Highest count of a 32-bit position object [counts]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,13 +55,13 @@ class PdoConfig:
     """
 
     number: int
-    """1 to 4."""
+    """Number of the RPDO or TPDO, 1 to 4."""
     objects: tuple[Mapped, ...]
     cob_id: int | None = None
-    """That of the predefined connection set by default."""
+    """COB-ID of the PDO; by default that of the predefined connection set."""
     deadline_ms: int = 0
-    """RPDO: the drive faults when none came for so long (140xh:05); 0: that object,
-    which not every drive has, is left alone."""
+    """Time without an RPDO after which the drive faults (140xh:05) [ms]; 0 leaves that object,
+    which not every drive has, alone."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.number <= PDO_COUNT:
@@ -76,9 +76,9 @@ class PdoConfig:
 
 
 RPDO = PdoConfig(number=1, objects=(CONTROLWORD, TARGET_POSITION), deadline_ms=20)
-"""The usual command: six bytes."""
+"""Command frame used by default: controlword and target position, six bytes."""
 TPDO = PdoConfig(number=1, objects=(STATUSWORD, POSITION_ACTUAL, LINK_POSITION_SHORT))
-"""The usual answer: eight bytes."""
+"""Answer frame used by default: statusword, motor and link position, eight bytes."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,16 +98,16 @@ class NodeConfig:
     rpdos: tuple[PdoConfig, ...] = (RPDO,)
     tpdos: tuple[PdoConfig, ...] = (TPDO,)
     parameters: tuple[Parameter, ...] = ()
-    """Beyond what `configuration.configuration` writes by itself, in this order."""
+    """Objects written after those of `configuration.configuration`, in this order."""
     temperature_object: Mapped | None = None
-    """Of whole numbers, if the drive reports its temperature."""
+    """Integer object in which the drive reports its temperature; none if it does not."""
     temperature_scale: float = 0.1
-    """What one count of that object is, which differs from maker to maker [deg C]."""
+    """Temperature of one count of `temperature_object`, which depends on the maker [deg C]."""
     heartbeat_consumer: bool = True
     """Whether the drive has 1016h, and so stops when its master's heartbeat is missing; some have
     not, and must be given a `deadline_ms` of their commands instead."""
     soft_limits: Range | None = None
-    """Of the motor, in the drive itself (607Dh), which clamps targets to them [rad]."""
+    """Motor range to which the drive itself clamps targets (607Dh) [rad]; none sets no range."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.node_id <= LAST_NODE:
@@ -136,7 +136,7 @@ class NodeConfig:
 
     @property
     def soft_limits_counts(self) -> tuple[int, int] | None:
-        """The same in encoder counts, lower first; raises ConfigError beyond 607Dh."""
+        """Soft limits in encoder counts, lower first; raises ConfigError beyond 607Dh."""
         if self.soft_limits is None:
             return None
         low, high = self.soft_limits
@@ -169,11 +169,11 @@ def _given(pdo: PdoConfig, predefined: int) -> int:
 NOT_IN_FILES = "not in files"
 """Metadata of a field that is no key of a bus file."""
 FASTEST_START = 5.0
-"""Of a move before a run begins [rad/s]."""
+"""Highest speed of the move to the start posture, before a run begins [rad/s]."""
 
 
 def check_start_speed(speed: float) -> None:
-    """Refuse what is no speed of a slow move [rad/s]; raises ConfigError."""
+    """Refuse a start speed [rad/s] that is not above 0 or is too fast; raises ConfigError."""
     if not 0.0 < speed <= FASTEST_START:
         raise ConfigError(
             f"start_speed is {speed:g} rad/s; it must be above 0 and at most {FASTEST_START:g}"
@@ -193,25 +193,26 @@ class BusConfig:
     """python-can's name of the interface; its own configuration decides if none is given."""
     channel: str | None = None
     bitrate: int = 1_000_000
-    """[bit/s]"""
+    """Bitrate of the bus [bit/s]."""
     period_us: int = 1000
     tpdo_deadline_us: int = 700
-    """After SYNC; process data that comes later counts as lost. A reply delay of 250 us, two full
-    frames and a heartbeat in front make 640 us at 1 Mbit/s; RPDOs need 230 us after it."""
+    """Deadline of the TPDOs after SYNC; later process data counts as lost [us]. A reply delay of
+    250 us, two full frames and a heartbeat in front make 640 us at 1 Mbit/s; RPDOs need 230 us
+    after it."""
     master_id: int = 126
-    """Producer of the heartbeat that the drives watch."""
+    """Node id under which the master produces the heartbeat that the drives watch."""
     heartbeat_ms: int = 20
-    """Of every drive (1017h); lost after three."""
+    """Heartbeat period of every drive (1017h) [ms]; a drive is lost after three."""
     master_heartbeat_ms: int = 10
-    """Of the master; the drives stop after three (1016h)."""
+    """Heartbeat period of the master [ms]; the drives stop after three without one (1016h)."""
     sdo_timeout_ms: int = 200
     sdo_retries: int = 3
     settle_cycles: int = 20
-    """Cycles with regular process data before anything is enabled."""
+    """Number of cycles with regular process data before a drive is enabled."""
     start_speed: float = 2.0
-    """Of a move to the start posture, before a run begins [rad/s]."""
+    """Speed of the move to the start posture, before a run begins [rad/s]."""
     stated_bitrate: int | None = field(default=None, metadata={NOT_IN_FILES: True})
-    """What the bus file says, where an interface is opened at another `bitrate` [bit/s]."""
+    """Bitrate in the bus file, where an interface is opened at another `bitrate` [bit/s]."""
     waive: tuple[str, ...] = ()
     """Protections that these drives do without, by name; every run says so."""
 
@@ -251,14 +252,14 @@ class BusConfig:
         check_distinct(users)
 
     def at(self, bitrate: int | None) -> "BusConfig":
-        """The same bus as an interface at another bitrate sees it [bit/s]."""
+        """Return this bus as an interface at another bitrate sees it [bit/s]."""
         if bitrate in (None, self.bitrate):
             return self
         return replace(self, bitrate=bitrate, stated_bitrate=self.bitrate)
 
     @property
     def bitrate_text(self) -> str:
-        """At which bitrate this bus is talked to, and who says so."""
+        """Bitrate of this bus in words, and whether it comes from the bus file or a flag."""
         if self.stated_bitrate is None:
             return f"the bus file says {self.bitrate} bit/s"
         return (
@@ -268,10 +269,10 @@ class BusConfig:
 
     @property
     def period(self) -> float:
-        """Of the cycle [s]."""
+        """Period of the cycle [s]."""
         return 1e-6 * self.period_us
 
     @property
     def period_ns(self) -> int:
-        """The same, exact [ns]."""
+        """Period of the cycle as a whole number [ns]."""
         return 1000 * self.period_us

@@ -10,17 +10,18 @@ from legbench.drives.setup.config import BusConfig, NodeConfig, Parameter, PdoCo
 from legbench.errors import ConfigError
 
 HEARTBEATS_MISSED = 3
-"""So many periods of the master's heartbeat a drive waits (1016h)."""
+"""Number of periods without the master's heartbeat after which a drive stops (1016h)."""
 QUICK_STOP = 3
-"""6007h: what a drive does when the connection is lost."""
+"""Option code of 6007h that makes a drive quick-stop when the connection is lost."""
 EVERY_SYNC = 1
 """Transmission type: latched, or sampled, at every SYNC."""
 U8, U16, U32 = DataType.UNSIGNED8, DataType.UNSIGNED16, DataType.UNSIGNED32
 I8, I16, I32 = DataType.INTEGER8, DataType.INTEGER16, DataType.INTEGER32
 STOP_OPTIONS = ((0x605B, 1), (0x605C, 1), (0x605D, 2), (0x605E, 2))
-"""On a ramp unless the bus file says otherwise: 0 would let the leg drop."""
+"""Stop option codes that make a drive stop on a ramp, by object: 0 would let the leg drop."""
 OFFSETS = ((0x60B0, I32), (0x60B1, I32), (0x60B2, I16), (0x607E, U8))
-"""Added to every target, or turning its sign: what another program left there moves the motor."""
+"""Objects that offset every target or turn its sign, and their types: values left by another
+program would move the motor, so all are set to 0."""
 
 
 def interpolation_time(period_us: int) -> tuple[int, int]:
@@ -38,7 +39,7 @@ def interpolation_time(period_us: int) -> tuple[int, int]:
 
 
 def configuration(bus: BusConfig, node: NodeConfig) -> Iterator[Parameter]:
-    """Everything a drive is told in pre-operational, defaults included: nothing is assumed."""
+    """Return all objects that a drive is sent in pre-operational, default values included."""
     value, exponent = interpolation_time(bus.period_us)
     watched = bus.master_id << 16 | HEARTBEATS_MISSED * bus.master_heartbeat_ms
     yield _parameter(0x1005, 0, U32, SYNC_ID)  # bit 30 clear: the drive is no SYNC producer
@@ -79,7 +80,7 @@ def configuration(bus: BusConfig, node: NodeConfig) -> Iterator[Parameter]:
 
 
 def _pdo(comm: int, pdo: PdoConfig, cob: int) -> Iterator[Parameter]:
-    """Off, unmap, map, type, on: the order that CiA 301 (7.5.2.36) asks for."""
+    """Yield the objects of a PDO in CiA 301's order (7.5.2.36): off, unmap, map, type, on."""
     yield _parameter(comm, 1, U32, COB_INVALID | cob)
     yield _parameter(comm + 0x200, 0, U8, 0)
     for sub, entry in enumerate(pdo.objects, start=1):

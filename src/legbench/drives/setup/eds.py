@@ -14,7 +14,7 @@ MANUFACTURER = range(0x2000, 0x6000)
 VAR, ARRAY, RECORD = 0x7, 0x8, 0x9
 ARRAYS = (0x1003, 0x1016, 0x1029, 0x607D, 0x6099, 0x60E4)
 BAUD_RATES = (10, 20, 50, 125, 250, 500, 800, 1000)
-"""[kbit/s]"""
+"""Bitrates that an EDS names [kbit/s]."""
 
 
 def eds_text() -> str:

@@ -13,7 +13,7 @@ from legbench.errors import ConfigError
 from legbench.limits.safety import Range, SafetyLimits
 
 SLACK = 0.2
-"""So far beyond its range a motor may stand or run on, see `stopping.LONGEST_WAY` [rad]."""
+"""Distance beyond its range that a motor may reach, see `stopping.LONGEST_WAY` [rad]."""
 
 
 def check_field_ranges(
@@ -23,9 +23,9 @@ def check_field_ranges(
 
     Args:
         config: the bus.
-        limits: of the leg.
-        stops: where the links can be at all, one range a joint; that of the limits by default
-            [rad].
+        limits: limits of the leg.
+        stops: ranges that the mechanical stops leave the links, one a joint; by default those of
+            the limits [rad].
 
     Raises:
         ConfigError: a motor's or a link's position, or a temperature limit, lies beyond its object.
@@ -39,7 +39,7 @@ def check_field_ranges(
 
 
 def _check_motor(node: NodeConfig, motor: Range) -> None:
-    """6064h and 607Ah hold every position of the range without passing their seam."""
+    """Check that 6064h and 607Ah hold every position of the range without wrapping."""
     if not all(map(math.isfinite, motor)):
         return
     units = node.motor
@@ -55,7 +55,7 @@ def _check_motor(node: NodeConfig, motor: Range) -> None:
 
 
 def _check_link(node: NodeConfig, joint: Range) -> None:
-    """No two positions of a joint show the same count.
+    """Check that no two positions of a joint show the same count.
 
     The lap of a link is found from its motor's position. Where it is found wrongly, the link seems
     to be a whole lap away: outside its range, where no drive is enabled.
@@ -74,7 +74,7 @@ def _check_link(node: NodeConfig, joint: Range) -> None:
 
 
 def _check_temperature(node: NodeConfig, limit: float) -> None:
-    """The highest count of the object lies above the limit."""
+    """Check that the highest count of the temperature object lies above the limit."""
     entry, scale = node.temperature_object, node.temperature_scale
     if entry is None or not math.isfinite(limit):
         return

@@ -16,8 +16,11 @@ from legbench.errors import ConfigError
 from legbench.limits.upper_ends import MASTER_WATCH
 
 LONGEST_STOP_MS = 100.0
-"""Within it every drive stands; at the 2 rad/s of a move it has gone 0.2 rad by then, which the
-series springs take up, and at the 5 rad/s of a jump half of a joint's range [ms]."""
+"""Longest time from the last frame of the master to standstill of every drive [ms].
+
+A motor has gone 0.2 rad by then at the 2 rad/s of a move, which the series springs take up, and
+half of a joint's range at the 5 rad/s of a jump.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,15 +28,15 @@ class Means:
     """One way in which a drive notices that its master is gone."""
 
     name: str
-    """Object of the drive, in words."""
+    """Name of the object that makes the drive notice."""
     time_ms: float
-    """From the last frame of the master to the reaction of the drive, at most [ms]."""
+    """Longest time from the last frame of the master to the reaction of the drive [ms]."""
     ramp_ms: float
-    """From there to standstill, on the quick-stop ramp 6085h [ms]."""
+    """Time from the reaction to standstill, on the quick-stop ramp 6085h [ms]."""
 
     @property
     def stop_ms(self) -> float:
-        """From the last frame of the master to standstill [ms]."""
+        """Longest time from the last frame of the master to standstill [ms]."""
         return self.time_ms + self.ramp_ms
 
 

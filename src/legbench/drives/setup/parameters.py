@@ -16,7 +16,7 @@ class Parameter:
     kind: DataType
     value: int
     optional: bool = False
-    """Left out on a drive that has no such object."""
+    """Whether the object is left out on a drive that has no such object."""
 
     @property
     def key(self) -> Key:

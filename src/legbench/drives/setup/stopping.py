@@ -8,7 +8,7 @@ from legbench.limits.safety import SafetyLimits
 
 QUICK_STOP_DECELERATION = (0x6085, 0)
 LONGEST_WAY = 0.2
-"""The series springs take up so much without hurting anything [rad]."""
+"""Longest way of a quick stop [rad]: the series springs take up this deflection unharmed."""
 
 
 def stopping_way(node: NodeConfig, speed: float) -> float:

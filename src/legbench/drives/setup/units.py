@@ -7,9 +7,9 @@ from typing import final
 from legbench.errors import ConfigError
 
 MOST_COUNTS = 1 << 31
-"""Beyond what a position object of 32 bits holds."""
+"""First count beyond the range of a 32-bit position object [counts]."""
 LEAST_GEAR = 1e-4
-"""No reduction of a joint lies beyond, nor its inverse."""
+"""Smallest gear ratio of a joint [-]; the largest is its inverse."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,17 +21,17 @@ class AxisUnits:
     """
 
     counts_per_rev: int
-    """Per turn of the encoder's own shaft."""
+    """Number of counts for one turn of the encoder's own shaft."""
     gear: float = 1.0
     """Turns of the encoder's shaft for one turn of the axis."""
     sign: int = 1
-    """-1 for a mirrored axis."""
+    """Direction of counting: 1, or -1 for a mirrored axis."""
     offset_counts: int = 0
-    """What the encoder shows at angle 0."""
+    """Count that the encoder shows at angle 0."""
     bits: int = 32
-    """The position object wraps at 2^bits."""
+    """Length of the position object, which wraps at 2^bits [bits]."""
     counts_per_rad: float = field(init=False)
-    """Signed [counts/rad]."""
+    """Counts for one radian of the axis, negative for a mirrored one [counts/rad]."""
 
     def __post_init__(self) -> None:
         if not 0 < self.counts_per_rev <= MOST_COUNTS:
@@ -58,7 +58,7 @@ class AxisUnits:
 
     @property
     def resolution(self) -> float:
-        """One count [rad]."""
+        """Angle of one count [rad]."""
         return 1.0 / abs(self.counts_per_rad)
 
     def to_rad(self, counts: int) -> float:

@@ -8,15 +8,15 @@ from legbench.drives.setup.config import BusConfig
 from legbench.errors import ConfigError
 
 OVERHEAD_BITS = 47
-"""Frame with 11-bit identifier and no data, the three bits between frames included."""
+"""Length of a frame with 11-bit identifier and no data, interframe space included [bits]."""
 STUFFED_BITS = 34
-"""Of those, the bits that are subject to stuffing: start of frame to CRC sequence."""
+"""Part of `OVERHEAD_BITS` subject to stuffing: start of frame to CRC sequence [bits]."""
 EXTENDED_BITS = 20
-"""What a 29-bit identifier adds, all of it subject to stuffing."""
+"""Length that a 29-bit identifier adds to a frame, all of it subject to stuffing [bits]."""
 ERROR_BITS = 23
-"""Active error flag, echo of the others and delimiter, the worst but for passive nodes."""
+"""Longest error frame of active nodes: superposed flags, delimiter, intermission [bits]."""
 MAX_LOAD = 0.80
-"""A cyclic schedule that needs more of the wire has no room for emergencies and retries."""
+"""Largest bus load of the cyclic schedule, which leaves room for emergencies and retries [-]."""
 _CRC_POLYNOMIAL = 0x4599
 
 
@@ -74,13 +74,13 @@ class LoadEntry:
 
     what: str
     bits: int
-    """At worst stuffing."""
+    """Length of the frame at worst-case bit stuffing [bits]."""
     rate: float
-    """[1/s]"""
+    """Number of frames per second [1/s]."""
 
 
 def schedule(bus: BusConfig) -> tuple[LoadEntry, ...]:
-    """Everything that goes over the bus regularly, at its worst."""
+    """Return every frame that is sent regularly, with its worst length and rate."""
     rate = 1e6 / bus.period_us
     entries = [LoadEntry(what=f"SYNC {SYNC_ID:03X}h", bits=worst_bits(0), rate=rate)]
     for node in bus.nodes:
@@ -107,12 +107,12 @@ def schedule(bus: BusConfig) -> tuple[LoadEntry, ...]:
 
 
 def bus_load(bus: BusConfig) -> float:
-    """Worst share of the wire that the schedule takes."""
+    """Worst-case share of the bus's bitrate that the schedule takes [-]."""
     return sum(entry.bits * entry.rate for entry in schedule(bus)) / bus.bitrate
 
 
 def check_load(bus: BusConfig) -> float:
-    """The worst load, if the wire can carry it.
+    """Return the worst-case bus load, refusing one that the bus cannot carry.
 
     Raises:
         ConfigError: it is above 80 %.

@@ -17,7 +17,7 @@ Details = Callable[[str], str]
 
 
 def ask_ip(channel: str) -> str:
-    """Ask; nothing where there is no `ip`, or it fails."""
+    """Ask `ip` for an interface; an empty text where there is no `ip`, or it fails."""
     command = ("ip", "-json", "-details", "link", "show", channel)
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=ASK_S, check=False)
@@ -27,7 +27,7 @@ def ask_ip(channel: str) -> str:
 
 
 def bitrate_of(details: str) -> int | None:
-    """The bitrate that `ip` tells [bit/s]; none for interfaces without one, such as a vcan."""
+    """Bitrate that `ip` reports [bit/s]; none for interfaces without one, such as a vcan."""
     try:
         return int(json.loads(details)[0]["linkinfo"]["info_data"]["bittiming"]["bitrate"])
     except (ValueError, LookupError, TypeError):

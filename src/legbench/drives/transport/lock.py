@@ -28,11 +28,10 @@ CREDENTIALS = struct.Struct("3i")
 
 @final
 class ChannelLock:
-    """Held from the first `acquire` to the last `release`, or to the end of the process, by
-    whatever means.
+    """Lock of a channel, held from the first `acquire` to the last `release` or the process's end.
 
     Args:
-        name: of the channel, such as `socketcan can0`; `of_channel` makes one.
+        name: name of the channel, such as `socketcan can0`; `of_channel` makes one.
         scope: locks of different scopes do not meet; everybody on this computer shares the one
             that is used by default.
 
@@ -112,7 +111,7 @@ class ChannelLock:
 
     @property
     def held(self) -> bool:
-        """Whether it is held here."""
+        """Whether this object holds the lock."""
         return self._fd is not None
 
     def release(self) -> None:

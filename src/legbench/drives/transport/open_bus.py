@@ -16,17 +16,17 @@ from legbench.drives.transport.virtual_bus import VirtualBus
 
 SLCAN, SOCKETCAN = "slcan", "socketcan"
 TERMINALS = "/dev/pts/"
-"""Of pseudo terminals on Linux."""
+"""Path of the pseudo terminals on Linux."""
 SHARED = ("legbench", "legbench_unix", "socketcan", "socketcand", "udp_multicast", "virtual")
 """Interfaces that serve any number of programs; any other adapter serves one."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Adapter:
-    """Where a bus is reached."""
+    """Interface and channel through which a bus is reached."""
 
     interface: str
-    """python-can's name."""
+    """Name of the interface in python-can."""
     channel: str | None
 
     @property
@@ -38,7 +38,7 @@ class Adapter:
 def adapter_of(
     config: BusConfig, *, interface: str | None = None, channel: str | None = None
 ) -> Adapter:
-    """Flags go before the bus file, python-can's own configuration fills in; opens nothing.
+    """Choose the adapter by flags, then bus file, then python-can's configuration; opens nothing.
 
     Raises:
         BusError: nobody says which interface.
@@ -80,7 +80,7 @@ def open_bus(config: BusConfig, adapter: Adapter) -> can.BusABC:
 
 
 def _slcan(given: dict[str, object]) -> can.BusABC:
-    """Imported late: without pyserial python-can warns of it."""
+    """Open an slcan adapter; its module is imported late, as python-can warns without pyserial."""
     options: dict[str, Any] = {**load_config(config=given)}
     del options["interface"]
     if os.path.realpath(str(options["channel"])).startswith(TERMINALS):
@@ -101,7 +101,7 @@ def _named(interface: str, channel: str | None, error: Exception) -> BusError:
 
 
 LISTEN_NS = 600_000_000
-"""So long a bus is listened to before anything is sent to drives [ns].
+"""Time that a bus is listened to before anything is sent to drives [ns].
 
 A master that leads a leg sends SYNC and commands every few milliseconds. One that has only started,
 or stands still, is given away by its heartbeat: usual periods are 100 to 500 ms, and drives that
@@ -110,10 +110,10 @@ are to stop within 100 ms need one of 33 ms. 600 ms hold a whole period of the s
 
 
 def listening_ns(bus: can.BusABC) -> int:
-    """How long to listen for another master; not at all where nobody else is plugged in [ns]."""
+    """Time to listen for another master; 0 on a virtual bus without other participants [ns]."""
     return 0 if isinstance(bus, VirtualBus) and bus.alone else LISTEN_NS
 
 
 def timebase_of(bus: can.BusABC, spin_ns: int = 0) -> Timebase:
-    """Virtual time of an emulated bus, the machine's for all others."""
+    """Time base of a bus: virtual time of an emulated bus, the machine's clock for all others."""
     return bus.timebase if isinstance(bus, VirtualBus) else SystemTime(spin_ns)

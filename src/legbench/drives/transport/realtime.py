@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 PRIORITY = 80
-"""Of SCHED_FIFO: above everything that is not the kernel's own."""
+"""Priority under SCHED_FIFO, above every process that is not the kernel's own."""
 SPIN_NS = 100_000
 """Last part of every wait that is spent awake, where SCHED_FIFO is granted [ns]."""
 MCL_CURRENT, MCL_FUTURE, MCL_ONFAULT = 1, 2, 4
@@ -17,10 +17,10 @@ MCL_CURRENT, MCL_FUTURE, MCL_ONFAULT = 1, 2, 4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Granted:
-    """What was asked for and granted; none of it is necessary, all of it helps."""
+    """Real-time services asked for and granted by the system; none of them is required."""
 
     fifo: str
-    """SCHED_FIFO: `priority 80` or why not."""
+    """Result of asking for SCHED_FIFO, such as `priority 80` or the refusal."""
     mlockall: str
     affinity: str
     spin_us: int
@@ -31,11 +31,11 @@ class Granted:
 def ask(cpu: int | None = None, priority: int = PRIORITY) -> Granted:
     """Ask for real-time scheduling, locked memory and a processor of one's own.
 
-    Garbage is no longer collected. All of it stays so until the process ends.
+    Garbage collection is switched off as well. All of it stays so until the process ends.
 
     Args:
-        cpu: to stay on; none leaves the choice to the kernel.
-        priority: of SCHED_FIFO.
+        cpu: processor to stay on; none leaves the choice to the kernel.
+        priority: priority under SCHED_FIFO.
     """
     fifo, granted = _fifo(priority)
     gc.collect()
@@ -61,9 +61,9 @@ def _fifo(priority: int) -> tuple[str, bool]:
 
 
 def _lock_memory() -> str:
-    """Memory that is there is fetched now; what comes later stays once it is used.
+    """Lock present memory at once and later memory when it is first used; returns the result.
 
-    Without the second, an allocator that reserves a gigabyte in advance, as Arrow's does, would get
+    Without MCL_ONFAULT an allocator that reserves a gigabyte in advance, as Arrow's does, would get
     all of it, half a second later.
     """
     library = ctypes.CDLL(ctypes.util.find_library("c"), use_errno=True)

@@ -1,8 +1,9 @@
 """python-can's own `slcan`, with a `recv` that keeps its time and a `send` that never waits.
 
-There an acknowledgement ends a wait without a frame, a wait for nothing takes as long as the serial
-port's own time-out, and every byte costs two system calls: too much between two SYNCs. An adapter
-that takes nothing any more holds a writer up for ever: no stop would come, and no ^C.
+In python-can's version an acknowledgement ends a wait without a frame, a wait for nothing takes as
+long as the serial port's own time-out, and every byte costs two system calls: too much between two
+SYNCs. An adapter that takes nothing any more blocks a writer for ever: no stop would be sent, and
+no ^C would end it.
 """
 
 import os

@@ -128,7 +128,7 @@ class UnixBus(can.BusABC):
         return message, False
 
     def fileno(self) -> int:
-        """For `select`."""
+        """File descriptor of the socket, for `select`."""
         return self._socket.fileno()
 
     def shutdown(self) -> None:
