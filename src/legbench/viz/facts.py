@@ -1,4 +1,4 @@
-"""What a picture must know of a run besides its rows."""
+"""Facts of a run that pictures show besides its rows: description, model and results."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -41,7 +41,7 @@ class Facts:
 
 
 def facts_of(run: RunDescription) -> Facts:
-    """What pictures need of a run."""
+    """Return the facts of a run that pictures need."""
     return Facts(run=run)
 
 

@@ -28,7 +28,7 @@ class BusServer(Closing):
         self._pacer = Pacer(network, now_ns)
 
     def poll(self) -> None:
-        """Wait a moment for frames, move them and time on.
+        """Wait a moment for frames, pass them on and advance virtual time.
 
         Raises:
             BusError: the bus has failed.
@@ -45,7 +45,7 @@ class BusServer(Closing):
             raise BusError(f"{self._bus.channel_info}: {error}") from error
 
     def _receive(self, timeout: float) -> can.Message | None:
-        """The next frame; an interface that is taken down is a cable pulled, it may come back."""
+        """Receive the next frame; an interface that is down counts as an unplugged cable."""
         try:
             return self._bus.recv(timeout)
         except can.CanOperationError as error:

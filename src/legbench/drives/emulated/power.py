@@ -18,7 +18,7 @@ _WORDS = {
 }
 """Low byte of the statusword, voltage enabled (bit 4) with the main supply."""
 STAY_IN_QUICK_STOP = 5
-"""605Ah from here on stays in quick stop active."""
+"""Lowest value of 605Ah with which a drive stays in quick stop active."""
 HALT = 1 << 8
 POWERED = (_S.OPERATION_ENABLED, _S.QUICK_STOP_ACTIVE, _S.FAULT_REACTION_ACTIVE)
 """States in which the motor holds or stops a load."""
@@ -29,7 +29,7 @@ class PowerStage:
     """State and pending stop of one drive.
 
     Attributes:
-        state: of the machine.
+        state: state of the machine.
         stopping: option code of the stop that runs, none if none does; 0 drops the motor at
             once, 1 is the slow-down ramp, 2 the quick-stop ramp, 3 and 4 the fastest possible.
     """
@@ -47,11 +47,11 @@ class PowerStage:
         return _WORDS[self.state]
 
     def boot(self) -> None:
-        """Self-test done (transition 1)."""
+        """Enter switch on disabled after the self-test (transition 1)."""
         self._enter(DriveState.SWITCH_ON_DISABLED)
 
     def command(self, controlword: int, *, cause_gone: bool) -> bool:
-        """Obey 6040h; whether a fault was reset."""
+        """Obey a controlword (6040h); returns whether a fault was reset."""
         before, self._before = self._before, controlword
         if self.state is DriveState.FAULT:
             edge = controlword & 0x80 and not before & 0x80
@@ -144,7 +144,7 @@ class PowerStage:
             self.quick_stop()
 
     def stopped(self) -> None:
-        """The ramp of a stop has ended."""
+        """Enter the state that follows a stop, at the end of its ramp."""
         after, self._after = self._after, None
         if after is not None:
             self._enter(after)

@@ -35,9 +35,9 @@ class ProcessData:
     """All PDOs of a drive.
 
     Attributes:
-        rpdos: those that exist, by COB-ID.
-        tpdos: those that exist, in order.
-        repeats: every TPDO repeats itself to the bit.
+        rpdos: RPDOs that exist, by COB-ID.
+        tpdos: TPDOs that exist, in order.
+        repeats: whether every TPDO repeats itself bit for bit.
     """
 
     def __init__(self, store: ObjectStore) -> None:

@@ -52,7 +52,7 @@ class UnixServer(Closing):
                 path.unlink()
 
     def poll(self) -> None:
-        """Wait a moment for frames, move them and time on."""
+        """Wait a moment for frames, pass them on and advance virtual time."""
         ready, _, _ = select.select([self._listener, *self._stations], [], [], self._pacer.wait_s())
         self._pacer.advance()
         for one in ready:

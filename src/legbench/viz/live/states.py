@@ -1,4 +1,4 @@
-"""What foot and controller are doing, as coloured lanes over time."""
+"""States of foot and controller, as coloured lanes over time."""
 
 from collections.abc import Mapping
 from typing import final

@@ -16,15 +16,15 @@ from legbench.synthesis.manufacture import shown
 from legbench.synthesis.trace import Trace
 
 PAGE = (297.0, 210.0)
-"""A4, lying [mm]."""
+"""Width and height of the page, A4 landscape [mm]."""
 LEG_SPACE = 150.0
 """Height on the page that the leg may take [mm]."""
 SCALES = (1.0, 2.0, 5.0, 10.0, 20.0)
-"""1 : n."""
+"""Scales 1 : n to choose from, by their n."""
 HIP = (62.0, 182.0)
-"""Where the leg hangs on the page [mm]."""
+"""Position of the leg's hip on the page [mm]."""
 SEGMENTS_AT = (134.0, 192.0, 250.0)
-"""Where the single segments hang [mm]."""
+"""Horizontal positions of the single segments on the page [mm]."""
 SEGMENTS_TOP = 160.0
 BODY = 7.0
 """Width of a segment on the page [mm]."""
@@ -38,7 +38,7 @@ LINES = ("#4269d0", "#e06c3c", "#3ca951", "#a463b8", "#8a6d3b", "#d04f86", "#3aa
 
 
 class Panel(Protocol):
-    """What is needed of a matplotlib Axes."""
+    """Protocol of the methods of a matplotlib Axes that a page needs."""
 
     def plot(self, *args: Any, **kwargs: Any) -> Any:
         """Lines."""
