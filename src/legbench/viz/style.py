@@ -74,7 +74,7 @@ _VIRIDIS = np.array(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AxisTitle:
-    """What one axis shows: plain text for the viewer, mathematics for print."""
+    """Title of one axis: plain text for the viewer, mathematics for print."""
 
     text: str
     math: str

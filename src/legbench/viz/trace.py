@@ -26,7 +26,7 @@ RATE_SHARE = 0.05
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TracedRows:
-    """Some rows with what pictures derive from them."""
+    """Rows of a run with the values that pictures derive from them."""
 
     rows: Recorded
     time: Floats

@@ -24,7 +24,7 @@ _STATUS = int(StatusBit.REMOTE)
 
 @final
 class Axis:
-    """One motor with its two encoders, as the object dictionary shows them.
+    """Emulated motor with its two encoders, as the object dictionary shows them.
 
     Attributes:
         power: the state machine.

@@ -65,14 +65,14 @@ class BusServer(Closing):
         try:
             self.network.send(self._station, frame)
         except BusError:
-            # As on a real bus: a full queue or bus-off loses the frame.
+            # A full queue or bus-off loses the frame, as on a real bus.
             return
 
     def _give(self) -> None:
         while self._station.received:
             _, frame = self._station.received.popleft()
             if not frame.error:
-                # As on a real bus: a full queue or a pulled cable loses the frame.
+                # A full queue or an unplugged cable loses the frame, as on a real bus.
                 with suppress(can.CanOperationError):
                     self._bus.send(
                         can.Message(

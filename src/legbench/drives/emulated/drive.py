@@ -44,7 +44,7 @@ _ORDERS = {
 
 @final
 class EmulatedDrive:
-    """One node on the bus.
+    """Emulated drive with one node id on the bus.
 
     Attributes:
         node_id: its address.

@@ -272,7 +272,7 @@ class Network:
         if isinstance(sender, Station):
             sender.waiting -= 1
         if sender is self._injector:
-            # Nobody hears a copy of what it has sent itself.
+            # No node receives a copy of its own frames.
             self._deliver(self._copied.pop(sequence, sender), frame)
             return
         for delay_ns, changed in self._injector.fate(frame, self.now_ns):

@@ -28,6 +28,6 @@ class Pacer:
         network.advance(now_ns)
 
     def wait_s(self) -> float:
-        """How long nothing happens on the network by itself [s]."""
+        """Time until the next event of the network [s]."""
         at_ns, _ = self._network._next()
         return max(0.0, 1e-9 * (at_ns + self._offset_ns - self._now_ns()))

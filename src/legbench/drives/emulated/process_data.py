@@ -16,7 +16,7 @@ _EVENT_TYPES = (254, 255)
 
 @final
 class Pdo:
-    """One PDO as its objects say."""
+    """Process data object (PDO) as its communication and mapping objects describe it."""
 
     def __init__(self, cob_id: int, kind: int, timer_ms: int, layout: PdoMap) -> None:
         self.cob_id, self.kind, self.layout = cob_id, kind, layout
@@ -32,7 +32,7 @@ class Pdo:
 
 @final
 class ProcessData:
-    """All PDOs of a drive.
+    """Process data objects (PDOs) of a drive.
 
     Attributes:
         rpdos: RPDOs that exist, by COB-ID.

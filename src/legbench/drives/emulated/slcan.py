@@ -57,7 +57,7 @@ class SlcanAdapter:
         station, lines = self._station, b""
         while station is not None and station.received:
             _, frame = station.received.popleft()
-            # An error frame has no line; `F` tells of it.
+            # An error frame has no line; the flags of `F` report it.
             if not frame.error:
                 lines += format_frame(frame)
         return lines

@@ -55,8 +55,8 @@ class SlcanServer(Closing):
             self._ours, self._theirs = os.openpty()
         except OSError as error:
             raise BusError(f"no pseudo terminal: {error.strerror}") from None
-        # Raw before anybody opens it: an echo would come back as frames. Our hold of the other
-        # end keeps the terminal when a program closes it.
+        # The terminal is raw before it is opened: an echo would come back as frames. This
+        # process holds the other end, too, so the terminal stays when a program closes it.
         tty.setraw(self._theirs)
         os.set_blocking(self._ours, False)
         self.path = os.ttyname(self._theirs)

@@ -29,7 +29,7 @@ class Port:
         bus: the interface, for callers that need the driver itself.
         listener: sees every frame, if there is one.
         listener_error: what the listener raised, in one line; it is not called any more.
-        error_frames: heard so far.
+        error_frames: number of error frames received so far.
         may_send: asked before every frame, where not all may go out.
     """
 

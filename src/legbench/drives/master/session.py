@@ -148,8 +148,8 @@ class Session(Closing):
             try:
                 self.bus.shutdown()
             except BaseException as error:
-                # The drives have been told to stop; the interface itself is beyond help, whatever
-                # it raises: a serial adapter has a ValueError for a garbled line.
+                # The drives have been told to stop; no error of the interface may end the closing:
+                # a serial adapter raises a ValueError for a garbled line.
                 shield.hold(error)
             self._lock.release()
 

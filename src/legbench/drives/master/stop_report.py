@@ -43,7 +43,7 @@ class StopReport:
         return "; ".join(parts) or None
 
     def after(self, earlier: "StopReport | None") -> "StopReport":
-        """Return this report of a repeated stop, with cut-off drives and errors of the earlier one."""
+        """Return this report of a repeated stop, joined with what the earlier one had to tell."""
         if earlier is None:
             return self
         return replace(
@@ -54,7 +54,7 @@ class StopReport:
 
 
 class Lead(Closing):
-    """Whoever may give drives power, and takes it away when its `with` ends.
+    """Base class of whatever gives drives power, and takes it away when its `with` ends.
 
     Attributes:
         stopped: how its last stop has ended; none if it never had to stop anything.

@@ -35,7 +35,7 @@ MEANINGS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Emergency:
-    """What a node reports once when an error comes, and with code 0 when all have gone."""
+    """Emergency message of a node, sent once when an error comes; code 0 says all have gone."""
 
     node_id: int
     code: int

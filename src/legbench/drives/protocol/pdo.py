@@ -13,7 +13,7 @@ MAX_BYTES = 8
 
 @dataclass(frozen=True, slots=True)
 class Mapped:
-    """One object in a PDO.
+    """Object that is mapped into a PDO.
 
     Raises:
         CodecError: a type of variable length.

@@ -32,7 +32,7 @@ class SlcanBus(slcanBus):
         """Open it; raises as python-can's does."""
         self._partial, self._unsent = b"", b""
         self._lines: deque[bytes] = deque()
-        self._is_shutdown = True  # One that does not open has nothing to be shut down.
+        self._is_shutdown = True  # A bus that fails to open has nothing to shut down.
         super().__init__(channel, **options)
         self._is_shutdown = False
         self.serialPortOrig.write_timeout = CLOSING_S

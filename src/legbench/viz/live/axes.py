@@ -33,7 +33,7 @@ class PlotSpec:
     equal: bool = False
     """Whether one unit is as long on both axes."""
     through: tuple[float, float] | None = None
-    """Point of the modal lines w1 and w2; none: no lines."""
+    """Point that the modal lines w1 and w2 pass; none draws no lines."""
     margin: float = 0.06
     """Free room around the data, as a share of their range."""
     least: tuple[float, float] = (0.0, 0.0)

@@ -1,4 +1,4 @@
-"""How the viewer lays out what `publish` logs."""
+"""Layout of the viewer for what `publish` logs."""
 
 from collections.abc import Sequence
 

@@ -41,27 +41,27 @@ class Panel(Protocol):
     """Protocol of the methods of a matplotlib Axes that a page needs."""
 
     def plot(self, *args: Any, **kwargs: Any) -> Any:
-        """Lines."""
+        """Draw lines."""
         ...
 
     def fill(self, *args: Any, **kwargs: Any) -> Any:
-        """Polygons."""
+        """Draw polygons."""
         ...
 
     def text(self, x: float, y: float, s: str, **kwargs: Any) -> Any:
-        """Words."""
+        """Write text."""
         ...
 
     def annotate(self, text: str, xy: tuple[float, float], **kwargs: Any) -> Any:
-        """Arrows."""
+        """Draw arrows and their labels."""
         ...
 
     def set(self, **kwargs: Any) -> Any:
-        """Limits and labels."""
+        """Set limits and labels."""
         ...
 
     def set_axis_off(self) -> None:
-        """No frame."""
+        """Hide the frame."""
         ...
 
 
@@ -170,7 +170,7 @@ def _draw_words(panel: Panel, design: LegDesign, half_angle: float, scale: float
 
 
 def _draw_body(panel: Panel, start: Floats, end: Floats, shade: tuple[float, ...]) -> None:
-    """A bar with round ends."""
+    """Draw a segment as a bar with round ends."""
     along = (end - start) / np.linalg.norm(end - start)
     angle = np.arctan2(along[1], along[0])
     turn = np.linspace(0.5 * np.pi, 1.5 * np.pi, 24)
@@ -191,7 +191,7 @@ def _draw_circle(panel: Panel, centre: Floats, radius: float, colour: Any) -> No
 
 
 def _draw_com(panel: Panel, centre: Floats, radius: float, colour: tuple[float, ...]) -> None:
-    """The quartered disc."""
+    """Draw the quartered disc that marks a centre of mass."""
     _draw_circle(panel, centre, radius, "white")
     for begin in (0.0, np.pi):
         turn = np.linspace(begin, begin + 0.5 * np.pi, 14)
@@ -205,7 +205,7 @@ def _draw_com(panel: Panel, centre: Floats, radius: float, colour: tuple[float, 
 def _draw_dimension(
     panel: Panel, x: float, top: float, bottom: float, words: str, *, left: bool = False
 ) -> None:
-    """A vertical dimension line with its number beside it."""
+    """Draw a vertical dimension line with its number beside it."""
     arrow = {"arrowstyle": "<->", "color": THIN, "linewidth": 0.7, "shrinkA": 0.0, "shrinkB": 0.0}
     for y in (top, bottom):
         panel.plot([x - 1.5, x + 1.5], [y, y], color=THIN, linewidth=0.7)

@@ -29,7 +29,7 @@ DIFFERENCES = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Look:
-    """How another run is drawn."""
+    """Colour and dashes in which another run is drawn."""
 
     colour: tuple[float, float, float]
     dashes: Dashes
@@ -44,7 +44,7 @@ LOOKS = (
 
 
 def look_of(place: int) -> Look:
-    """How the other run at a place in the order given is drawn."""
+    """Look of the other run at a place in the order given."""
     return LOOKS[place % len(LOOKS)]
 
 
