@@ -22,7 +22,7 @@ class BusServer(Closing):
     def __init__(
         self, network: Network, bus: can.BusABC, now_ns: Callable[[], int] = time.monotonic_ns
     ) -> None:
-        """Plug in; the bus is closed with this."""
+        """Attach to a network and a bus, which closes together with this server."""
         self.network, self._bus = network, bus
         self._station = network.attach()
         self._pacer = Pacer(network, now_ns)
@@ -84,5 +84,5 @@ class BusServer(Closing):
                     )
 
     def close(self) -> None:
-        """Unplug; may be called twice."""
+        """Close the bus; may be called twice."""
         self._bus.shutdown()

@@ -15,7 +15,7 @@ START = 1 << 4
 
 
 class HomingState(Enum):
-    """Bits 10, 12 and 13 of 6041h."""
+    """States of homing, shown by bits 10, 12 and 13 of the statusword (6041h)."""
 
     IDLE = auto()
     SEARCHING = auto()
@@ -26,7 +26,7 @@ class HomingState(Enum):
 
 @final
 class Homing:
-    """One run of a homing method."""
+    """Homing run of an emulated motor."""
 
     def __init__(self, values: dict[Key, int], counts_per_rev: int) -> None:
         self._values, self._per_rev = values, counts_per_rev

@@ -43,7 +43,7 @@ class PowerStage:
 
     @property
     def low_byte(self) -> int:
-        """Bits 0 to 6 of 6041h."""
+        """Bits 0 to 6 of the statusword (6041h)."""
         return _WORDS[self.state]
 
     def boot(self) -> None:
@@ -105,7 +105,7 @@ class PowerStage:
             self.stopping = self._after = None
 
     def quick_stop(self) -> None:
-        """Stop as 605Ah says (transition 11)."""
+        """Start the stop that the quick stop option code 605Ah selects (transition 11)."""
         if self.state is not DriveState.OPERATION_ENABLED:
             return
         option = self._values[0x605A, 0]
@@ -117,7 +117,7 @@ class PowerStage:
         self._after = None if option >= STAY_IN_QUICK_STOP else _S.SWITCH_ON_DISABLED
 
     def fault(self) -> None:
-        """React as 605Eh says (transition 13)."""
+        """Start the stop that the fault reaction option code 605Eh selects (transition 13)."""
         if self.state in (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE):
             return
         moving = self.state in POWERED
@@ -134,7 +134,7 @@ class PowerStage:
             self._enter(_S.SWITCH_ON_DISABLED)
 
     def connection_lost(self) -> None:
-        """React as 6007h says."""
+        """Start the reaction to a lost connection that 6007h selects."""
         option = self._values[0x6007, 0]
         if option == 1:
             self.fault()

@@ -39,7 +39,7 @@ class Encoder:
         self._ailment, self._size, self._offset = ailment, size, 0.0
 
     def tick(self, step_ns: int) -> None:
-        """Let time pass [ns]."""
+        """Advance the time of the fault [ns]."""
         if self._ailment is Ailment.DRIFT:
             self._offset += self._size * step_ns / SECOND_NS
         elif self._ailment is Ailment.STEP:
@@ -67,6 +67,6 @@ class Sensors:
         self.link = Encoder(node.link.counts_per_rad)
 
     def tick(self, step_ns: int) -> None:
-        """Let time pass [ns]."""
+        """Advance the time of the fault [ns]."""
         self.motor.tick(step_ns)
         self.link.tick(step_ns)

@@ -74,7 +74,7 @@ class AxisLink:
 
     @property
     def rpdo_ids(self) -> tuple[int, ...]:
-        """COB-IDs of its commands."""
+        """COB-IDs of the drive's RPDOs, which carry its commands."""
         return tuple(cob_id for cob_id, _ in self._rpdos)
 
     @property
@@ -133,7 +133,7 @@ class AxisLink:
 
     @property
     def state_text(self) -> str:
-        """State in words."""
+        """State of the drive in words."""
         state = decode_state(self.statusword)
         return "unknown state" if state is None else state.value
 

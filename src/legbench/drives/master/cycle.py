@@ -60,7 +60,7 @@ class Cycle:
         error_frames: number of error frames received so far.
         late_frames: process data that came after its deadline.
         silent_total: ticks that were left out to find late answers.
-        notices: what a run has to tell though it ends nothing.
+        notices: irregularities that end no run.
         stopping: whether a stop is under way, for which SYNC goes out at every tick.
     """
 
@@ -111,7 +111,7 @@ class Cycle:
         self.arm()
 
     def arm(self) -> None:
-        """Watch from now on, whatever was before."""
+        """Start the watches anew, clearing what they have counted."""
         now_ns = self._port.timebase.now_ns()
         for watch in self.watches:
             watch.arm(now_ns)

@@ -73,9 +73,9 @@ class Link(Lead):
     Attributes:
         state: state of the link.
         fault: first fault, which ended the link.
-        stopped: how the stop of the drives has ended, none before it.
+        stopped: report of the stop of the drives, none before it.
         skipped_total: ticks without SYNC since the start.
-        not_parked: what `close` failed to switch off, see `master.parking`.
+        not_parked: command frames that `close` failed to switch off, see `master.parking`.
         listening: read-only, and another master sends SYNC: this one sends nothing.
     """
 
@@ -101,7 +101,7 @@ class Link(Lead):
             timebase: time base of the link; by default the bus's.
             listener: sees every frame, such as a `BusLog`.
             read_only: observe; change nothing in a drive, see `master.read_only`.
-            lock: taken by `open`; by default one for the bus's channel.
+            lock: lock that `open` takes; by default one for the bus's channel.
 
         Raises:
             ConfigError: the bus cannot carry the schedule.

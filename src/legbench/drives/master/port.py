@@ -28,9 +28,9 @@ class Port:
         timebase: time base of the bus.
         bus: the interface, for callers that need the driver itself.
         listener: sees every frame, if there is one.
-        listener_error: what the listener raised, in one line; it is not called any more.
+        listener_error: error that the listener raised, in one line; it is not called any more.
         error_frames: number of error frames received so far.
-        may_send: asked before every frame, where not all may go out.
+        may_send: filter of the frames that may be sent; none if all may.
     """
 
     def __init__(

@@ -50,7 +50,7 @@ class SdoStop:
         Args:
             port: to the bus.
             nodes: the drives.
-            hold: told what was raised, such as `Shield.hold`.
+            hold: called with what was raised, such as `Shield.hold`.
             beat: this master's heartbeat, if drives watch for it.
             rest_ns: pause between two rounds of reading all statuswords [ns].
         """
@@ -152,8 +152,8 @@ def leave_operational(
         order: sends the order to all drives, such as `BringUp.pre_operational`.
         port: to the bus.
         nodes: all drives.
-        stopped: how their stop has ended, none if none was needed.
-        hold: told what was raised, such as `Shield.hold`.
+        stopped: report of their stop, none if none was needed.
+        hold: called with what was raised, such as `Shield.hold`.
 
     Returns:
         How the stop has ended now; none if it was not repeated.

@@ -29,7 +29,7 @@ class Session(Closing):
 
     Attributes:
         bus: the interface.
-        config: what hangs on it.
+        config: drives on the bus.
         log: raw frames since `log_to`.
     """
 

@@ -78,7 +78,7 @@ class StartUp:
         self._cycle.send(words)
 
     def faulted(self) -> list[AxisLink]:
-        """Drives in fault."""
+        """Return the drives in fault."""
         return [
             axis for axis in self._cycle.axes if decode_state(axis.statusword) is DriveState.FAULT
         ]

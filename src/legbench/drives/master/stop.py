@@ -32,8 +32,8 @@ class StopLadder:
         """Prepare to stop the drives of a cycle.
 
         Args:
-            cycle: led from now on by this alone.
-            hold: told what was raised, such as `Shield.hold`.
+            cycle: cycle of the drives, which this stop alone leads from now on.
+            hold: called with what was raised, such as `Shield.hold`.
         """
         self._cycle, self._hold = cycle, hold
         self._cut_off: list[str] = []

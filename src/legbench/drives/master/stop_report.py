@@ -57,7 +57,7 @@ class Lead(Closing):
     """Base class of whatever gives drives power, and takes it away when its `with` ends.
 
     Attributes:
-        stopped: how its last stop has ended; none if it never had to stop anything.
+        stopped: report of its last stop; none if it never had to stop anything.
     """
 
     stopped: StopReport | None = None

@@ -29,7 +29,7 @@ class Mapped:
 
     @property
     def bits(self) -> int:
-        """Length [bits]."""
+        """Length of the object [bits]."""
         return 8 * (size_of(self.kind) or 0)
 
     @property

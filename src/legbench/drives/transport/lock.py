@@ -36,7 +36,7 @@ class ChannelLock:
             that is used by default.
 
     Attributes:
-        address: what is bound; two locks of one address exclude each other.
+        address: socket address that is bound; two locks of one address exclude each other.
     """
 
     def __init__(self, name: str, scope: Path | None = None) -> None:

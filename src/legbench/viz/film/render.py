@@ -43,7 +43,7 @@ def render(
         recording: the run, whose folder holds its model.
         path: file to write; an older one is replaced when the new one is whole.
         time: instant to draw, for a .png of a single one [s].
-        progress: told after each frame.
+        progress: called after each frame.
 
     Raises:
         ConfigError: another suffix, or a `time` that is outside the run or not for a .png.

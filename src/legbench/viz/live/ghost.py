@@ -77,7 +77,7 @@ class Ghost:
         self.trace = Tracer(other.facts).extend(other.recording)
 
     def push(self) -> None:
-        """Add the whole run."""
+        """Add all rows of the run."""
         self._push_joints()
         self._push_leg()
 

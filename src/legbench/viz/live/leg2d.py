@@ -38,7 +38,7 @@ def bar_points(joint: Floats, lengths: tuple[float, float, float], arm: float) -
 
 @final
 class Leg2D:
-    """Publishes the stick figure."""
+    """Publisher of the leg's stick figure."""
 
     def __init__(self, stream: rr.RecordingStream, facts: Facts) -> None:
         self._stream = stream

@@ -56,7 +56,7 @@ class Tail:
         return batches
 
     def close(self) -> None:
-        """Let the file go."""
+        """Close the file of the stream."""
         self._file.close()
 
 
