@@ -1,4 +1,4 @@
-"""What drives and buses refuse, below the common error tree."""
+"""Errors of drives and buses, part of the common error tree."""
 
 from legbench.errors import LegbenchError
 

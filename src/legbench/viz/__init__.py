@@ -1,1 +1,1 @@
-"""From a recording to pictures; what the viewer, print and film share lies here."""
+"""Pictures of recordings: what the viewer, print figures and films share."""

@@ -1,4 +1,4 @@
-"""Which rows of a run a figure shows, in which colour: by period, or by stance and flight."""
+"""Colouring of a run's rows in a figure: by period, or by stance and flight."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -26,14 +26,14 @@ class ColouredRows:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Colouring:
-    """What a figure's lines show."""
+    """Colours of a figure's lines, and their meaning."""
 
     stretches: tuple[ColouredRows, ...]
     """Highlighted rows in order."""
     periods: int = 0
-    """How many periods the colours count; zero for stance and flight."""
+    """Number of periods that the colours count; zero for stance and flight."""
     ratings: str = ""
-    """P^r in words."""
+    """Ratings P^r in words."""
 
 
 def colouring_of(recording: Recorded) -> Colouring:

@@ -11,14 +11,14 @@ from legbench.recording.files import put_in_place
 
 @contextmanager
 def draft_of(path: Path) -> Iterator[Path]:
-    """Give a file to write in `path`'s place, with its suffix; put it there when all went well.
+    """Yield a draft file with `path`'s suffix, which replaces `path` if no exception is raised.
 
     Raises:
         RecordingError: nothing can be written there.
     """
     draft = path.with_name(f".{path.stem}.draft{path.suffix}")
     try:
-        # Made anew: whatever lies there, such as a link, is not written through.
+        # The draft is made anew: whatever lies there, such as a link, is not written through.
         draft.unlink(missing_ok=True)
         draft.touch(exist_ok=False)
     except OSError as error:

@@ -1,4 +1,4 @@
-"""What a picture must know of a run besides its rows."""
+"""Facts of a run that pictures show besides its rows: description, model and results."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,7 +15,7 @@ from legbench.recording.description import RunDescription
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Facts:
-    """What pictures say of a run: its description, and the model that it keeps."""
+    """Facts of a run that pictures show: its description, and the model that it keeps."""
 
     run: RunDescription
 
@@ -36,12 +36,12 @@ class Facts:
         values = (("z2", run.z2), ("dz2", run.dz2))
         settings = [f"{name} = {value:g}" for name, value in values if value is not None]
         words = [run.design.name, run.setup.kind.value, run.controller, ", ".join(settings)]
-        # A word that stands for two of them, the jump, is said once.
+        # A word that is both setup and controller, the jump, is named once.
         return " · ".join(filter(None, dict.fromkeys(words)))
 
 
 def facts_of(run: RunDescription) -> Facts:
-    """What pictures need of a run."""
+    """Return the facts of a run that pictures need."""
     return Facts(run=run)
 
 

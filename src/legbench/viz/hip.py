@@ -1,4 +1,4 @@
-"""Where the hip of a recorded leg is."""
+"""Position of the hip of a recorded leg."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ GROUNDED = (SetupKind.JUMP, SetupKind.FFS)
 
 
 def hip_of(rows: Recorded, facts: Facts) -> Floats:
-    """Hip in the plane of motion (n, 2) [m]: as recorded, else as the setup holds it."""
+    """Hip positions in the plane of motion (n, 2) [m]: as recorded, else as the setup holds it."""
     hip = rows["trunk_pos"]
     if np.isfinite(hip).all():
         return hip

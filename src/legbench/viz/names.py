@@ -1,4 +1,4 @@
-"""What runs shown together are called."""
+"""Names of runs that are shown together."""
 
 from collections.abc import Sequence
 
@@ -6,7 +6,7 @@ from legbench.metrics.source import Recorded
 
 
 def names_of(runs: Sequence[Recorded]) -> list[str]:
-    """Plant, linkage and design of each run; its folder, too, where that names several."""
+    """Name of each run: plant, linkage and design, with the folder where several share these."""
     names = [run.description.title for run in runs]
     return [
         name if names.count(name) == 1 else " ".join([name, run.path.name])

@@ -1,4 +1,4 @@
-"""From joint angles to poses of a run's own MuJoCo model."""
+"""Poses of a run's own MuJoCo model from recorded joint angles."""
 
 from typing import final
 
@@ -21,13 +21,13 @@ class Puppet:
         }
 
     def hip(self, recorded: Floats) -> Floats:
-        """Where the model's hip will be (n, 2) [m]: where a trunk that cannot move is fixed."""
+        """Hip path (n, 2) that the model can take [m]: constant if its trunk is fixed."""
         if any(name in self._places for name in ("trunk_x", "boom_yaw")):
             return recorded
         return np.tile(self.model.body("trunk").pos[[0, 2]], (len(recorded), 1))
 
     def positions(self, hip: Floats, joint: Floats) -> Floats:
-        """MuJoCo's qpos (n, nq) of a hip path and joint angles, each (n, 2) [m], [rad]."""
+        """MuJoCo's qpos (n, nq) for a hip path [m] and joint angles [rad], each (n, 2)."""
         knee = joint[:, 1] - joint[:, 0]
         angles = {
             "hip": joint[:, 0],
@@ -50,7 +50,7 @@ class Puppet:
         mujoco.mj_kinematics(self.model, self.data)
 
     def _trunk(self, hip: Floats) -> dict[str, Floats]:
-        """The trunk's joints that put the hip there, on slides or on a boom."""
+        """Joint values, by name, that put the trunk's hip there, on slides or on a boom."""
         shift = hip - self.model.body("trunk").pos[[0, 2]]
         if "boom_yaw" not in self._places:
             return {"trunk_x": shift[:, 0], "trunk_z": shift[:, 1]}

@@ -15,19 +15,19 @@ Colours = NDArray[np.uint8]
 STANCE: Rgb = (226, 88, 60)
 FLIGHT: Rgb = (66, 133, 244)
 MODE_1: Rgb = (230, 159, 0)
-"""Polar mode w1."""
+"""Colour of the polar mode w1."""
 MODE_2: Rgb = (0, 172, 193)
-"""Radial mode w2."""
+"""Colour of the radial mode w2."""
 FIRST: Rgb = (232, 110, 80)
-"""Component 1 of a series: q1, tau1."""
+"""Colour of component 1 of a series, such as q1 or tau1."""
 SECOND: Rgb = (74, 144, 226)
 FIRST_FAINT: Rgb = (150, 92, 78)
-"""What component 1 was asked to be."""
+"""Colour of the desired value of component 1 of a series."""
 SECOND_FAINT: Rgb = (74, 104, 142)
 ACCENT: Rgb = (124, 179, 66)
 FORCE: Rgb = (240, 180, 40)
 GREY: Rgb = (128, 128, 128)
-"""Readable on the viewer's dark and light themes alike."""
+"""Grey that is readable on the viewer's dark and light themes."""
 SEGMENT: Rgb = (150, 152, 160)
 TRUNK: Rgb = (52, 104, 172)
 BAR_GREEN: Rgb = (67, 160, 88)
@@ -39,7 +39,7 @@ PHASES: dict[Role, tuple[Rgb, ...]] = {
     Role.STANCE: ((236, 140, 96), (178, 60, 84), (0, 150, 136), STANCE),
     Role.FLIGHT: ((142, 108, 190), FLIGHT, (110, 170, 250), (84, 96, 200)),
 }
-"""Colours of what the controller does, by what that means for the leg."""
+"""Colours of a controller's phases, by their role for the leg."""
 
 UNDECLARED: Rgb = (70, 70, 76)
 """Colour of a phase that no controller has declared."""
@@ -74,7 +74,7 @@ _VIRIDIS = np.array(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AxisTitle:
-    """What one axis shows: plain text for the viewer, mathematics for print."""
+    """Title of one axis: plain text for the viewer, mathematics for print."""
 
     text: str
     math: str
@@ -136,12 +136,12 @@ def colours_by_code(phases: Sequence[PhaseInfo], codes: Ints) -> Colours:
 
 
 def packed(colour: Rgb) -> int:
-    """0xRRGGBBAA, as rerun's state configuration wants it."""
+    """Colour as 0xRRGGBBAA, as rerun's state configuration requires it."""
     red, green, blue = colour
     return red << 24 | green << 16 | blue << 8 | 0xFF
 
 
 def unit(colour: Rgb) -> tuple[float, float, float]:
-    """The colour as matplotlib wants it."""
+    """Colour as three numbers in [0, 1], as matplotlib requires it."""
     red, green, blue = colour
     return (red / 255.0, green / 255.0, blue / 255.0)

@@ -1,4 +1,4 @@
-"""Where an axis gets its ticks and what stands there."""
+"""Ticks of an axis and their labels."""
 
 import math
 from itertools import pairwise
@@ -22,7 +22,7 @@ def ticks(low: float, high: float, count: int = 5) -> list[float]:
 
 
 def tick_labels(values: list[float]) -> list[str]:
-    """The values with as many decimals as tell them apart, none of them a negative zero."""
+    """Labels of the values, with as many decimals as tell them apart and no negative zero."""
     spacing = min((b - a for a, b in pairwise(values)), default=1.0)
     decimals = 0
     while decimals < 9 and abs(round(spacing, decimals) - spacing) > 1e-6 * spacing:

@@ -1,4 +1,4 @@
-"""Rows as a picture needs them: coordinates, period numbers, stance or flight.
+"""Quantities of a run's rows that pictures show: coordinates, period numbers, stance.
 
 Everything here is causal: a run taken in slices gives what the whole run gives, so that the
 viewer shows the same live and afterwards.
@@ -19,33 +19,33 @@ from legbench.signals import Bools, Floats, Ints
 from legbench.viz.facts import Facts
 
 RATE_FLOOR = 0.05
-"""Slower radial motion is rest, no period [rad/s]."""
+"""Lowest rate of radial motion that counts as oscillation [rad/s]; slower motion is rest."""
 RATE_SHARE = 0.05
 """Hysteresis of a period's start, as a share of the fastest radial motion so far."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TracedRows:
-    """Some rows with what pictures derive from them."""
+    """Rows of a run with the values that pictures derive from them."""
 
     rows: Recorded
     time: Floats
-    """(n,) [s]"""
+    """Times (n,) of the rows [s]."""
     joint: Floats
-    """q1, q2 (n, 2) [rad]."""
+    """Joint angles q1, q2 (n, 2) [rad]."""
     polar: Floats
-    """x1 [rad], x2 [m] (n, 2)."""
+    """Polar coordinates x1 [rad], x2 [m] of the foot tip (n, 2)."""
     modal: Floats
-    """z2 [rad] and its rate [rad/s] (n, 2)."""
+    """Radial modal coordinate z2 [rad] and its rate [rad/s] (n, 2)."""
     period: Ints
-    """Number of the oscillation period, or of the jump (n,)."""
+    """Numbers (n,) of the rows' oscillation periods, or jumps."""
     stance: Bools
-    """Whether the foot carries (n,)."""
+    """Mask (n,) of the rows in which the foot carries the leg."""
 
 
 @final
 class Tracer:
-    """Turns consecutive slices of a run into traces."""
+    """Converter of consecutive slices of a run into traced rows."""
 
     def __init__(self, facts: Facts) -> None:
         self._facts = facts
@@ -94,7 +94,7 @@ class Tracer:
 
 
 def stance_of(rows: Recorded, kind: SetupKind) -> Bools:
-    """Whether the foot carries (n,): the contact, or what the controller took for it."""
+    """Mask (n,) of the rows in stance: the contact, or what the controller took for it."""
     if kind is SetupKind.FFS:
         return np.ones(len(rows.time), dtype=np.bool_)
     if kind is not SetupKind.JUMP:

@@ -1,4 +1,4 @@
-"""What is wrong with a drive: emergency messages, error register, history."""
+"""Errors of an emulated drive: emergency messages, error register, history."""
 
 from typing import final
 
@@ -25,7 +25,7 @@ def register_of(code: int) -> int:
 
 @final
 class Alarms:
-    """Errors of one node; those whose cause stands cannot be reset."""
+    """Errors of one node; they cannot be reset while the cause of one is present."""
 
     def __init__(self, node_id: int, values: dict[Key, int]) -> None:
         self._node_id, self._values = node_id, values
@@ -33,7 +33,7 @@ class Alarms:
         self._shown: set[int] = set()
 
     def raise_(self, code: int) -> Frame | None:
-        """An error has come; its message, once."""
+        """Record a new error; returns its emergency message, none if it has been sent."""
         if code in self._shown:
             return None
         self._shown.add(code)
@@ -43,20 +43,20 @@ class Alarms:
         return self._message(code)
 
     def hold(self, code: int) -> None:
-        """The cause of an error stands."""
+        """Record that the cause of an error is present."""
         self._standing.add(code)
 
     def release(self, code: int) -> None:
-        """The cause has gone; the error stays until it is reset."""
+        """Record that the cause of an error is gone; the error stays until it is reset."""
         self._standing.discard(code)
 
     @property
     def standing(self) -> bool:
-        """Whether any cause is still there."""
+        """Whether the cause of any error is still present."""
         return bool(self._standing)
 
     def reset(self) -> Frame | None:
-        """Forget the errors whose causes have gone; the all-clear, if there were any."""
+        """Clear all errors, unless a cause is present; returns the all-clear, if there were any."""
         if not self._shown or self._standing:
             return None
         self._shown.clear()
@@ -64,7 +64,7 @@ class Alarms:
         return self._message(0)
 
     def clear(self, code: int) -> Frame | None:
-        """A communication error is over by itself; the all-clear, if it was the last."""
+        """Clear a communication error, which ends by itself; returns the all-clear, if due."""
         if code not in self._shown:
             return None
         self._shown.discard(code)

@@ -24,14 +24,14 @@ _STATUS = int(StatusBit.REMOTE)
 
 @final
 class Axis:
-    """One motor with its two encoders, as the object dictionary shows them.
+    """Emulated motor with its two encoders, as the object dictionary shows them.
 
     Attributes:
-        power: the state machine.
-        motion: the motor.
-        alarms: what is wrong.
-        sensors: what the encoders make of the positions.
-        warning: bit 7 of the statusword is set.
+        power: power state machine.
+        motion: motion of the motor.
+        alarms: errors of the drive.
+        sensors: encoders of motor and link.
+        warning: whether bit 7 of the statusword is set.
     """
 
     def __init__(self, node: NodeConfig, behaviour: Behaviour, values: dict[Key, int]) -> None:

@@ -5,7 +5,7 @@ from enum import Enum
 
 
 class MissingSetpoint(Enum):
-    """What a drive makes of a SYNC without a new target."""
+    """Reactions of a drive to a SYNC without a new target."""
 
     HOLD = "hold"
     EXTRAPOLATE = "extrapolate"
@@ -13,7 +13,7 @@ class MissingSetpoint(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Behaviour:
-    """Properties of the emulated hardware, none of which a master may know."""
+    """Properties of the emulated hardware; no master has access to them."""
 
     reply_delay_us: tuple[int, int] = (50, 250)
     """Shortest and longest delay of a reply after SYNC or a request, uniformly distributed [us]."""
@@ -33,7 +33,7 @@ class Behaviour:
     status_lag_us: int = 0
     """Delay of the statusword, rounded to whole motion cycles [us]."""
     bandwidth: float | None = None
-    """Corner frequency of the position loop [Hz]; none: the motor is where it should be."""
+    """Corner frequency of the position loop [Hz]; none stands for a loop without lag."""
     mode_lag_us: int = 2000
     """Delay of the mode display (6061h) after a mode change (6060h) [us]."""
     halt_blocks_mode: bool = True

@@ -22,15 +22,15 @@ def emulate(
     keep_log: bool = False,
     configured: bool = False,
 ) -> Network:
-    """Drives as a bus file describes them, on a wire of its bitrate.
+    """Build the emulated bus that a bus file describes, at its bitrate.
 
     Args:
         bus: the bus.
         behaviours: one a drive; by default ordinary drives at position 0.
-        body: moves one body period.
-        body_period_ns: by default the bus's period [ns].
-        stuffing: how long frames are.
-        faults: to inject.
+        body: function that moves the body for one period.
+        body_period_ns: period of the body; by default the bus's [ns].
+        stuffing: how stuff bits count in the length of a frame.
+        faults: faults to inject.
         keep_log: remember every frame in `Network.log`.
         configured: the drives have kept, over their last power-off, what the bus file says.
 

@@ -126,7 +126,7 @@ class LockstepBus(VirtualBus):
         return len(self._station.received)
 
     def shutdown(self) -> None:
-        """Unplug."""
+        """Detach from the network."""
         if not self._is_shutdown:
             self.network.detach(self._station)
         super().shutdown()

@@ -22,13 +22,13 @@ class BusServer(Closing):
     def __init__(
         self, network: Network, bus: can.BusABC, now_ns: Callable[[], int] = time.monotonic_ns
     ) -> None:
-        """Plug in; the bus is closed with this."""
+        """Attach to a network and a bus, which closes together with this server."""
         self.network, self._bus = network, bus
         self._station = network.attach()
         self._pacer = Pacer(network, now_ns)
 
     def poll(self) -> None:
-        """Wait a moment for frames, move them and time on.
+        """Wait a moment for frames, pass them on and advance virtual time.
 
         Raises:
             BusError: the bus has failed.
@@ -45,7 +45,7 @@ class BusServer(Closing):
             raise BusError(f"{self._bus.channel_info}: {error}") from error
 
     def _receive(self, timeout: float) -> can.Message | None:
-        """The next frame; an interface that is taken down is a cable pulled, it may come back."""
+        """Receive the next frame; an interface that is down counts as an unplugged cable."""
         try:
             return self._bus.recv(timeout)
         except can.CanOperationError as error:
@@ -65,14 +65,14 @@ class BusServer(Closing):
         try:
             self.network.send(self._station, frame)
         except BusError:
-            # As on a real bus: a full queue or bus-off loses the frame.
+            # A full queue or bus-off loses the frame, as on a real bus.
             return
 
     def _give(self) -> None:
         while self._station.received:
             _, frame = self._station.received.popleft()
             if not frame.error:
-                # As on a real bus: a full queue or a pulled cable loses the frame.
+                # A full queue or an unplugged cable loses the frame, as on a real bus.
                 with suppress(can.CanOperationError):
                     self._bus.send(
                         can.Message(
@@ -84,5 +84,5 @@ class BusServer(Closing):
                     )
 
     def close(self) -> None:
-        """Unplug; may be called twice."""
+        """Close the bus; may be called twice."""
         self._bus.shutdown()

@@ -44,7 +44,7 @@ _ORDERS = {
 
 @final
 class EmulatedDrive:
-    """One node on the bus.
+    """Emulated drive with one node id on the bus.
 
     Attributes:
         node_id: its address.
@@ -104,7 +104,7 @@ class EmulatedDrive:
         return out
 
     def receive(self, frame: Frame, now_ns: int) -> None:
-        """A frame of another node has been on the wire; whatever it says, nothing is raised."""
+        """Receive a frame of another node; whatever it says, nothing is raised."""
         self._now_ns = now_ns
         if frame.error or frame.extended or frame.remote or self.state is NmtState.BOOT_UP:
             return
@@ -127,7 +127,7 @@ class EmulatedDrive:
         self._forward()
 
     def tick(self, now_ns: int) -> float:
-        """Move until now and look at the timers; true motor position [rad]."""
+        """Move until now and check the timers; returns the true motor position [rad]."""
         step_ns, self._now_ns, self._tick_ns = now_ns - self._tick_ns, now_ns, now_ns
         if step_ns <= 0:
             return self.axis.motion.angle
@@ -141,7 +141,7 @@ class EmulatedDrive:
         return angle
 
     def sense(self, link_pos: float, spring_torque: float) -> None:
-        """What the body did in this tick: link angle [rad], torque of its spring [N m]."""
+        """Take over the state of the body in this tick: link angle [rad], spring torque [N m]."""
         self.axis.sense(link_pos, spring_torque)
         self.axis.publish()
         if self.state is NmtState.OPERATIONAL:
@@ -163,7 +163,7 @@ class EmulatedDrive:
         self._boot_ns = now_ns + 1000 * self._behaviour.boot_us
 
     def trip(self, code: int, now_ns: int) -> None:
-        """The cause of an error comes and stays, such as `UNDER_VOLTAGE`."""
+        """Bring on the lasting cause of an error, such as `UNDER_VOLTAGE`."""
         self._now_ns = now_ns
         self.axis.alarms.hold(code)
         if code == OVER_TEMPERATURE:
@@ -172,11 +172,11 @@ class EmulatedDrive:
         self._forward()
 
     def untrip(self, code: int) -> None:
-        """The cause of an error goes; a fault reset is possible again."""
+        """Remove the cause of an error; a fault reset is possible again."""
         self.axis.alarms.release(code)
 
     def bus_off(self, now_ns: int) -> None:
-        """Its own controller has left the bus: stop as 6007h says."""
+        """Stop by 6007h, as the drive's own controller is bus-off."""
         self._now_ns = now_ns
         self.axis.power.connection_lost()
         self._out.clear()
@@ -233,7 +233,7 @@ class EmulatedDrive:
                 self._watches.setdefault(node_id, HeartbeatWatch(timeout_ns, self._now_ns))
 
     def _consumed(self) -> Iterator[tuple[int, int]]:
-        """Node and time-out [ns] of 1016h."""
+        """Yield the node and time-out [ns] of every heartbeat to watch (1016h)."""
         for sub in (1, 2):
             word = self._values[0x1016, sub]
             if word >> 16 & 0x7F and word & 0xFFFF:
@@ -317,7 +317,7 @@ class EmulatedDrive:
                 self.axis.fault(SYNC_MISSING)
 
     def _connection_lost(self, code: int) -> None:
-        """A communication error: say it, stop as 6007h says, fall back as 1029h says."""
+        """Handle a communication error: emergency, stop by 6007h, NMT state by 1029h."""
         self._send_now(self.axis.alarms.raise_(code))
         self.axis.power.connection_lost()
         fallback = {0: NmtState.PRE_OPERATIONAL, 2: NmtState.STOPPED}.get(self._values[0x1029, 1])
@@ -325,7 +325,7 @@ class EmulatedDrive:
             self._enter(fallback)
 
     def _events(self) -> None:
-        """Event-driven TPDOs: on change, and when their timer runs out."""
+        """Send the event-driven TPDOs that have changed or whose timer has run out."""
         for pdo in self._pdos.tpdos:
             if pdo.kind <= LAST_SYNCHRONOUS:
                 continue

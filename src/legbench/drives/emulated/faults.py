@@ -90,4 +90,4 @@ class Babble:
 
 
 Fault = FrameFault | NodeFault | Babble
-"""Anything that may be injected."""
+"""Union of all faults that can be injected into an emulated bus."""

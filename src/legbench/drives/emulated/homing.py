@@ -15,7 +15,7 @@ START = 1 << 4
 
 
 class HomingState(Enum):
-    """Bits 10, 12 and 13 of 6041h."""
+    """States of homing, shown by bits 10, 12 and 13 of the statusword (6041h)."""
 
     IDLE = auto()
     SEARCHING = auto()
@@ -26,7 +26,7 @@ class HomingState(Enum):
 
 @final
 class Homing:
-    """One run of a homing method."""
+    """Homing run of an emulated motor."""
 
     def __init__(self, values: dict[Key, int], counts_per_rev: int) -> None:
         self._values, self._per_rev = values, counts_per_rev
@@ -35,7 +35,7 @@ class Homing:
         self._index = 0.0
 
     def command(self, controlword: int) -> None:
-        """Look at bit 4."""
+        """Start or interrupt homing by bit 4 of a controlword."""
         asked = bool(controlword & START)
         if asked and not self._asked:
             known = self._values[0x6098, 0] in (*IN_PLACE, *TO_STOP)
@@ -45,7 +45,7 @@ class Homing:
         self._asked = asked
 
     def step(self, motion: Motion, step_ns: int) -> None:
-        """One motion cycle."""
+        """Run homing for one motion cycle."""
         method = self._values[0x6098, 0]
         home = self._values[0x607C, 0]
         if self.state is HomingState.SEARCHING:

@@ -1,4 +1,4 @@
-"""Which faults strike what and when; pure."""
+"""Injector of faults into an emulated bus: which fault acts on what, and when; pure."""
 
 from collections.abc import Iterator, Sequence
 from typing import final
@@ -28,7 +28,7 @@ _ENCODERS = {
     NodeFaultKind.LINK_DRIFT: ("link", Ailment.DRIFT),
 }
 Fate = tuple[tuple[int, Frame], ...]
-"""What arrives of a frame: delay [ns] and content of each copy."""
+"""Delay [ns] and content of each copy of a frame that arrives."""
 
 
 def _strike_parts(drive: EmulatedDrive, fault: NodeFault, *, begins: bool) -> None:
@@ -48,7 +48,7 @@ def _strike_parts(drive: EmulatedDrive, fault: NodeFault, *, begins: bool) -> No
 
 @final
 class Injector:
-    """Holds the faults of one bus; stands in as the sender of frames that nobody sent."""
+    """Faults of one bus; it also counts as the sender of the frames of babbling nodes."""
 
     def __init__(self, faults: Sequence[Fault]) -> None:
         self._frames: list[FrameFault] = []

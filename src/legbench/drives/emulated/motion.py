@@ -1,4 +1,4 @@
-"""Set points to motor positions: interpolation, ramps, the position loop, encoders."""
+"""Motion of an emulated motor: interpolation of set points, ramps, position loop, encoder."""
 
 import math
 from typing import final
@@ -15,9 +15,9 @@ class Motion:
     """The moving part of one drive, in unwrapped counts of its motor encoder.
 
     Attributes:
-        demand: where the motor should be right now [counts].
-        actual: where it is [counts].
-        speed: of the demand [counts/s].
+        demand: position that the motor should have now [counts].
+        actual: position of the motor [counts].
+        speed: speed of the demand [counts/s].
         limited: the target was cut to the software limits (607Dh).
         missing: SYNCs in a row without a new target.
         jammed: the motor stands, whatever the position loop does.
@@ -46,7 +46,7 @@ class Motion:
 
     @property
     def angle(self) -> float:
-        """True motor position, whatever homing called it [rad]."""
+        """True motor position, independent of the zero set by homing [rad]."""
         return (self.actual - self._true_zero) / self._units.counts_per_rad
 
     @property
@@ -56,12 +56,12 @@ class Motion:
         return max(1, round(value * 10.0 ** max(-9, min(exponent, 3)) * SECOND_NS))
 
     def hold(self, now_ns: int) -> None:
-        """Stand where the motor is; nothing is on the way."""
+        """Hold the motor where it is and drop the interpolated way to a target."""
         self.demand = self._from = self._to = self.actual
         self.speed, self._since_ns, self.missing = 0.0, now_ns, 0
 
     def latch(self, target: int | None, now_ns: int) -> None:
-        """SYNC: begin the way to a target, or notice that none came [counts]."""
+        """Start the interpolated way to a target [counts] at SYNC, or count that none came."""
         if target is None:
             self.missing += 1
             if self._behaviour.missing_setpoint is not MissingSetpoint.EXTRAPOLATE:
@@ -95,7 +95,7 @@ class Motion:
         self._demand(self.demand + speed * step_ns / SECOND_NS, step_ns)
 
     def ramp(self, deceleration: float, step_ns: int) -> bool:
-        """Brake the demand [counts/s2], at once if it is zero; whether it stands."""
+        """Brake the demand [counts/s2], at once at deceleration 0; returns whether it stands."""
         step = step_ns / SECOND_NS
         loss = deceleration * step if deceleration > 0.0 else math.inf
         speed = math.copysign(max(0.0, abs(self.speed) - loss), self.speed)
@@ -109,7 +109,7 @@ class Motion:
         self.demand = demand
 
     def drive(self, step_ns: int) -> None:
-        """The position loop moves the motor towards the demand."""
+        """Move the motor towards the demand, as its position loop does."""
         if self.jammed:
             return
         move = self.demand - self.actual
@@ -139,7 +139,7 @@ class Motion:
         return self._late_ms > self._values[0x6066, 0]
 
     def call_it(self, counts: int) -> None:
-        """Homing: the present position is `counts` from now on."""
+        """Set the present position to `counts`, as homing does."""
         shift = counts - self.actual
         low, high = self._hard
         self._true_zero += shift

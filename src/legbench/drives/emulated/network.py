@@ -17,8 +17,8 @@ from legbench.drives.protocol.frame import Frame
 from legbench.drives.setup.wire import ERROR_BITS, exact_bits, plain_bits, worst_bits
 
 Body = Callable[[tuple[float, ...]], tuple[Sequence[float], Sequence[float]]]
-"""Moves one body period with the motors at these positions [rad]; link positions [rad] and
-spring torques [N m] at its end."""
+"""Function that moves the body for one period, from the motor positions [rad] to the link
+positions [rad] and spring torques [N m] at its end."""
 PASSIVE, BUS_OFF = 128, 256
 """Transmit error counts from which a node is error passive, or off the bus (ISO 11898-1)."""
 
@@ -29,7 +29,7 @@ BUS_OFF_FRAME = Frame(0x40, bytes(8), error=True)
 
 
 class Stuffing(Enum):
-    """How long frames are taken to be."""
+    """Ways to count the stuff bits in the length of a frame."""
 
     NONE = "none"
     WORST = "worst"
@@ -37,10 +37,10 @@ class Stuffing(Enum):
 
 
 class Participant(Protocol):
-    """Whatever takes part in the traffic by itself."""
+    """A participant of the bus that sends frames by itself."""
 
     def receive(self, frame: Frame, now_ns: int) -> None:
-        """A frame of another node has been on the wire."""
+        """Receive a frame of another node."""
         ...
 
     def take(self) -> list[tuple[int, Frame]]:
@@ -48,7 +48,7 @@ class Participant(Protocol):
         ...
 
     def tick(self, now_ns: int) -> float:
-        """Look at the timers, once a body period."""
+        """Check the timers, once a body period; returns the motor position of a drive [rad]."""
         ...
 
 
@@ -67,7 +67,7 @@ class Station:
 
 Node = Participant | Station
 _Pending = tuple[int, int, int, Node, Frame]
-"""Ready at [ns], identifier, sequence number, sender, frame."""
+"""Frame that waits for the wire: ready at [ns], identifier, sequence number, sender, frame."""
 
 
 def stiff_body(motor_pos: tuple[float, ...]) -> tuple[Sequence[float], Sequence[float]]:
@@ -81,10 +81,10 @@ class Network:
 
     Attributes:
         now_ns: virtual time [ns].
-        drives: in the order of the leg's joints.
+        drives: emulated drives, in the order of the leg's joints.
         log: every frame that was on the wire with the time of its end, if wanted.
         errors: transmit error counter of every node.
-        bitrate: of the wire and of all drives [bit/s].
+        bitrate: bitrate of the wire and of all drives [bit/s].
     """
 
     def __init__(
@@ -125,7 +125,7 @@ class Network:
     ) -> Station:
         """Plug a master in, by default at the bitrate of the wire [bit/s].
 
-        At another one it reads nothing, nobody reads what it sends, and until its controller is
+        At another bitrate it reads nothing, nobody reads what it sends, and until its controller is
         error passive it destroys what the others send.
         """
         station = Station(tx_queue, bitrate or self.bitrate, listen_only=listen_only)
@@ -174,7 +174,7 @@ class Network:
         self._submit(station, self.now_ns, frame)
 
     def advance(self, until_ns: int, station: Station | None = None) -> None:
-        """Let time pass until then, or until a frame for `station` has come."""
+        """Advance virtual time to `until_ns`, or until a frame for `station` has come."""
         while station is None or not station.received:
             at_ns, event = self._next()
             if at_ns > until_ns:
@@ -239,8 +239,10 @@ class Network:
         self._end_ns = now_ns + bits * self._bit_ns
 
     def _garbled(self, sender: Node) -> bool:
-        """Whether two bitrates meet: all others flag what a stranger sends, and a stranger flags
-        all that it hears as long as it may.
+        """Whether a frame is destroyed because two bitrates meet.
+
+        All others flag what a station at another bitrate sends, and such a station flags all that
+        it hears until it is error passive.
         """
         if sender in self._strangers:
             return True
@@ -270,7 +272,7 @@ class Network:
         if isinstance(sender, Station):
             sender.waiting -= 1
         if sender is self._injector:
-            # Nobody hears a copy of what it has sent itself.
+            # No node receives a copy of its own frames.
             self._deliver(self._copied.pop(sequence, sender), frame)
             return
         for delay_ns, changed in self._injector.fate(frame, self.now_ns):

@@ -7,13 +7,13 @@ from legbench.drives.emulated.network import Network
 
 @final
 class NetworkTime:
-    """Virtual time of an emulated bus; waiting makes it pass."""
+    """Virtual time of an emulated bus, which waiting advances."""
 
     def __init__(self, network: Network) -> None:
         self._network = network
 
     def now_ns(self) -> int:
-        """Now [ns]."""
+        """Return the present time [ns]."""
         return self._network.now_ns
 
     def wait_until(self, at_ns: int) -> None:

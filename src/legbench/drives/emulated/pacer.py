@@ -11,14 +11,14 @@ FORGIVEN_NS = 3_000_000
 
 @final
 class Pacer:
-    """Lets a network catch up with a clock."""
+    """Pacer that lets the virtual time of a network follow a clock."""
 
     def __init__(self, network: Network, now_ns: Callable[[], int]) -> None:
         self._network, self._now_ns = network, now_ns
         self._offset_ns = now_ns() - network.now_ns
 
     def advance(self) -> None:
-        """Move the network to now."""
+        """Advance the network to the present time of the clock."""
         network = self._network
         now_ns = self._now_ns() - self._offset_ns
         away_ns = now_ns - network.now_ns
@@ -28,6 +28,6 @@ class Pacer:
         network.advance(now_ns)
 
     def wait_s(self) -> float:
-        """How long nothing happens on the network by itself [s]."""
+        """Time until the next event of the network [s]."""
         at_ns, _ = self._network._next()
         return max(0.0, 1e-9 * (at_ns + self._offset_ns - self._now_ns()))

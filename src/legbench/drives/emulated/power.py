@@ -18,7 +18,7 @@ _WORDS = {
 }
 """Low byte of the statusword, voltage enabled (bit 4) with the main supply."""
 STAY_IN_QUICK_STOP = 5
-"""605Ah from here on stays in quick stop active."""
+"""Lowest value of 605Ah with which a drive stays in quick stop active."""
 HALT = 1 << 8
 POWERED = (_S.OPERATION_ENABLED, _S.QUICK_STOP_ACTIVE, _S.FAULT_REACTION_ACTIVE)
 """States in which the motor holds or stops a load."""
@@ -29,7 +29,7 @@ class PowerStage:
     """State and pending stop of one drive.
 
     Attributes:
-        state: of the machine.
+        state: state of the machine.
         stopping: option code of the stop that runs, none if none does; 0 drops the motor at
             once, 1 is the slow-down ramp, 2 the quick-stop ramp, 3 and 4 the fastest possible.
     """
@@ -43,15 +43,15 @@ class PowerStage:
 
     @property
     def low_byte(self) -> int:
-        """Bits 0 to 6 of 6041h."""
+        """Bits 0 to 6 of the statusword (6041h)."""
         return _WORDS[self.state]
 
     def boot(self) -> None:
-        """Self-test done (transition 1)."""
+        """Enter switch on disabled after the self-test (transition 1)."""
         self._enter(DriveState.SWITCH_ON_DISABLED)
 
     def command(self, controlword: int, *, cause_gone: bool) -> bool:
-        """Obey 6040h; whether a fault was reset."""
+        """Obey a controlword (6040h); returns whether a fault was reset."""
         before, self._before = self._before, controlword
         if self.state is DriveState.FAULT:
             edge = controlword & 0x80 and not before & 0x80
@@ -105,7 +105,7 @@ class PowerStage:
             self.stopping = self._after = None
 
     def quick_stop(self) -> None:
-        """Stop as 605Ah says (transition 11)."""
+        """Start the stop that the quick stop option code 605Ah selects (transition 11)."""
         if self.state is not DriveState.OPERATION_ENABLED:
             return
         option = self._values[0x605A, 0]
@@ -117,7 +117,7 @@ class PowerStage:
         self._after = None if option >= STAY_IN_QUICK_STOP else _S.SWITCH_ON_DISABLED
 
     def fault(self) -> None:
-        """React as 605Eh says (transition 13)."""
+        """Start the stop that the fault reaction option code 605Eh selects (transition 13)."""
         if self.state in (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE):
             return
         moving = self.state in POWERED
@@ -134,7 +134,7 @@ class PowerStage:
             self._enter(_S.SWITCH_ON_DISABLED)
 
     def connection_lost(self) -> None:
-        """React as 6007h says."""
+        """Start the reaction to a lost connection that 6007h selects."""
         option = self._values[0x6007, 0]
         if option == 1:
             self.fault()
@@ -144,7 +144,7 @@ class PowerStage:
             self.quick_stop()
 
     def stopped(self) -> None:
-        """The ramp of a stop has ended."""
+        """Enter the state that follows a stop, at the end of its ramp."""
         after, self._after = self._after, None
         if after is not None:
             self._enter(after)

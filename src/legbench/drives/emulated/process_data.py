@@ -16,7 +16,7 @@ _EVENT_TYPES = (254, 255)
 
 @final
 class Pdo:
-    """One PDO as its objects say."""
+    """Process data object (PDO) as its communication and mapping objects describe it."""
 
     def __init__(self, cob_id: int, kind: int, timer_ms: int, layout: PdoMap) -> None:
         self.cob_id, self.kind, self.layout = cob_id, kind, layout
@@ -32,12 +32,12 @@ class Pdo:
 
 @final
 class ProcessData:
-    """All PDOs of a drive.
+    """Process data objects (PDOs) of a drive.
 
     Attributes:
-        rpdos: those that exist, by COB-ID.
-        tpdos: those that exist, in order.
-        repeats: every TPDO repeats itself to the bit.
+        rpdos: RPDOs that exist, by COB-ID.
+        tpdos: TPDOs that exist, in order.
+        repeats: whether every TPDO repeats itself bit for bit.
     """
 
     def __init__(self, store: ObjectStore) -> None:

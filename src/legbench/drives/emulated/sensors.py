@@ -1,4 +1,4 @@
-"""What the two encoders of an emulated axis show, and how they may fail; pure."""
+"""Readings of the two encoders of an emulated axis, and their faults; pure."""
 
 from enum import Enum
 from typing import final
@@ -9,7 +9,7 @@ SECOND_NS = 1_000_000_000
 
 
 class Ailment(Enum):
-    """How an encoder may fail."""
+    """Kinds of fault that an encoder may have."""
 
     FROZEN = "frozen"
     """The encoder keeps its last value."""
@@ -21,14 +21,14 @@ class Ailment(Enum):
 
 @final
 class Encoder:
-    """One encoder: true counts in, shown counts out.
+    """Encoder that turns true counts into shown counts, with its fault if it has one.
 
-    The position loop of the emulated drive goes on with the true position: what fails is what is
-    told, not what the motor does.
+    The position loop of the emulated drive goes on with the true position: a fault changes the
+    reading, not the motion.
     """
 
     def __init__(self, counts_per_rad: float) -> None:
-        """Begin healthy."""
+        """Make an encoder without a fault."""
         self._counts_per_rad = counts_per_rad
         self._ailment: Ailment | None = None
         self._size = self._offset = 0.0
@@ -39,14 +39,14 @@ class Encoder:
         self._ailment, self._size, self._offset = ailment, size, 0.0
 
     def tick(self, step_ns: int) -> None:
-        """Let time pass [ns]."""
+        """Advance the time of the fault [ns]."""
         if self._ailment is Ailment.DRIFT:
             self._offset += self._size * step_ns / SECOND_NS
         elif self._ailment is Ailment.STEP:
             self._offset = self._size
 
     def show(self, counts: int) -> int:
-        """Return what is told of a true position [counts]."""
+        """Return the reading for a true position [counts]."""
         if self._ailment is not Ailment.FROZEN:
             self._shown = counts + round(self._offset * self._counts_per_rad)
         return self._shown
@@ -67,6 +67,6 @@ class Sensors:
         self.link = Encoder(node.link.counts_per_rad)
 
     def tick(self, step_ns: int) -> None:
-        """Let time pass [ns]."""
+        """Advance the time of the fault [ns]."""
         self.motor.tick(step_ns)
         self.link.tick(step_ns)

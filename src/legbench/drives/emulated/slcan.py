@@ -26,8 +26,8 @@ class SlcanAdapter:
     """One adapter, plugged into an emulated network while its channel is open.
 
     Attributes:
-        bitrate: as it was set, none before [bit/s].
-        openings: how often its channel was opened.
+        bitrate: bitrate set by the computer, none before [bit/s].
+        openings: number of times that the channel was opened.
     """
 
     def __init__(self, network: Network) -> None:
@@ -38,7 +38,7 @@ class SlcanAdapter:
         self.openings = 0
 
     def feed(self, chunk: bytes) -> bytes:
-        """Take bytes of the computer; the answers to the lines that they complete."""
+        """Take bytes of the computer; returns the answers to the lines that they complete."""
         answers = b""
         for byte in chunk:
             if byte != OK[0]:
@@ -57,7 +57,7 @@ class SlcanAdapter:
         station, lines = self._station, b""
         while station is not None and station.received:
             _, frame = station.received.popleft()
-            # An error frame has no line; `F` tells of it.
+            # An error frame has no line; the flags of `F` report it.
             if not frame.error:
                 lines += format_frame(frame)
         return lines

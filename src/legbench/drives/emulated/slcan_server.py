@@ -17,7 +17,7 @@ from legbench.drives.errors import BusError
 from legbench.drives.protocol.slcan import OK, REFUSED
 
 CHUNK, FULL = 4096, 1 << 16
-"""Bytes that are read at once; bytes from which on a computer that does not read loses lines."""
+"""Largest read; amount of unread output from which on lines are dropped [bytes]."""
 
 
 def _say_nothing(_text: str) -> None:
@@ -29,7 +29,7 @@ class SlcanServer(Closing):
     """One emulated bus behind one adapter; python-can's `slcan` opens `path`.
 
     Attributes:
-        path: of the terminal, such as `/dev/pts/3`.
+        path: path of the terminal, such as `/dev/pts/3`.
     """
 
     def __init__(
@@ -42,10 +42,10 @@ class SlcanServer(Closing):
         """Open a terminal.
 
         Args:
-            network: to plug in.
+            network: emulated bus behind the adapter.
             link: a symbolic link to the terminal, whose own name is a matter of chance.
-            now_ns: clock.
-            warn: told of an adapter that is set to another bitrate than the bus.
+            now_ns: clock that paces the bus [ns].
+            warn: called with a warning of an adapter that is set to another bitrate than the bus.
 
         Raises:
             BusError: there is no terminal to be had, or no link.
@@ -55,8 +55,8 @@ class SlcanServer(Closing):
             self._ours, self._theirs = os.openpty()
         except OSError as error:
             raise BusError(f"no pseudo terminal: {error.strerror}") from None
-        # Raw before anybody opens it: an echo would come back as frames. Our hold of the other
-        # end keeps the terminal when a program closes it.
+        # The terminal is raw before it is opened: an echo would come back as frames. This
+        # process holds the other end, too, so the terminal stays when a program closes it.
         tty.setraw(self._theirs)
         os.set_blocking(self._ours, False)
         self.path = os.ttyname(self._theirs)
@@ -96,7 +96,7 @@ class SlcanServer(Closing):
         self._give()
 
     def _forget_old(self) -> None:
-        """Whoever opens the channel does not want what an earlier program has left unread."""
+        """Drop what an earlier program has left unread when the channel is opened anew."""
         if self._adapter.openings != self._openings:
             self._openings = self._adapter.openings
             self._unsent = b"\r" if self._cut else b""

@@ -42,7 +42,7 @@ class UnixServer(Closing):
 
     @staticmethod
     def _replace_dead(path: Path) -> None:
-        """Remove a socket file that nobody serves any more."""
+        """Remove a socket file that no process serves any more."""
         if not (path.exists() and stat.S_ISSOCK(path.stat().st_mode)):
             return
         with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as probe:
@@ -52,7 +52,7 @@ class UnixServer(Closing):
                 path.unlink()
 
     def poll(self) -> None:
-        """Wait a moment for frames, move them and time on."""
+        """Wait a moment for frames, pass them on and advance virtual time."""
         ready, _, _ = select.select([self._listener, *self._stations], [], [], self._pacer.wait_s())
         self._pacer.advance()
         for one in ready:
@@ -87,7 +87,7 @@ class UnixServer(Closing):
             try:
                 self.network.send(self._stations[client], frame)
             except BusError:
-                # As on a real bus: a full queue or bus-off loses the frame.
+                # A full queue or bus-off loses the frame, as on a real bus.
                 continue
 
     def _give(self, client: socket.socket, station: Station) -> None:

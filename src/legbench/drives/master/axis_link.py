@@ -1,4 +1,4 @@
-"""One drive as the cycle sees it: process data <-> angles, controlword and target; pure."""
+"""One drive in the cycle: process data <-> angles, controlword and target; pure."""
 
 from typing import final
 
@@ -16,7 +16,7 @@ from legbench.drives.setup.units import Unwrapper, wrap
 
 
 def _wanted(layout: PdoMap, node: NodeConfig) -> tuple[tuple[int, int], ...]:
-    """Slot among what an axis is after, and place among the values of a TPDO."""
+    """Pairs of a slot in `_shown` and the place of its object among the values of a TPDO."""
     objects = (STATUSWORD, POSITION_ACTUAL, node.link_object)
     places = [(slot, layout.place(*entry.key)) for slot, entry in enumerate(objects)]
     return tuple((slot, place) for slot, place in places if place is not None)
@@ -30,8 +30,8 @@ class AxisLink:
         node: its configuration.
         machine: leads it through its states.
         statusword: statusword last received.
-        target_counts: what its next RPDO says, not wrapped.
-        sent_counts: what its last RPDO said, none before the first.
+        target_counts: target of its next RPDO, not wrapped.
+        sent_counts: target of its last RPDO, none before the first.
         fresh: whether all its TPDOs have come in this cycle.
         motor_pos, link_pos: measured angles of motor and link [rad].
     """
@@ -74,12 +74,12 @@ class AxisLink:
 
     @property
     def rpdo_ids(self) -> tuple[int, ...]:
-        """COB-IDs of its commands."""
+        """COB-IDs of the drive's RPDOs, which carry its commands."""
         return tuple(cob_id for cob_id, _ in self._rpdos)
 
     @property
     def known(self) -> bool:
-        """Whether it has ever said where its motor is."""
+        """Whether the drive has sent its motor position since the start or `forget`."""
         return self._known
 
     @property
@@ -92,7 +92,7 @@ class AxisLink:
         return not self._tpdos[cob_id][0] & self._missing
 
     def begin_cycle(self) -> None:
-        """SYNC goes out: everything is expected again."""
+        """Begin a cycle at SYNC, from which all process data is expected again."""
         self._missing = self._all
         self.fresh = False
 
@@ -128,18 +128,18 @@ class AxisLink:
         self._known = True
 
     def forget(self) -> None:
-        """Positions may have jumped (homing, reset): unwrap anew."""
+        """Unwrap the positions anew, as they may have jumped by homing or a reset."""
         self._known = False
 
     @property
     def state_text(self) -> str:
-        """State in words."""
+        """State of the drive in words."""
         state = decode_state(self.statusword)
         return "unknown state" if state is None else state.value
 
     @property
     def target_pos(self) -> float:
-        """What its next RPDO says [rad]."""
+        """Target of its next RPDO [rad]."""
         return self.node.motor.to_rad(self.target_counts)
 
     def aim(self, motor_pos: float) -> None:

@@ -122,7 +122,7 @@ class BringUp:
                 )
 
     def identity(self, node: NodeConfig) -> Identity:
-        """What a node says it is (1018h); raises as `SdoPort.read` does."""
+        """Read the identity object of a node (1018h); raises as `SdoPort.read` does."""
         vendor, product, revision, serial = (
             self.sdo(node).get_int(0x1018, sub, U32) for sub in range(1, 5)
         )
@@ -269,7 +269,7 @@ class BringUp:
         return actual
 
     def soft_limits(self, node: NodeConfig) -> tuple[int, int] | None:
-        """What the drive clamps targets to (607Dh) [counts]; none where it does not."""
+        """Range to which the drive clamps targets (607Dh) [counts]; none where it does not."""
         sdo = self.sdo(node)
         try:
             low, high = sdo.get_int(0x607D, 1, I32), sdo.get_int(0x607D, 2, I32)
@@ -299,7 +299,7 @@ class BringUp:
             )
 
     def temperature(self, node: NodeConfig) -> int | None:
-        """What the drive's sensor shows [counts]; none where the bus file names no object."""
+        """Reading of the drive's temperature [counts]; none if the bus file names no object."""
         entry = node.temperature_object
         return None if entry is None else self.sdo(node).get_int(entry.index, entry.sub, entry.kind)
 
@@ -320,7 +320,7 @@ class BringUp:
             )
 
     def powered(self, node: NodeConfig) -> bool:
-        """Whether its motor may have torque (6041h)."""
+        """Whether the motor of a drive may have torque (6041h)."""
         return decode_state(self.sdo(node).get_int(0x6041, 0, U16)) in POWERED
 
     def error_text(self, node: NodeConfig) -> str:

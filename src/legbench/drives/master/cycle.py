@@ -49,18 +49,18 @@ class Tick(NamedTuple):
 
 @final
 class Cycle:
-    """Ticks on an absolute grid: late is late, missed is skipped and counted, never made up.
+    """Cycle on an absolute grid of ticks; a missed tick is skipped and counted, never repeated.
 
     Attributes:
-        axes: the drives, in the order of the leg's joints.
-        watches: the same, as watched.
-        bus_error: why the last cycle could not send.
+        axes: drives, in the order of the leg's joints.
+        watches: watches of the drives, in the same order.
+        bus_error: reason why the last cycle could not send.
         bus_off: the controller has left the bus.
         stranger: identifier of a frame that only this master may send, and another one did.
-        error_frames: heard so far.
+        error_frames: number of error frames received so far.
         late_frames: process data that came after its deadline.
         silent_total: ticks that were left out to find late answers.
-        notices: what a run has to tell though it ends nothing.
+        notices: irregularities that end no run.
         stopping: whether a stop is under way, for which SYNC goes out at every tick.
     """
 
@@ -111,7 +111,7 @@ class Cycle:
         self.arm()
 
     def arm(self) -> None:
-        """Watch from now on, whatever was before."""
+        """Start the watches anew, clearing what they have counted."""
         now_ns = self._port.timebase.now_ns()
         for watch in self.watches:
             watch.arm(now_ns)
@@ -121,7 +121,7 @@ class Cycle:
         timebase = self._port.timebase
         now_ns = timebase.now_ns()
         late_ns = now_ns - self._due_ns
-        # Up to half a period late SYNC still goes out; beyond, it would crowd the next one.
+        # SYNC is still sent up to half a period late; later it would crowd the next one.
         skipped = max(0, (late_ns + self._period_ns // 2) // self._period_ns)
         self._due_ns += skipped * self._period_ns
         timebase.wait_until(self._due_ns)
@@ -211,9 +211,10 @@ class Cycle:
         return self.stranger is not None
 
     def send(self, controlwords: Sequence[int | None]) -> bool:
-        """Send the RPDOs of all drives; they act at the next SYNC. False: the bus failed.
+        """Send the RPDOs of all drives, which act at the next SYNC; false if the bus failed.
 
-        A frame that is refused keeps no other drive from its own; no word, no frame.
+        A frame that is refused keeps no other drive from its own. A drive without a controlword
+        gets no frame.
         """
         sent = True
         for axis, controlword in zip(self.axes, controlwords, strict=True):
@@ -231,9 +232,9 @@ class Cycle:
         return self.send_rest() and sent
 
     def send_rest(self) -> bool:
-        """What has to go out now and then: heartbeat, polls. False: the bus failed."""
+        """Send heartbeat and polls, where due; false if the bus failed."""
         try:
-            # By the grid, not by the cycle: silent ticks must not stretch what drives wait for.
+            # The heartbeat follows the grid, not the cycles: silent ticks must not delay it.
             if self._due_ns >= self._beat_due_ns:
                 self._port.send_frame(self._beat)
                 self._beat_due_ns = self._due_ns + self._beat_ns
@@ -272,7 +273,7 @@ class Cycle:
             self.notices.sdo_request(message, node_id, self._port.timebase.now_ns())
 
     def _gather(self, until_ns: int) -> int:
-        """Take frames until all process data is there or the deadline; how many are missing."""
+        """Take frames until all process data is there or the deadline; counts those missing."""
         missing, receive, tpdos = self._expected, self._port.receive, self._tpdos
         garbled: set[int] = set()
         try:
@@ -324,11 +325,11 @@ class Cycle:
                     self.other(message)
         except BusError as error:
             self._failed(error)
-            # What is still unread may be an answer to an earlier SYNC.
+            # Frames that are still unread may be answers to an earlier SYNC.
             self._owed.update(self._tpdos)
 
     def _late(self, message: can.Message) -> None:
-        """Process data between two cycles: an answer that was missed, or one too many."""
+        """Take process data between two cycles: a late answer, or one too many."""
         cob_id = message.arbitration_id
         if cob_id not in self._owed and self._tpdos[cob_id].fresh:
             self.notices.answered_twice(message, self._port.timebase.now_ns())

@@ -1,4 +1,4 @@
-"""What is wrong when nobody answers the first question: often the bitrate."""
+"""Explanation of a first request without an answer, whose cause is often the bitrate."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,7 +10,7 @@ from legbench.drives.setup.config import BusConfig
 
 @contextmanager
 def first_contact(port: Port, config: BusConfig) -> Iterator[None]:
-    """Say more of a bus that fails, and of a drive that keeps silent, than that it does.
+    """Add the likely cause to the error of a bus that fails or a drive that does not answer.
 
     Raises:
         BusError: the bus fails, or carries error frames only.

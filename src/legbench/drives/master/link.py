@@ -55,27 +55,27 @@ class LinkState(Enum):
 
     NEW = auto()
     CONFIGURED = auto()
-    """Identity checked, configuration written and read back; nothing moves."""
+    """Identity is checked, configuration written and read back; nothing moves."""
     CYCLIC = auto()
-    """Process data flows, targets follow the motors."""
+    """Process data is exchanged, targets follow the motors."""
     RUNNING = auto()
-    """All drives in operation enabled, commands are taken."""
+    """All drives are in operation enabled, commands are taken."""
     STOPPING = auto()
-    """Told to stop, and not every drive has been seen without power yet."""
+    """Drives have been told to stop, and not every one has been seen without power yet."""
     STOPPED = auto()
     """Every drive has been seen without power; or this link never led one."""
 
 
 @final
 class Link(Lead):
-    """One master, its bus and its drives.
+    """Cyclic link of one master to its drives over a bus.
 
     Attributes:
-        state: how far it has come.
-        fault: the first fault; what ended the link.
-        stopped: how the stop of the drives has ended, none before it.
+        state: state of the link.
+        fault: first fault, which ended the link.
+        stopped: report of the stop of the drives, none before it.
         skipped_total: ticks without SYNC since the start.
-        not_parked: what `close` failed to switch off, see `master.parking`.
+        not_parked: command frames that `close` failed to switch off, see `master.parking`.
         listening: read-only, and another master sends SYNC: this one sends nothing.
     """
 
@@ -95,13 +95,13 @@ class Link(Lead):
 
         Args:
             bus: stays the caller's, who shuts it down after `close`.
-            config: what hangs on it.
-            limits: enforced here.
+            config: drives on the bus.
+            limits: limits that this link enforces.
             stiffness: stiffness of the series springs, one a drive [N m/rad].
             timebase: time base of the link; by default the bus's.
             listener: sees every frame, such as a `BusLog`.
             read_only: observe; change nothing in a drive, see `master.read_only`.
-            lock: taken by `open`; by default one for the bus's channel.
+            lock: lock that `open` takes; by default one for the bus's channel.
 
         Raises:
             ConfigError: the bus cannot carry the schedule.
@@ -139,7 +139,7 @@ class Link(Lead):
 
     @property
     def listener_error(self) -> str | None:
-        """What a listener raised, in one line; it hears nothing more then."""
+        """Error that a listener raised, in one line; the listener is not called again."""
         return self._port.listener_error
 
     # --- before anything moves ---------------------------------------------------------------
@@ -245,7 +245,7 @@ class Link(Lead):
                 f"a link that is {self.state.name.lower()} cannot start; make a new one"
             )
         if not self._read_only and self.cycle.led_by_another():
-            self._supervisor.alone()  # It has come since `open`, and keeps the drives.
+            self._supervisor.alone()  # A master that has come since `open` keeps the drives.
         self.state = LinkState.CYCLIC
         try:
             self._start_up.settle(self._settling_tick)
@@ -275,7 +275,7 @@ class Link(Lead):
         self._check(sample)
         self._guard.check_start(sample.motor_pos)
         up.seek(Goal.ENABLED, self.cycle.axes, self._watched_tick, "become enabled")
-        # What the drives hold, not what their encoders show: the next target is the last one.
+        # The guard begins from the targets that the drives hold, not from their encoders.
         held = tuple(axis.target_pos for axis in self.cycle.axes)
         self._guard.start_at(held)
         self._expected = [held] * 2
@@ -475,8 +475,8 @@ class Link(Lead):
     def close(self) -> None:
         """Stop, leave the drives parked in pre-operational, release the channel; raises no error.
 
-        Twice is once. A stop that is not verified is repeated, in the end over SDO. A link that
-        only looks leaves the drives of another master alone.
+        A second call does nothing. A stop that is not verified is repeated, in the end over SDO. A
+        link that only looks leaves the drives of another master alone.
         """
         if self.state is LinkState.NEW or self._closed:
             return

@@ -1,4 +1,4 @@
-"""Hearing another master before, and while, drives are brought up; nothing is sent from here."""
+"""Detection of another master before and during bring-up; nothing is sent from here."""
 
 from collections.abc import Iterator
 from typing import final
@@ -20,7 +20,7 @@ from legbench.errors import PlantFault
 
 @final
 class Lookout:
-    """Notices whoever else leads the drives of a bus file, or talks to their objects.
+    """Detector of any other master that leads the drives of a bus file or accesses their objects.
 
     A master of a leg is heard by its SYNC, its commands (RPDOs), its orders (NMT), its questions
     (SDO requests) and its heartbeat. A node that the bus file does not name may be anything, such
@@ -49,7 +49,7 @@ class Lookout:
         self.beats: set[int] = set()
 
     def listen(self) -> None:
-        """Be silent for `open_bus.LISTEN_NS`; on a bus that nobody else can be on, for no time.
+        """Listen for `open_bus.LISTEN_NS`, or not at all on a bus without other participants.
 
         Raises:
             PlantFault: another master leads these drives, or asks them.
@@ -96,7 +96,7 @@ class Lookout:
             self._found(HEARTBEAT_BASE + master, what)
 
     def rest(self) -> None:
-        """Raise no more: from now on these drives are led from here, and a stop must get out."""
+        """Stop raising, as these drives are led from here and a stop must get out."""
         self._armed = False
 
     def _found(self, cob_id: int, name: str) -> None:

@@ -1,4 +1,4 @@
-"""What a run has to tell though nothing ended it: how often, since when, and what it was first."""
+"""Notices of a run that do not end it: how often, since when, and the first one's detail."""
 
 from collections.abc import Sequence
 from typing import Any, final
@@ -17,7 +17,7 @@ WRITES = (0, 1, 6)
 
 @final
 class Notices:
-    """Counts what a person wants to know of a bus and its drives.
+    """Counts of irregularities of a bus and its drives that do not end a run.
 
     Attributes:
         events: what has been seen, by name: how often, when first on the bus's time base [s], and
@@ -35,7 +35,7 @@ class Notices:
         event["count"] += 1
 
     def statuswords(self, axes: Sequence[AxisLink], now_ns: int) -> None:
-        """Look at bits 7 (warning) and 11 (internal limit) of what drives have just sent."""
+        """Count warnings (bit 7) and internal limits (bit 11) in the statuswords just received."""
         for axis in axes:
             word = axis.statusword & TOLD
             if not (word and axis.fresh):

@@ -1,4 +1,4 @@
-"""What a link leaves behind: drives that no recorded command moves again.
+"""Parking of drives at the end of a link, so that no recorded command moves them again.
 
 A log that is played back holds NMT start, SYNC, controlwords and targets. A drive that keeps its
 configuration obeys all of them. One whose command frames are switched off does not, operational
@@ -17,7 +17,7 @@ from legbench.drives.protocol.frame import COB_INVALID
 from legbench.drives.setup.config import BusConfig, NodeConfig, Parameter
 
 RPDO_COMMUNICATION = 0x1400
-"""First of the objects whose sub-index 1 is the COB-ID of a command frame."""
+"""First of the objects whose sub-index 1 is the COB-ID of a command frame (RPDO)."""
 
 
 def parked(node: NodeConfig) -> list[Parameter]:
@@ -38,8 +38,8 @@ def is_parked(node: NodeConfig, parameter: Parameter, there: int) -> bool:
 
     Args:
         node: the drive.
-        parameter: what the configuration wants.
-        there: what the drive holds.
+        parameter: object and value of the configuration.
+        there: value that the drive holds.
     """
     return any(
         (parameter.key, there) == (rest.key, rest.value) and there == parameter.value | COB_INVALID
@@ -53,7 +53,7 @@ def park(
     on_other: Callable[[can.Message], None],
     powered: Collection[str] = (),
 ) -> list[str]:
-    """Park all drives, reading every object back; what went wrong, one line a drive.
+    """Park all drives and read every object back; returns what went wrong, one line a drive.
 
     No stop waits for this, nothing is tried twice, and nothing is raised. A drive that has kept its
     power is left out: the deadline of its command frames may be what stops it.

@@ -28,9 +28,9 @@ class Port:
         timebase: time base of the bus.
         bus: the interface, for callers that need the driver itself.
         listener: sees every frame, if there is one.
-        listener_error: what the listener raised, in one line; it is not called any more.
-        error_frames: heard so far.
-        may_send: asked before every frame, where not all may go out.
+        listener_error: error that the listener raised, in one line; it is not called any more.
+        error_frames: number of error frames received so far.
+        may_send: filter of the frames that may be sent; none if all may.
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class Port:
         self._echoes = _echoes(bus)
 
     def foreign(self, message: can.Message) -> bool:
-        """Whether somebody else sent a received frame.
+        """Whether a received frame is from another sender.
 
         SocketCAN marks those of every process of this machine as sent, not only our own.
         """
@@ -61,7 +61,7 @@ class Port:
 
     @staticmethod
     def message(cob_id: int, data: bytes = b"") -> can.Message:
-        """A frame for `put`."""
+        """Make a message that `put` sends."""
         return can.Message(arbitration_id=cob_id, data=data, is_extended_id=False, is_rx=False)
 
     def put(self, message: can.Message) -> None:
@@ -84,7 +84,7 @@ class Port:
         self.send(frame.cob_id, frame.data)
 
     def receive(self, until_ns: int) -> can.Message | None:
-        """The next frame, or none until then; remote and extended frames are not for us.
+        """Receive the next frame, none if none comes by `until_ns`; skips remote and extended ones.
 
         Raises:
             BusError: the driver has failed.
@@ -98,7 +98,7 @@ class Port:
                 return None
 
     def take(self) -> can.Message | None:
-        """The next frame that has come already, whatever lies before it; raises BusError."""
+        """Take the next frame that has come already, none if none has; raises BusError."""
         while True:
             message = self._receive(0.0)
             if message is None or self._for_us(message):
@@ -123,10 +123,10 @@ class Port:
         return not (message.is_extended_id or message.is_remote_frame)
 
     def _came_at(self, stamp: float) -> float:
-        """A driver's stamp on our time base [s].
+        """Time of reception on the bus's time base, from a driver's time stamp [s].
 
-        SocketCAN and slcan stamp by the system's clock, adapters by one of their own, which says
-        nothing here: then it is now.
+        SocketCAN and slcan stamp by the system's clock. Other adapters have a clock of their own,
+        which says nothing here: their frames are stamped with the present time.
         """
         now = 1e-9 * self.timebase.now_ns()
         if 0.0 <= now - stamp < OLDEST_S:
@@ -135,7 +135,7 @@ class Port:
         return now - age if 0.0 <= age < OLDEST_S else now
 
     def _tell(self, message: can.Message) -> None:
-        """Show a frame to the listener; one that fails hears nothing more, and ends nothing."""
+        """Show a frame to the listener; one that fails is not called again, and ends nothing."""
         listener = self.listener
         if listener is None:
             return
@@ -147,7 +147,7 @@ class Port:
 
     @property
     def off_bus(self) -> bool:
-        """Whether the controller has left the bus, as far as the driver tells."""
+        """Whether the controller is bus-off, as far as the driver tells."""
         try:
             return self.bus.state is can.BusState.ERROR
         except Exception:
@@ -155,7 +155,7 @@ class Port:
 
 
 def _echoes(bus: can.BusABC) -> bool:
-    """Whether a bus may give back what we send; a SocketCAN socket says so."""
+    """Whether a bus may return the frames sent on it; a SocketCAN socket says so."""
     raw = getattr(bus, "socket", None)
     if not isinstance(raw, socket.socket) or raw.family != getattr(socket, "AF_CAN", None):
         return True

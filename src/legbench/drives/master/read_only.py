@@ -1,4 +1,4 @@
-"""What a master that only looks may send; pure."""
+"""Frames that a read-only master may send; pure."""
 
 from collections.abc import Callable
 
@@ -24,8 +24,10 @@ def may_read(cob_id: int, data: bytes | bytearray) -> bool:
 
 
 def may_pace(master_id: int) -> MaySend:
-    """Questions, and what drives without power need to send process data: start, SYNC, heartbeat,
-    and the order that takes them back to where they were found.
+    """Return the filter of frames that a read-only master may send where nobody else sends SYNC.
+
+    These are questions, and what drives without power need to send process data: start, SYNC,
+    heartbeat, and the order that takes them back to where they were found.
     """
     orders = (NmtCommand.START, NmtCommand.ENTER_PRE_OPERATIONAL)
 

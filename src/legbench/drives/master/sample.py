@@ -11,8 +11,9 @@ _STATUSWORD, _FRESH, _CELSIUS = map(attrgetter, ("statusword", "fresh", "celsius
 
 
 class Sample(NamedTuple):
-    """One cycle; one value a drive, in the order of the leg's joints. A tuple, because one is made
-    a millisecond.
+    """Measurements of one cycle, one value a drive, in the order of the leg's joints.
+
+    It is a named tuple because one is made every millisecond.
     """
 
     time_ns: int

@@ -99,7 +99,7 @@ class SdoPort:
         )
 
     def _run(self, transfer: Upload | Download) -> bool:
-        """Whether the transfer came to its end in time."""
+        """Run a transfer; returns whether it was completed in time."""
         port, timebase = self._port, self._port.timebase
         reply_id = SDO_REPLY_BASE + self.node_id
         if isinstance(transfer, Download):

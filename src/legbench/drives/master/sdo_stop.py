@@ -30,7 +30,7 @@ STATUSWORD, CONTROLWORD = 0x6041, 0x6040
 
 @final
 class SdoStop:
-    """One stop of some drives; raises nothing.
+    """Stop of some drives over SDO; raises nothing.
 
     The controlword goes to all drives at once, before anybody waits for an answer. Whatever a
     step raises, a KeyboardInterrupt out of a driver included, the next step is taken.
@@ -50,9 +50,9 @@ class SdoStop:
         Args:
             port: to the bus.
             nodes: the drives.
-            hold: told what was raised, such as `Shield.hold`.
+            hold: called with what was raised, such as `Shield.hold`.
             beat: this master's heartbeat, if drives watch for it.
-            rest_ns: between two looks [ns].
+            rest_ns: pause between two rounds of reading all statuswords [ns].
         """
         self._port, self._hold = port, hold
         self._nodes = tuple(nodes)
@@ -122,7 +122,7 @@ class SdoStop:
     def _try(self, step: Callable[[], None]) -> bool:
         try:
             step()
-        except BaseException as error:  # As above.
+        except BaseException as error:  # The stop goes on, whatever a driver raises.
             self._note(error)
             return False
         return True
@@ -152,8 +152,8 @@ def leave_operational(
         order: sends the order to all drives, such as `BringUp.pre_operational`.
         port: to the bus.
         nodes: all drives.
-        stopped: how their stop has ended, none if none was needed.
-        hold: told what was raised, such as `Shield.hold`.
+        stopped: report of their stop, none if none was needed.
+        hold: called with what was raised, such as `Shield.hold`.
 
     Returns:
         How the stop has ended now; none if it was not repeated.

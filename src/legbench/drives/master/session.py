@@ -29,7 +29,7 @@ class Session(Closing):
 
     Attributes:
         bus: the interface.
-        config: what hangs on it.
+        config: drives on the bus.
         log: raw frames since `log_to`.
     """
 
@@ -44,8 +44,8 @@ class Session(Closing):
         """Own a bus.
 
         Args:
-            bus: shut down in the end.
-            config: what hangs on it.
+            bus: interface to shut down at the end.
+            config: drives on the bus.
             timebase: time base of the session; by default the bus's.
             lock: lock of the bus's channel, which this session releases if it is held already.
         """
@@ -63,7 +63,7 @@ class Session(Closing):
         return isinstance(self.bus, VirtualBus)
 
     def be_punctual(self, cpu: int | None = None) -> Granted | None:
-        """Ask the system for what a loop in real time needs; none in virtual time.
+        """Ask the system for real-time scheduling; returns none in virtual time.
 
         Links that are made afterwards spend the last part of every wait awake, if it was granted.
         """
@@ -84,7 +84,7 @@ class Session(Closing):
             link.tell(self.log)
 
     def _lock_of_bus(self) -> ChannelLock:
-        """An emulated bus of this process has no other master."""
+        """Lock of the bus's channel; a private one for an emulated bus of this process."""
         name = str(self.bus.channel_info)
         return ChannelLock.private(name) if self.virtual else ChannelLock(name)
 
@@ -94,7 +94,7 @@ class Session(Closing):
             self._lock.acquire()
 
     def port(self) -> Port:
-        """Frames in and out."""
+        """Port of the bus, for frames in and out."""
         return Port(self.bus, self.timebase, self.log)
 
     def bring_up(self) -> BringUp:
@@ -104,7 +104,7 @@ class Session(Closing):
     def link(
         self, limits: SafetyLimits, stiffness: Sequence[float], *, read_only: bool = False
     ) -> Link:
-        """A cyclic link; nothing is sent yet."""
+        """Make a cyclic link; nothing is sent yet."""
         link = Link(
             self.bus,
             self.config,
@@ -121,12 +121,12 @@ class Session(Closing):
         return link
 
     def leads(self, lead: Lead) -> None:
-        """Close somebody who leads drives with this session, before the bus is shut down."""
+        """Register whoever leads drives, to be closed before the bus is shut down."""
         self._leads.append(lead)
 
     @property
     def stopped(self) -> tuple[StopReport, ...]:
-        """How the stops of those who have led drives have ended."""
+        """Reports of the stops of those who have led drives with this session."""
         return tuple(lead.stopped for lead in self._leads if lead.stopped is not None)
 
     def close(self) -> None:
@@ -148,8 +148,8 @@ class Session(Closing):
             try:
                 self.bus.shutdown()
             except BaseException as error:
-                # The drives have been told to stop; the interface itself is beyond help, whatever
-                # it raises: a serial adapter has a ValueError for a garbled line.
+                # The drives have been told to stop; no error of the interface may end the closing:
+                # a serial adapter raises a ValueError for a garbled line.
                 shield.hold(error)
             self._lock.release()
 

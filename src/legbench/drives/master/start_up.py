@@ -68,7 +68,7 @@ class StartUp:
         words: list[int | None] = []
         for axis in self._cycle.axes:
             if not axis.known:
-                # Where its motor is has not been said yet: any target would be a guess.
+                # The motor position is not known yet: any target would be a guess.
                 words.append(None)
                 continue
             step = axis.machine.step(axis.statusword)
@@ -78,7 +78,7 @@ class StartUp:
         self._cycle.send(words)
 
     def faulted(self) -> list[AxisLink]:
-        """Drives in fault."""
+        """Return the drives in fault."""
         return [
             axis for axis in self._cycle.axes if decode_state(axis.statusword) is DriveState.FAULT
         ]

@@ -23,7 +23,7 @@ FAILED_CYCLES = 3
 
 @final
 class StopLadder:
-    """One stop of all drives of a cycle; raises nothing.
+    """Stop of all drives of a cycle; raises nothing.
 
     Whatever a step raises, a KeyboardInterrupt out of a driver included, the next step is taken.
     """
@@ -32,8 +32,8 @@ class StopLadder:
         """Prepare to stop the drives of a cycle.
 
         Args:
-            cycle: led from now on by this alone.
-            hold: told what was raised, such as `Shield.hold`.
+            cycle: cycle of the drives, which this stop alone leads from now on.
+            hold: called with what was raised, such as `Shield.hold`.
         """
         self._cycle, self._hold = cycle, hold
         self._cut_off: list[str] = []
@@ -79,7 +79,7 @@ class StopLadder:
                     [axis.machine.step(axis.statusword).controlword for axis in self._cycle.axes]
                 )
                 break
-            except BaseException as error:  # Until the drives have been told nothing else counts.
+            except BaseException as error:  # The controlwords must be sent, whatever is raised.
                 self._note(error)
 
     def _tick(self) -> None:
@@ -87,7 +87,7 @@ class StopLadder:
         try:
             self._cycle.tick()
             self._failed = 0
-        except BaseException as error:  # As above.
+        except BaseException as error:  # The stop goes on, whatever a cycle raises.
             self._failed += 1
             self._note(error)
         for axis in self._cycle.axes:

@@ -1,4 +1,4 @@
-"""What a stop has achieved, and who leads drives and so has to stop them."""
+"""Report of a stop, and the base class of whoever leads drives and so has to stop them."""
 
 from abc import abstractmethod
 from dataclasses import dataclass, replace
@@ -10,7 +10,7 @@ from legbench.drives.errors import StopError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StopReport:
-    """How a stop of all drives of one master has ended; drives by their names in the bus file."""
+    """Result of a stop of all drives of one master, by their names in the bus file."""
 
     powered: tuple[str, ...] = ()
     """Drives that still show a state with power."""
@@ -21,7 +21,7 @@ class StopReport:
     cut_off: tuple[str, ...] = ()
     """Drives whose voltage was disabled before their quick-stop ramp had ended."""
     errors: tuple[str, ...] = ()
-    """What went wrong on the way, such as a frame that could not be sent."""
+    """Errors raised during the stop, such as a frame that could not be sent."""
 
     @property
     def verified(self) -> bool:
@@ -30,7 +30,7 @@ class StopReport:
 
     @property
     def trouble(self) -> str | None:
-        """What a person beside the leg has to know, in one line; none after a verified stop."""
+        """Warning to the person beside the leg, in one line; none after a verified stop."""
         parts = [
             f"drive '{name}' keeps its power after the stop ({state}): switch its power off"
             for name, state in zip(self.powered, self.states, strict=True)
@@ -43,7 +43,7 @@ class StopReport:
         return "; ".join(parts) or None
 
     def after(self, earlier: "StopReport | None") -> "StopReport":
-        """This report of a stop that repeats an earlier one, with what that had to tell."""
+        """Return this report of a repeated stop, joined with what the earlier one had to tell."""
         if earlier is None:
             return self
         return replace(
@@ -54,10 +54,10 @@ class StopReport:
 
 
 class Lead(Closing):
-    """Whoever may give drives power, and takes it away when its `with` ends.
+    """Base class of whatever gives drives power, and takes it away when its `with` ends.
 
     Attributes:
-        stopped: how its last stop has ended; none if it never had to stop anything.
+        stopped: report of its last stop; none if it never had to stop anything.
     """
 
     stopped: StopReport | None = None

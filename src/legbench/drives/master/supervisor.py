@@ -1,4 +1,4 @@
-"""What ends a run besides the limits of motion: the bus, the grid, the drives' own state."""
+"""Checks that end a run besides the limits of motion: bus, grid, and state of the drives."""
 
 import math
 from typing import final
@@ -12,7 +12,7 @@ from legbench.limits.safety import SafetyLimits
 
 FOLLOWS = int(StatusBit.FOLLOWS_COMMAND)
 MISSING_TEMPERATURES = 3
-"""Requests in a row without an answer that end the run, where a temperature is limited."""
+"""Number of unanswered temperature requests in a row that end a run with such a limit."""
 
 
 @final

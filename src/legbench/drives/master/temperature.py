@@ -13,7 +13,7 @@ EVERY_CYCLES = 200
 
 @final
 class TemperaturePoll:
-    """Asks every so many cycles; a drive that does not answer is asked again.
+    """Poll of a drive's temperature every `EVERY_CYCLES` cycles; an unanswered request is repeated.
 
     Attributes:
         celsius: last temperature, none before or where the bus file names no object [deg C].

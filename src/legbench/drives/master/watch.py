@@ -1,4 +1,4 @@
-"""What a master knows of a drive besides its process data: heartbeat, emergencies, losses; pure."""
+"""Watch of a drive besides its process data: heartbeat, emergencies, losses; pure."""
 
 from typing import final
 
@@ -74,7 +74,7 @@ class NodeWatch:
             self.lost_total += 1
 
     def trouble(self, now_ns: int, lost_frames: int) -> tuple[str, str] | None:
-        """Cause and message of what is wrong, if anything is."""
+        """Cause and message of what is wrong with the drive; none if nothing is."""
         who = self._who
         if self.emergency is not None:
             return "drive emergency", f"{who}: {self.emergency}"

@@ -58,7 +58,7 @@ class Mode(IntEnum):
 
 
 class StatusBit(IntEnum):
-    """Bits of 6041h."""
+    """Bits of the statusword (6041h)."""
 
     VOLTAGE_ENABLED = 1 << 4
     WARNING = 1 << 7
@@ -100,7 +100,7 @@ def decode_state(statusword: int) -> DriveState | None:
 
 
 def describe_statusword(statusword: int) -> str:
-    """A statusword in words."""
+    """Description of a statusword: its state and set bits."""
     state = decode_state(statusword)
     words = [state.value if state is not None else "unknown state"]
     words += [text for bit, text in _BIT_WORDS if statusword & bit]

@@ -50,7 +50,7 @@ SHORT_NAMES = {
     "str": DataType.VISIBLE_STRING,
     "bytes": DataType.OCTET_STRING,
 }
-"""How files name the types."""
+"""Names of the types in files."""
 
 
 def size_of(kind: DataType) -> int | None:

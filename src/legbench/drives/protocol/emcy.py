@@ -30,12 +30,12 @@ MEANINGS = {
     0xFF10: "set points missing",
     0xFF11: "SYNC missing",
 }
-"""Error code -> words."""
+"""Meaning of each error code."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Emergency:
-    """What a node reports once when an error comes, and with code 0 when all have gone."""
+    """Emergency message of a node, sent once when an error comes; code 0 says all have gone."""
 
     node_id: int
     code: int
@@ -46,7 +46,7 @@ class Emergency:
 
     @property
     def meaning(self) -> str:
-        """The code in words."""
+        """Meaning of the error code."""
         known = MEANINGS.get(self.code)
         if known is not None:
             return known
@@ -57,7 +57,7 @@ class Emergency:
 
 
 def emcy_frame(emergency: Emergency) -> Frame:
-    """An emergency as its frame."""
+    """Frame of an emergency message."""
     data = _LAYOUT.pack(emergency.code, emergency.register, emergency.vendor)
     return Frame(EMCY_BASE + emergency.node_id, data)
 

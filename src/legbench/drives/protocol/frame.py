@@ -49,7 +49,7 @@ def sync_frame(counter: int | None = None) -> Frame:
 
 
 def describe_id(cob_id: int) -> str:
-    """What an 11-bit identifier carries in the predefined connection set, such as `TPDO1 of 5`."""
+    """Meaning of an 11-bit identifier in the predefined connection set, such as `TPDO1 of 5`."""
     if cob_id in (NMT_ID, SYNC_ID, TIME_ID):
         return {NMT_ID: "NMT", SYNC_ID: "SYNC", TIME_ID: "TIME"}[cob_id]
     for base, name in _BASES:

@@ -42,7 +42,7 @@ def decode_nmt(data: bytes) -> tuple[NmtCommand, int] | None:
 
 
 def heartbeat_frame(node_id: int, state: NmtState) -> Frame:
-    """Heartbeat, or boot-up, of a node."""
+    """Frame of a heartbeat, or of the boot-up message, of a node."""
     return Frame(HEARTBEAT_BASE + node_id, bytes((state,)))
 
 

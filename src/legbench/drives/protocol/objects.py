@@ -22,7 +22,7 @@ TEMPERATURE = 0x2070
 
 
 class Access(Enum):
-    """Who may read or write an object by SDO."""
+    """Access to an object by SDO: reading, writing or both."""
 
     CONST = "const"
     RO = "ro"
@@ -32,7 +32,7 @@ class Access(Enum):
 
 @dataclass(frozen=True, slots=True)
 class ObjectEntry:
-    """One object or sub-object."""
+    """Entry of the object dictionary: an object or sub-object."""
 
     index: int
     sub: int

@@ -13,7 +13,7 @@ MAX_BYTES = 8
 
 @dataclass(frozen=True, slots=True)
 class Mapped:
-    """One object in a PDO.
+    """Object that is mapped into a PDO.
 
     Raises:
         CodecError: a type of variable length.
@@ -29,7 +29,7 @@ class Mapped:
 
     @property
     def bits(self) -> int:
-        """Length [bits]."""
+        """Length of the object [bits]."""
         return 8 * (size_of(self.kind) or 0)
 
     @property

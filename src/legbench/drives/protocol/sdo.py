@@ -6,7 +6,7 @@ from enum import IntEnum
 from legbench.drives.errors import SdoAbortError
 
 MUX = struct.Struct("<BHB")
-"""Command specifier, index, sub-index."""
+"""Layout of the first four bytes of an SDO frame: command specifier, index, sub-index."""
 SIZE = struct.Struct("<I")
 FRAME = 8
 """Length of every SDO frame [bytes]."""

@@ -18,7 +18,7 @@ from legbench.drives.protocol.sdo import (
 
 
 class Progress(Enum):
-    """What a reply did to a transfer."""
+    """Effects of a reply on a transfer."""
 
     IGNORED = "not a reply to this transfer"
     NEXT = "send `request`"
@@ -26,7 +26,7 @@ class Progress(Enum):
 
 
 class _Transfer:
-    """What uploads and downloads share: the object, aborts, the toggle bit.
+    """Common part of uploads and downloads: the object, aborts, the toggle bit.
 
     Attributes:
         request: the frame to send next; after an error the abort to send, or empty.

@@ -7,7 +7,7 @@ python-can and newer adapters mean by them.
 from legbench.drives.protocol.frame import Frame
 
 OK, REFUSED = b"\r", b"\a"
-"""End of every line of an adapter."""
+"""Characters that end an adapter's lines: of accepted and of refused commands."""
 BITRATES = dict(
     zip(
         (f"S{digit}" for digit in range(10)),
@@ -18,7 +18,7 @@ BITRATES = dict(
 BTR_CLOCK = 8_000_000
 """Clock of the bit timing of an SJA1000, half its crystal's frequency, for the command `s` [Hz]."""
 STANDARD, EXTENDED = 3, 8
-"""Hexadecimal digits of an identifier."""
+"""Number of hexadecimal digits of a standard and of an extended identifier."""
 
 
 def format_frame(frame: Frame) -> bytes:

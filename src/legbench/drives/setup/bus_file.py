@@ -203,7 +203,7 @@ def _build(
 
 
 def _finite(where: str, name: str, value: float) -> float:
-    """A number that arithmetic can take; one that says nothing is left out, not infinite."""
+    """Return a number of a file, refusing one that is infinite, not a number or too large."""
     if not abs(value) < LARGEST:
         text = f"{value}" if isinstance(value, float) else "too large"
         raise ConfigError(

@@ -1,4 +1,4 @@
-"""What the numbers of a bus file may be; pure."""
+"""Ranges of the numbers of a bus file; pure."""
 
 from collections.abc import Mapping, Sequence
 

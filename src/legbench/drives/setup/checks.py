@@ -1,4 +1,4 @@
-"""What bus and limits files must fulfil together before drives are led or looked at; pure."""
+"""Checks of bus and limits files together, before drives are led or observed; pure."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""Which identifiers process data may have (CiA 301, 7.3.5: restricted CAN-IDs); pure."""
+"""Identifiers that process data may have (CiA 301, 7.3.5: restricted CAN-IDs); pure."""
 
 from collections.abc import Mapping
 

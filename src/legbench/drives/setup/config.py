@@ -48,7 +48,7 @@ class Identity:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PdoConfig:
-    """One synchronous process data object (1400h/1600h or 1800h/1A00h and following).
+    """Synchronous process data object (1400h/1600h or 1800h/1A00h and following).
 
     Raises:
         ConfigError: a number that does not exist, or objects that fill no frame.
@@ -83,7 +83,7 @@ TPDO = PdoConfig(number=1, objects=(STATUSWORD, POSITION_ACTUAL, LINK_POSITION_S
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NodeConfig:
-    """One drive.
+    """Configuration of one drive.
 
     Raises:
         ConfigError: a node id that does not exist, or process data that cannot close the loop.

@@ -46,7 +46,7 @@ def dcf_text(bus: BusConfig, node: NodeConfig) -> str:
 def _text(name: str, values: Mapping[Key, int], commissioning: Mapping[str, str] | None) -> str:
     sections = [*_head(name)]
     if commissioning is not None:
-        # CiA 306 spells it so.
+        # The spelling is that of CiA 306.
         sections.append(_section("DeviceComissioning", commissioning))
     indices = sorted({index for index, _ in OBJECTS})
     for words, chosen in (

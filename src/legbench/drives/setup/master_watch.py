@@ -1,4 +1,4 @@
-"""How each drive notices that its master has died, and how soon it stands then; pure.
+"""Time within which every drive notices that its master has died, and stands; pure.
 
 A process that is killed, a computer that hangs and a cable that is pulled send no quick stop. What
 counts is therefore not the value of a key but a property: by at least one of its own means every
@@ -57,7 +57,7 @@ def means_of(
         commands: RPDOs are sent, as in a run; the deadline of one that never comes never ends.
     """
     ramp_ms = _ramp_ms(node, speed)
-    # A drive looks at its timers once in a cycle of its own.
+    # A drive checks its timers once per cycle of its own.
     late_ms = 1e-3 * config.period_us
     found: list[tuple[str, float]] = []
     if node.heartbeat_consumer:

@@ -1,4 +1,4 @@
-"""How far a motor runs on after a quick stop, from the limits and the drive's own ramp."""
+"""Way of a motor during a quick stop, from the limits and the drive's own ramp."""
 
 import math
 

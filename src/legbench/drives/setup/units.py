@@ -14,7 +14,7 @@ LEAST_GEAR = 1e-4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AxisUnits:
-    """How an encoder counts an angle: `counts = offset + sign gear counts_per_rev angle / 2 pi`.
+    """Units of one axis: `counts = offset + sign gear counts_per_rev angle / 2 pi`.
 
     Raises:
         ConfigError: a number of counts, a gear or a sign that no axis has.

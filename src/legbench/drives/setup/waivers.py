@@ -1,4 +1,4 @@
-"""What a bus and a limits file waive, in words that every run repeats; pure."""
+"""Protections that a bus and a limits file waive, in words that every run repeats; pure."""
 
 import math
 

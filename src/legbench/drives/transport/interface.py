@@ -1,4 +1,4 @@
-"""What Linux says of a CAN interface before it is opened: whether it is up, and its bitrate."""
+"""State of a CAN interface in Linux before it is opened: whether it is up, and its bitrate."""
 
 import json
 import subprocess
@@ -13,7 +13,7 @@ IFF_UP = 1
 ASK_S = 5.0
 """Longest that `ip` may take to answer [s]."""
 Details = Callable[[str], str]
-"""What `ip -json -details link show` prints of an interface."""
+"""Function that returns the output of `ip -json -details link show` for an interface."""
 
 
 def ask_ip(channel: str) -> str:

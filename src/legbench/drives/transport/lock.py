@@ -1,4 +1,4 @@
-"""One master a channel: a lock of this computer that the end of the process releases.
+"""Lock that gives a channel one master per computer; the end of the process releases it.
 
 The lock is a name among the kernel's abstract AF_UNIX sockets (unix(7)), not a file: nothing to
 truncate, no link or FIFO to be led to, no owner or umask that shuts other users out, nothing left
@@ -19,7 +19,7 @@ from legbench.drives.errors import BusError
 BY_FILE = ("legbench_unix", "serial", "slcan")
 """Interfaces whose channels are files, also where a name has no slash in it."""
 LONGEST_ADDRESS = 107
-"""What `sun_path` leaves to an abstract name after its leading zero, unix(7) [bytes]."""
+"""Longest abstract name that fits `sun_path` after its leading zero, unix(7) [bytes]."""
 ASKED_AT_MOST = 4096
 """Refused processes whose question for the holder can be answered (`net.core.somaxconn`)."""
 CREDENTIALS = struct.Struct("3i")
@@ -36,7 +36,7 @@ class ChannelLock:
             that is used by default.
 
     Attributes:
-        address: what is bound; two locks of one address exclude each other.
+        address: socket address that is bound; two locks of one address exclude each other.
     """
 
     def __init__(self, name: str, scope: Path | None = None) -> None:
@@ -93,7 +93,7 @@ class ChannelLock:
                 "bus move the leg twice, and an adapter on a serial line serves one program: end "
                 "that one first"
             ) from None
-        # Its number alone: a lock that is forgotten stays held, as one of a file would.
+        # The descriptor is detached, so that a lock object that is dropped stays held.
         return taken.detach()
 
     def _holder(self) -> str:
@@ -103,7 +103,7 @@ class ChannelLock:
             try:
                 asking.connect(self.address)
             except OSError:
-                # It does not listen yet, ends right now, or has been asked too often.
+                # The holder does not listen yet, is ending, or has been asked too often.
                 return "unknown"
             told = asking.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, CREDENTIALS.size)
         # 0: a process of another pid namespace, such as one outside this container.

@@ -1,4 +1,4 @@
-"""What the operating system grants a loop that has to be on time."""
+"""Real-time services of the operating system: scheduling, locked memory, own processor."""
 
 import ctypes
 import ctypes.util
@@ -45,7 +45,7 @@ def ask(cpu: int | None = None, priority: int = PRIORITY) -> Granted:
         fifo=fifo,
         mlockall=_lock_memory(),
         affinity=_pin(cpu),
-        # On a single processor whoever spins keeps the others from answering.
+        # A process that spins on a single processor keeps the others from answering.
         spin_us=SPIN_NS // 1000 if granted and len(os.sched_getaffinity(0)) > 1 else 0,
         kernel=platform.release(),
         preemption=_preemption(),

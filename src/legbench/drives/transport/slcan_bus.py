@@ -19,20 +19,20 @@ from legbench.drives.protocol.frame import Frame
 from legbench.drives.protocol.slcan import OK, REFUSED, format_frame, parse_frame
 
 CHUNK = 4096
-"""Bytes that are read at once."""
+"""Largest number of bytes read at once."""
 CLOSING_S = 0.1
 """Longest that an adapter may take to be told to close its channel [s]."""
 
 
 @final
 class SlcanBus(slcanBus):
-    """An adapter on a serial line."""
+    """Bus behind a CAN adapter on a serial line."""
 
     def __init__(self, channel: str, **options: Any) -> None:
-        """Open it; raises as python-can's does."""
+        """Open the adapter; raises as python-can's `slcanBus` does."""
         self._partial, self._unsent = b"", b""
         self._lines: deque[bytes] = deque()
-        self._is_shutdown = True  # One that does not open has nothing to be shut down.
+        self._is_shutdown = True  # A bus that fails to open has nothing to shut down.
         super().__init__(channel, **options)
         self._is_shutdown = False
         self.serialPortOrig.write_timeout = CLOSING_S

@@ -13,7 +13,7 @@ class Timebase(Protocol):
     """Monotonic time, and waiting for a point of it."""
 
     def now_ns(self) -> int:
-        """Now [ns]."""
+        """Return the present time [ns]."""
         ...
 
     def wait_until(self, at_ns: int) -> None:
@@ -36,7 +36,7 @@ class SystemTime:
         self._timespec = _Timespec()
 
     def now_ns(self) -> int:
-        """Now [ns]."""
+        """Return the present time [ns]."""
         return time.monotonic_ns()
 
     def wait_until(self, at_ns: int) -> None:

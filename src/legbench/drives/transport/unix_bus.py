@@ -18,13 +18,13 @@ from can.typechecking import CanFilters
 from legbench.drives.protocol.frame import Frame
 
 PACKET = struct.Struct("<IB8s")
-"""Identifier with flags, length, data."""
+"""Layout of a packet: identifier with flags, length, data."""
 EXTENDED, REMOTE, ERROR, ID_MASK = 1 << 31, 1 << 30, 1 << 29, (1 << 29) - 1
 BITRATE = struct.Struct("<I")
 
 
 def pack_frame(frame: Frame) -> bytes:
-    """A frame as one packet."""
+    """Pack a frame into one packet."""
     flags = EXTENDED * frame.extended | REMOTE * frame.remote | ERROR * frame.error
     return PACKET.pack(frame.cob_id | flags, len(frame.data), frame.data)
 
@@ -132,7 +132,7 @@ class UnixBus(can.BusABC):
         return self._socket.fileno()
 
     def shutdown(self) -> None:
-        """Disconnect."""
+        """Disconnect from the serving process."""
         if not self._is_shutdown:
             self._socket.close()
         super().shutdown()

@@ -1,4 +1,4 @@
-"""The one door to video and image files."""
+"""Reading and writing of video and image files: the only module that imports imageio."""
 
 from legbench.errors import MissingExtraError
 

@@ -19,7 +19,7 @@ from legbench.viz.run_model import model_of
 
 CAMERA = "side"
 CALM = 0.5
-"""The camera follows the mean of the hip over this time, not each sway [s]."""
+"""Time over which the hip is averaged for the camera to follow smoothly [s]."""
 
 
 ABOVE, BELOW = 0.10, 0.06
@@ -28,7 +28,7 @@ ABOVE, BELOW = 0.10, 0.06
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Size:
-    """Of an image [pixels]; even, as video encoders ask."""
+    """Size of an image [pixels]; both sides are even, as video encoders require."""
 
     width: int
     height: int
@@ -76,7 +76,7 @@ class Film:
                 yield screen.draw(scene)
 
     def _frame(self, points: Floats) -> Floats:
-        """Where the camera must stand (3,) to see every height that trunk and leg reach [m]."""
+        """Camera position (3,) from which every height that trunk and leg reach is seen [m]."""
         model, data = self._puppet.model, self._puppet.data
         mujoco.mj_kinematics(model, data)
         mujoco.mj_camlight(model, data)
@@ -88,7 +88,7 @@ class Film:
         return np.array([0.0, 0.0, 0.5 * (low + high)]) + distance * backwards
 
     def _ahead(self, rows: Ints, follow: bool) -> Floats:
-        """How far the camera has gone with the hip (m,) [m]."""
+        """Forward position (m,) of the camera, which follows the averaged hip or stays put [m]."""
         forward = self._hip[:, 0]
         if not follow:
             return np.full(len(rows), forward[rows].mean())

@@ -26,16 +26,16 @@ except ImportError as error:
 Image = NDArray[np.uint8]
 
 LIBRARIES = {"egl": "EGL", "osmesa": "OSMesa"}
-"""OpenGL without a display, in the order of preference: name for MUJOCO_GL, shared library."""
+"""OpenGL libraries that need no display, best first: value of MUJOCO_GL -> shared library."""
 WAY_OUT = "on Debian install libegl1 and libgl1-mesa-dri"
 REFUSALS = (ImportError, AttributeError, OSError, RuntimeError, OpenGLError, mujoco.FatalError)
-"""How a machine without a working driver shows, depending on what is missing."""
+"""Exceptions that a machine without a working OpenGL driver raises."""
 
 
 def backend() -> str:
     """The OpenGL that will be used: what MUJOCO_GL asks for, else what the machine has.
 
-    Chosen here and not by MuJoCo, which decides once, when it is imported.
+    The choice is made here because MuJoCo decides only once, when it is imported.
 
     Raises:
         MissingExtraError: there is none.

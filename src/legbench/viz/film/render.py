@@ -20,14 +20,14 @@ SUFFIXES = (".mp4", ".gif", ".png")
 VIDEO, ANIMATION = Size(width=800, height=600), Size(width=480, height=360)
 FRAME, STILL = Size(width=960, height=720), Size(width=240, height=420)
 VIDEO_FPS, ANIMATION_FPS = 30, 20
-"""GIF counts in hundredths of a second, so 20 a second is exact and 30 is not."""
+"""Frame rates [1/s]: GIF counts in hundredths of a second, so 20 is exact there and 30 is not."""
 GAP = 3
-"""Between stills [pixels]."""
+"""Gap between two stills of a series [pixels]."""
 STILLS = 7
-"""From one lower apex to the next, as in Fig. 7."""
+"""Number of stills in a series from one lower apex to the next, as in Fig. 7."""
 
 Progress = Callable[[int, int], None]
-"""Called with the frames done and the frames in all."""
+"""Callback of a rendering's progress: number of frames done, number of frames in all."""
 
 
 def render(
@@ -41,9 +41,9 @@ def render(
 
     Args:
         recording: the run, whose folder holds its model.
-        path: where to; an older file is replaced when the new one is whole.
-        time: for a .png, the one instant to draw [s].
-        progress: told after each frame.
+        path: file to write; an older one is replaced when the new one is whole.
+        time: instant to draw, for a .png of a single one [s].
+        progress: called after each frame.
 
     Raises:
         ConfigError: another suffix, or a `time` that is outside the run or not for a .png.
@@ -69,7 +69,7 @@ def render(
 
 
 def _frames(recording: Recording, fps: int) -> Ints:
-    """Rows that a video in real time shows."""
+    """Rows (n,) that a video in real time shows."""
     time = recording.time
     instants = np.arange(time[0], time[-1] + 0.5 / fps, 1.0 / fps)
     return np.minimum(np.searchsorted(time, instants), len(time) - 1)
@@ -126,7 +126,7 @@ def _row_at(recording: Recording, time: float) -> Ints:
 
 
 def _still_rows(recording: Recording) -> Ints:
-    """Evenly spread over the last jump, lower apex to lower apex; else the last period."""
+    """Rows of the stills, evenly spread over the last jump, or the last period without jumps."""
     run = Analysis(recording)
     jumps, periods, begin, end = run.gait.jumps, run.periods, run.time[0], run.time[-1]
     if len(jumps):

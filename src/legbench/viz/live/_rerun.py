@@ -1,4 +1,4 @@
-"""The one door to rerun."""
+"""Import of rerun, an optional dependency: every other module imports it from here."""
 
 from legbench.errors import MissingExtraError
 

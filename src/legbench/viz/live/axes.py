@@ -1,4 +1,4 @@
-"""What stands around an XY plot in rerun: frame, grid, ticks, labels and the modal lines.
+"""Axes of an XY plot in rerun: frame, grid, ticks, labels and the modal lines.
 
 The data live in their own units under `<path>/data`; the static transform put there stretches
 them into a box of `WIDTH` x `HEIGHT` plot units whose lower left corner is the plot's origin.
@@ -14,7 +14,7 @@ from legbench.viz.live._rerun import rr
 from legbench.viz.ticks import tick_labels, ticks
 
 WIDTH = HEIGHT = 4.0
-"""Of the plot's box [plot units]."""
+"""Width and height of the plot's box [plot units]."""
 STRONG, FAINT = (*style.GREY, 170), (*style.GREY, 60)
 HAIR, LINE, NONE = rr.Radius.ui_points(0.5), rr.Radius.ui_points(0.8), rr.Radius.ui_points(0.0)
 """Radii in screen points: the transform stretches scene units unevenly."""
@@ -24,20 +24,20 @@ Span = tuple[float, float]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlotSpec:
-    """What an XY plot is: where it lives, what its axes say, how long its trail is."""
+    """Specification of an XY plot: entity path, axis titles, ranges and trail."""
 
     path: str
     title: str
     x: style.AxisTitle
     y: style.AxisTitle
     equal: bool = False
-    """One unit is as long on both axes."""
+    """Whether one unit is as long on both axes."""
     through: tuple[float, float] | None = None
-    """Point of the modal lines w1 and w2; none: no lines."""
+    """Point that the modal lines w1 and w2 pass; none draws no lines."""
     margin: float = 0.06
     """Free room around the data, as a share of their range."""
     least: tuple[float, float] = (0.0, 0.0)
-    """Shortest ranges of x and y: less motion than that is to look like none."""
+    """Shortest ranges of x and y, so that very small motion is not magnified."""
     trail: float = 2.0
     """Time that the coloured trail covers [s]."""
 

@@ -1,4 +1,4 @@
-"""How the viewer lays out what `publish` logs."""
+"""Layout of the viewer for what `publish` logs."""
 
 from collections.abc import Sequence
 
@@ -21,7 +21,7 @@ def blueprint(
     """The layout: leg and facts, the four planes, the signals over time.
 
     Args:
-        facts: of the run.
+        facts: facts of the run.
         room: lowest and highest point that the pictures of the leg show [m].
         live: follow the newest rows and let the series slide.
         others: keys of the other runs that are shown in the same views.

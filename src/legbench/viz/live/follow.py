@@ -19,17 +19,17 @@ from legbench.viz.live.publish import Publisher
 from legbench.viz.live.tail import Tail, rows_of
 
 CLOSING_LOOKS = 40
-"""How often to look whether the writer has made its archive, after the last row."""
+"""Largest number of looks for the writer's archive after the last row."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pace:
-    """When to look, and until when."""
+    """Timing of the looks at a growing run, and the condition that ends them."""
 
     wait: Callable[[], None]
-    """Returns when it is time for the next look."""
+    """Waits until it is time for the next look."""
     over: Callable[[], bool]
-    """Whether nobody writes any more, which a torn stream does not show."""
+    """Tells whether the writer has gone, which a truncated stream does not show."""
 
 
 def follow(folder: Path, stream: rr.RecordingStream, pace: Pace) -> int:

@@ -19,11 +19,11 @@ from legbench.viz.live.leg2d import PATH, hip_of
 from legbench.viz.trace import Thinner, Tracer
 
 COLOURS: tuple[style.Rgb, ...] = ((200, 150, 198), (196, 176, 130), (130, 180, 150))
-"""Of the first, second and third other run, pale on dark and light grounds; then again."""
+"""Colours of the other runs in turn, pale on dark and light grounds; the fourth has the first."""
 SEGMENT, TIP = 0.0028, 0.0045
-"""Radii [m]."""
+"""Radii of segments and foot tip [m]."""
 OPACITY = 170
-"""Of the leg [of 255]."""
+"""Opacity of the other run's leg [of 255]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,26 +33,26 @@ class Other:
     recording: Recording
     facts: Facts
     place: int
-    """In the order given, from 0."""
+    """Index of this run among the other runs, in the order given, from 0."""
 
     @property
     def key(self) -> str:
-        """Its entities' own part of the path."""
+        """Part of the entity paths that belongs to this run alone."""
         return f"other_{self.place + 1}"
 
     @property
     def name(self) -> str:
-        """Plant, linkage and design."""
+        """Title of the run: plant, linkage and design."""
         return self.facts.run.title
 
     @property
     def label(self) -> str:
-        """What legends with little room call it."""
+        """Short name of the run for legends with little room."""
         return f"other {self.place + 1}"
 
     @property
     def colour(self) -> style.Rgb:
-        """Of all that is drawn of it."""
+        """Colour of everything that is drawn of this run."""
         return COLOURS[self.place % len(COLOURS)]
 
 
@@ -77,7 +77,7 @@ class Ghost:
         self.trace = Tracer(other.facts).extend(other.recording)
 
     def push(self) -> None:
-        """Add the whole run."""
+        """Add all rows of the run."""
         self._push_joints()
         self._push_leg()
 
@@ -111,6 +111,6 @@ class Ghost:
         self._stream.send_columns(f"{path}/tip", index, tips)
 
     def _leg(self) -> Floats:
-        """Hip, knees and tip in the world (n, 4, 2) [m]."""
+        """Positions of hip, knees and foot tip in the world (n, 4, 2) [m]."""
         hip = hip_of(self._other.recording, self._other.facts)
         return hip[:, None] + leg_points(self.trace.joint, self._other.facts.run.design.lengths)

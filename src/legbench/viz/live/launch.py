@@ -19,7 +19,7 @@ class LiveView:
     """A live view that has been started.
 
     Attributes:
-        url: of the page to open in a browser; None for a window.
+        url: address of the page to open in a browser; None for a window.
     """
 
     def __init__(self, process: "subprocess.Popen[bytes]", url: str | None) -> None:
@@ -28,7 +28,7 @@ class LiveView:
 
     @property
     def pid(self) -> int:
-        """Of the program that follows the run."""
+        """Process id of the program that follows the run."""
         return self._process.pid
 
     @property
@@ -56,9 +56,9 @@ def start_live(
     """Start watching a run that is about to write its first row.
 
     Args:
-        run_folder: of the run; its manifest is there.
-        serve: to a browser on this machine rather than in a window.
-        port: of the viewer; one that already listens is used.
+        run_folder: folder of the run; its manifest is there.
+        serve: show it in a browser on this machine rather than in a window.
+        port: port of the viewer; one that already listens is used.
         save: write an `.rrd` file instead of opening a viewer.
 
     Raises:

@@ -13,17 +13,17 @@ from legbench.viz.live._rerun import rr, rrb
 from legbench.viz.trace import Thinner, TracedRows
 
 FREQ = 100.0
-"""Of the drawings [Hz]."""
+"""Rate at which the stick figure is drawn [Hz]."""
 PATH, VIEW = "/leg/plane", "/leg/view"
-"""What is drawn, and the frame it is seen from, which goes along with the hip."""
+"""Entity paths of the drawing, and of the frame that follows the hip and shows it."""
 TRUNK_HALF = (0.055, 0.02)
 """Half width and half height of the trunk [m]."""
 FORCE_SCALE = 0.003
 """Length of the arrow that shows the contact force [m/N]."""
 FORCE_MAX = 80.0
-"""The arrow grows no more from here on: impacts peak at hundreds of newtons [N]."""
+"""Largest force that the arrow shows to scale, as impacts peak at hundreds of newtons [N]."""
 SEGMENT, BAR, JOINT, TIP = 0.0045, 0.0018, 0.0055, 0.0065
-"""Radii [m]."""
+"""Radii of segments, bars, joints and foot tip [m]."""
 
 
 def bar_points(joint: Floats, lengths: tuple[float, float, float], arm: float) -> list[Floats]:
@@ -38,7 +38,7 @@ def bar_points(joint: Floats, lengths: tuple[float, float, float], arm: float) -
 
 @final
 class Leg2D:
-    """Publishes the stick figure."""
+    """Publisher of the leg's stick figure."""
 
     def __init__(self, stream: rr.RecordingStream, facts: Facts) -> None:
         self._stream = stream

@@ -13,7 +13,7 @@ from legbench.viz.live.xyplot import XYPlot
 from legbench.viz.trace import Thinner, TracedRows
 
 FREQ = 200.0
-"""Of the trajectories: a period has a hundred points [Hz]."""
+"""Rate of the trajectories' points, about a hundred a period [Hz]."""
 
 
 def plot_specs(facts: Facts) -> dict[str, PlotSpec]:

@@ -1,4 +1,4 @@
-"""What a run shows in rerun: the only code that knows which entity carries what.
+"""Publishing of a run in rerun: the only code that knows which entity carries what.
 
 A run is published whole, or in slices while it is still going on; both give the same entities
 with the same rows.
@@ -22,7 +22,7 @@ from legbench.viz.live.states import States
 from legbench.viz.trace import Tracer
 
 APPLICATION = "legbench"
-"""Under which the viewer keeps the layout that a user arranged."""
+"""Application id under which the viewer keeps the layout that a user has arranged."""
 
 
 @final
@@ -55,7 +55,7 @@ class Publisher:
         self.describe(facts)
 
     def describe(self, facts: Facts, summary: Summary | None = None) -> None:
-        """Show a run's facts; again once it has ended and is rated."""
+        """Show a run's facts; called again once the run has ended and is rated."""
         others = [
             f"{other.label}: {other.name}, run `{other.facts.run.id}`" for other in self._others
         ]

@@ -28,15 +28,15 @@ class RatedRows:
 
     key: int
     time: float
-    """Of its first row [s]."""
+    """Time of the first row [s]."""
     rows: int
     rated: int
-    """Rows that have a direction."""
+    """Number of rows with a direction of motion, which alone are rated."""
     total: float
-    """Of their alignments."""
+    """Sum of the alignments of the rated rows [-]."""
 
     def add(self, more: "RatedRows | None") -> None:
-        """Rows that turned out to belong to it."""
+        """Add rows that have turned out to belong to the same period or phase."""
         if more is not None:
             self.rows += more.rows
             self.rated += more.rated
@@ -45,7 +45,7 @@ class RatedRows:
 
 @final
 class RatingSeries:
-    """Publishes P^r of every finished period; of stance and flight apart for jumps."""
+    """Publisher of P^r of every finished period, or of every stance and flight of a jump."""
 
     def __init__(self, stream: rr.RecordingStream, facts: Facts) -> None:
         self._stream = stream
@@ -53,9 +53,9 @@ class RatingSeries:
         self._jumps = facts.run.jumps
         self._now: RatedRows | None = None
         self._next: RatedRows | None = None
-        """What may be the stretch after it, or chatter."""
+        """Rows after `_now`: the next stretch, or contact chatter."""
         self._gap: RatedRows | None = None
-        """Between contacts of which none has lasted."""
+        """Flight rows after a contact that may still turn out to be chatter."""
         self._whole = False
         for name in ("flight", "stance") if facts.run.jumps else ("period",):
             looks = rr.SeriesLines(
@@ -77,12 +77,12 @@ class RatingSeries:
             self._take(RatedRows(key, time, int(stop - first), rated, total))
 
     def finish(self) -> None:
-        """The run is over: what had begun may have been longer than what was seen of it."""
+        """Rate the last stretch whose end was seen; the one under way is left out."""
         if self._now is not None and self._next is not None:
             self._close(self._now, self._next.time)
 
     def _take(self, rows: RatedRows) -> None:
-        """Rows of one kind, in the order of `metrics.stance`: gaps are filled, then contacts."""
+        """Take rows of one kind; as in `metrics.stance`, gaps are filled first, then contacts."""
         if self._now is None:
             self._now = rows
         elif self._next is None and rows.key == self._now.key:

@@ -17,7 +17,7 @@ def write_rrd(recording: Recording, path: Path, against: Sequence[Recording] = (
 
     Args:
         recording: the run.
-        path: of the file.
+        path: path of the file.
         against: other runs, shown in the same views from the same t = 0, in its modal convention.
 
     Raises:

@@ -15,15 +15,15 @@ from legbench.viz.style import Colours
 from legbench.viz.trace import Thinner, TracedRows
 
 PATH, VIEW = "/scene/model", "/scene/view"
-"""What is drawn, and the frame it is seen from, which goes along with the hip."""
+"""Entity paths of the model, and of the frame that follows the hip and shows it."""
 PLANE_HALF = (0.4, 0.15, 5e-4)
-"""Half sides of what is drawn of an endless plane [m]."""
+"""Half sides of the part of an endless plane that is drawn [m]."""
 PLANE_COLOUR = (96, 100, 108, 255)
-"""Planes carry a texture, which has no colour of its own."""
+"""Colour of planes, whose texture gives none."""
 DARKEST = 0.27
-"""Black parts would be lost before the viewer's dark ground."""
+"""Lowest value of a colour channel [0 to 1], so that black parts show on a dark ground."""
 HIDDEN_GROUP = 3
-"""MuJoCo's convention: geoms from this group on are for the collision alone."""
+"""First group of geoms that are for the collision alone, by MuJoCo's convention."""
 
 Shape = rr.Boxes3D | rr.Capsules3D | rr.Cylinders3D | rr.Ellipsoids3D
 

@@ -14,7 +14,7 @@ from legbench.viz.trace import TracedRows
 COMPONENTS = (style.FIRST, style.SECOND)
 TARGETS = (style.FIRST_FAINT, style.SECOND_FAINT)
 PEAKS = "MinMax"
-"""Zoomed out, the viewer averages by default and hides every peak."""
+"""Aggregation of a zoomed-out series; the viewer's default, the average, hides every peak."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

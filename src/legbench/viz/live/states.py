@@ -1,4 +1,4 @@
-"""What foot and controller are doing, as coloured lanes over time."""
+"""States of foot and controller, as coloured lanes over time."""
 
 from collections.abc import Mapping
 from typing import final
@@ -36,7 +36,7 @@ class States:
         self._send(CONTROLLER, trace, trace.rows["phase"], self._names)
 
     def _configure(self, path: str, names: Mapping[int, str], colours: list[style.Rgb]) -> None:
-        # As an array, since rerun takes a list of four numbers for one colour.
+        # The colours are an array, since rerun takes a list of four numbers for one colour.
         packed = np.array([style.packed(colour) for colour in colours], dtype=np.uint32)
         configuration = rr.StateConfiguration(values=list(names.values()), colors=packed)
         self._stream.log(path, configuration, static=True)

@@ -16,7 +16,7 @@ from legbench.recording.stream import END_MARK
 
 @final
 class Tail:
-    """What a growing Arrow stream has gained since the last look.
+    """Reader of the batches that a growing Arrow stream has gained since the last look.
 
     Keeps the file open, so it reads to the end even after the writer has replaced the stream by
     its archive.
@@ -56,7 +56,7 @@ class Tail:
         return batches
 
     def close(self) -> None:
-        """Let the file go."""
+        """Close the file of the stream."""
         self._file.close()
 
 

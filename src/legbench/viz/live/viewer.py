@@ -15,14 +15,14 @@ from legbench.errors import MissingExtraError
 from legbench.viz.display import has_display
 
 LOOPBACK = "127.0.0.1"
-"""The viewer's own default is every network interface."""
+"""Address that the viewer listens on; its own default is every network interface."""
 PORT, WEB_PORT = 9876, 9090
 MEMORY = ("--memory-limit", "2GB", "--server-memory-limit", "512MB")
-"""The viewer's default is three quarters of the machine that may be running the control loop."""
+"""Memory limits of the viewer, whose default is three quarters of the whole machine's memory."""
 
 
 def proxy_url(port: int = PORT) -> str:
-    """Where a recording stream connects to."""
+    """Address that a recording stream connects to."""
     return f"rerun+http://{LOOPBACK}:{port}/proxy"
 
 
@@ -95,7 +95,7 @@ class Viewer:
     """A viewer that was opened on a file.
 
     Attributes:
-        url: of the page to open in a browser; None for a window.
+        url: address of the page to open in a browser; None for a window.
     """
 
     def __init__(self, process: "subprocess.Popen[bytes]", url: str | None) -> None:

@@ -24,27 +24,27 @@ from legbench.viz.live.follow import Pace, follow
 from legbench.viz.live.publish import APPLICATION
 
 LOOK_PERIOD = 0.05
-"""Between two looks at the run [s]: the writer hands over 50 rows at a time."""
+"""Period of the looks at the run [s]: the writer hands over 50 rows at a time."""
 PATIENCE = 30.0
 """Time after which a viewer that takes no data is given up [s]."""
 START_TIME = 20.0
-"""Within which a viewer must accept connections [s]."""
+"""Longest time until a viewer must accept connections [s]."""
 NICENESS = 10
-"""The control loop goes first."""
+"""Niceness of this program, lower in priority than the control loop."""
 LOG = "live.log"
-"""In the run folder, written only when something went wrong."""
+"""Name of the log in the run folder, written only when something went wrong."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Options:
-    """What the program is asked for."""
+    """Options of the program on its command line."""
 
     run: Path
     """Folder of the run."""
     port: int = viewer.PORT
-    """Of the viewer."""
+    """Port of the viewer."""
     serve: bool = False
-    """To a browser on this machine rather than in a window."""
+    """Show the run in a browser on this machine rather than in a window."""
     parent: int | None = None
     """Process that writes the run; by default the one that started this program."""
     save: Path | None = None
@@ -53,7 +53,7 @@ class Options:
 
 @final
 class EndRequest:
-    """Whether the run's process has asked for an end, or has gone."""
+    """Watch for the end: whether the run's process has asked for it, or has gone."""
 
     def __init__(self, parent: int | None) -> None:
         self._parent = os.getppid() if parent is None else parent
@@ -61,7 +61,7 @@ class EndRequest:
         signal.signal(signal.SIGTERM, self._ask)
 
     def __call__(self) -> bool:
-        """Whether it is over."""
+        """Whether the end has been asked for, or the run's process has gone."""
         return self._asked or os.getppid() != self._parent
 
     def _ask(self, number: int, frame: object) -> None:

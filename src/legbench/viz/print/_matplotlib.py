@@ -1,4 +1,4 @@
-"""The one door to matplotlib; figures are objects, no window and no global state."""
+"""Import of matplotlib, an optional dependency; figures are objects without window or state."""
 
 from contextlib import AbstractContextManager
 from io import BytesIO

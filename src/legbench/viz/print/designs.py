@@ -16,15 +16,15 @@ from legbench.synthesis.manufacture import shown
 from legbench.synthesis.trace import Trace
 
 PAGE = (297.0, 210.0)
-"""A4, lying [mm]."""
+"""Width and height of the page, A4 landscape [mm]."""
 LEG_SPACE = 150.0
 """Height on the page that the leg may take [mm]."""
 SCALES = (1.0, 2.0, 5.0, 10.0, 20.0)
-"""1 : n."""
+"""Scales 1 : n to choose from, by their n."""
 HIP = (62.0, 182.0)
-"""Where the leg hangs on the page [mm]."""
+"""Position of the leg's hip on the page [mm]."""
 SEGMENTS_AT = (134.0, 192.0, 250.0)
-"""Where the single segments hang [mm]."""
+"""Horizontal positions of the single segments on the page [mm]."""
 SEGMENTS_TOP = 160.0
 BODY = 7.0
 """Width of a segment on the page [mm]."""
@@ -38,30 +38,30 @@ LINES = ("#4269d0", "#e06c3c", "#3ca951", "#a463b8", "#8a6d3b", "#d04f86", "#3aa
 
 
 class Panel(Protocol):
-    """What is needed of a matplotlib Axes."""
+    """Protocol of the methods of a matplotlib Axes that a page needs."""
 
     def plot(self, *args: Any, **kwargs: Any) -> Any:
-        """Lines."""
+        """Draw lines."""
         ...
 
     def fill(self, *args: Any, **kwargs: Any) -> Any:
-        """Polygons."""
+        """Draw polygons."""
         ...
 
     def text(self, x: float, y: float, s: str, **kwargs: Any) -> Any:
-        """Words."""
+        """Write text."""
         ...
 
     def annotate(self, text: str, xy: tuple[float, float], **kwargs: Any) -> Any:
-        """Arrows."""
+        """Draw arrows and their labels."""
         ...
 
     def set(self, **kwargs: Any) -> Any:
-        """Limits and labels."""
+        """Set limits and labels."""
         ...
 
     def set_axis_off(self) -> None:
-        """No frame."""
+        """Hide the frame."""
         ...
 
 
@@ -170,7 +170,7 @@ def _draw_words(panel: Panel, design: LegDesign, half_angle: float, scale: float
 
 
 def _draw_body(panel: Panel, start: Floats, end: Floats, shade: tuple[float, ...]) -> None:
-    """A bar with round ends."""
+    """Draw a segment as a bar with round ends."""
     along = (end - start) / np.linalg.norm(end - start)
     angle = np.arctan2(along[1], along[0])
     turn = np.linspace(0.5 * np.pi, 1.5 * np.pi, 24)
@@ -191,7 +191,7 @@ def _draw_circle(panel: Panel, centre: Floats, radius: float, colour: Any) -> No
 
 
 def _draw_com(panel: Panel, centre: Floats, radius: float, colour: tuple[float, ...]) -> None:
-    """The quartered disc."""
+    """Draw the quartered disc that marks a centre of mass."""
     _draw_circle(panel, centre, radius, "white")
     for begin in (0.0, np.pi):
         turn = np.linspace(begin, begin + 0.5 * np.pi, 14)
@@ -205,7 +205,7 @@ def _draw_com(panel: Panel, centre: Floats, radius: float, colour: tuple[float, 
 def _draw_dimension(
     panel: Panel, x: float, top: float, bottom: float, words: str, *, left: bool = False
 ) -> None:
-    """A vertical dimension line with its number beside it."""
+    """Draw a vertical dimension line with its number beside it."""
     arrow = {"arrowstyle": "<->", "color": THIN, "linewidth": 0.7, "shrinkA": 0.0, "shrinkB": 0.0}
     for y in (top, bottom):
         panel.plot([x - 1.5, x + 1.5], [y, y], color=THIN, linewidth=0.7)

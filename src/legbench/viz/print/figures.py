@@ -27,9 +27,9 @@ from legbench.viz.print.overlay import (
 )
 
 SIZE, TALL = (10.0, 3.7), (10.0, 6.4)
-"""Of one row of panels, of two [inch]."""
+"""Figure sizes with one and with two rows of panels [inch]."""
 WIDTH, WIDE = 1.3, 2.4
-"""Of the coloured lines alone, and under those of another run [pt]."""
+"""Widths of the coloured lines alone, and under the lines of another run [pt]."""
 PLANES = (
     (style.POLAR, style.X1, style.X2),
     (style.JOINT, style.Q1, style.Q2),

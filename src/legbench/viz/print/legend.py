@@ -1,4 +1,4 @@
-"""What the colours and dashes of a print figure mean."""
+"""Legends of a print figure, for its colours and dashes."""
 
 from collections.abc import Sequence
 
@@ -18,7 +18,7 @@ from legbench.viz.print.overlay import look_of
 
 FAINT_COLOUR = (0.80, 0.80, 0.82)
 HANDLE, ROW = 8, 150
-"""Room of a legend's line and of its widest row [characters]."""
+"""Widths of a legend's line and of its widest row [characters]."""
 
 
 def explain(

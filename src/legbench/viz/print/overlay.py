@@ -18,7 +18,7 @@ Dashes = tuple[float, tuple[float, ...]]
 LEAST = 1e-15
 """Smaller differences are drawn as large as this: zero has no logarithm [rad]."""
 DECADES = 5
-"""Below the largest difference that are shown: every change of sign dips to zero."""
+"""Decades shown below the largest difference, as every change of sign dips to zero."""
 
 DIFFERENCES = (
     ("(d) difference over time, radial mode", r"$|\Delta z_2|$ [rad]"),
@@ -29,7 +29,7 @@ DIFFERENCES = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Look:
-    """How another run is drawn."""
+    """Colour and dashes in which another run is drawn."""
 
     colour: tuple[float, float, float]
     dashes: Dashes
@@ -40,11 +40,11 @@ LOOKS = (
     Look(colour=(0.45, 0.20, 0.50), dashes=(0.0, (1.2, 1.2))),
     Look(colour=(0.15, 0.45, 0.25), dashes=(0.0, (6.0, 1.5, 1.2, 1.5))),
 )
-"""Of the first, second and third of them; then again."""
+"""Looks of the other runs in turn; the fourth has the first again."""
 
 
 def look_of(place: int) -> Look:
-    """How the other run at a place in the order given is drawn."""
+    """Look of the other run at a place in the order given."""
     return LOOKS[place % len(LOOKS)]
 
 

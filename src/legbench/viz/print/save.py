@@ -1,4 +1,4 @@
-"""How every print figure becomes a file."""
+"""Saving of print figures as files."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ from legbench.viz.print._matplotlib import PlainFigure, styled
 
 SUFFIXES = (".png", ".svg", ".pdf")
 DPI = 200
-"""Dots of a .png, and of what is drawn as dots in the others [1/inch]."""
+"""Resolution of a .png, and of rasterised parts in vector files [1/inch]."""
 
 
 def save_figure(figure: PlainFigure, path: Path, dpi: int = DPI) -> Path:
