@@ -10,30 +10,30 @@ from typing import final
 from legbench.control import AbstractController
 from legbench.design import LegDesign, load_design
 from legbench.design.setup import Setup
-from legbench.drives.bus import LockstepBus
-from legbench.drives.bus_file import load_bus, load_limits
-from legbench.drives.codec.datatypes import DataType
-from legbench.drives.codec.pdo import Mapped
-from legbench.drives.config import (
+from legbench.drives.emulated.behaviour import Behaviour
+from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.bus import LockstepBus
+from legbench.drives.emulated.network import Network
+from legbench.drives.emulated.network_time import NetworkTime
+from legbench.drives.master.session import Session
+from legbench.drives.protocol.datatypes import DataType
+from legbench.drives.protocol.pdo import Mapped
+from legbench.drives.setup.bus_file import load_bus, load_limits
+from legbench.drives.setup.config import (
     LINK_POSITION,
     POSITION_ACTUAL,
     STATUSWORD,
     BusConfig,
     PdoConfig,
 )
-from legbench.drives.emulated.behaviour import Behaviour
-from legbench.drives.emulated.build import emulate
-from legbench.drives.emulated.network import Network
-from legbench.drives.limits import SafetyLimits
-from legbench.drives.session import Session
-from legbench.drives.timebase import NetworkTime
-from legbench.drives.units import AxisUnits
+from legbench.drives.setup.units import AxisUnits
 from legbench.experiment import (
     ControllerSettings,
     Experiment,
     make_controller,
     targets_of,
 )
+from legbench.limits.safety import SafetyLimits
 from legbench.plant.can import CanPlant
 from legbench.plant.emulated_leg import EmulatedLeg
 from legbench.plant.start import Start

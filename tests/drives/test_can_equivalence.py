@@ -10,9 +10,9 @@ import pytest
 from can_rig import BUS, experiment, fine_bus, stage, staged
 
 from legbench.control import BangBangConfig, JumpConfig
-from legbench.drives.bus_file import load_bus
-from legbench.drives.limits import SafetyLimits
+from legbench.drives.setup.bus_file import load_bus
 from legbench.experiment import ControllerSettings, Experiment, record
+from legbench.limits.safety import SafetyLimits
 from legbench.loop import run
 from legbench.metrics import summarise
 from legbench.plant.abstract import AbstractPlant

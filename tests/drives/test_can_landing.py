@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 
 from legbench.control import BangBangConfig, JumpConfig, PositionJumpConfig
 from legbench.design.setup import Setup, SetupKind
-from legbench.drives.bus_file import load_bus, load_limits
-from legbench.drives.cia402 import DriveState
 from legbench.drives.emulated.faults import NodeFault, NodeFaultKind
-from legbench.drives.limits import SafetyLimits
+from legbench.drives.protocol.cia402 import DriveState
+from legbench.drives.setup.bus_file import load_bus, load_limits
 from legbench.experiment import ControllerSettings, record
+from legbench.limits.safety import SafetyLimits
 from legbench.loop import Outcome, StopFlag, run
 from legbench.plant.landing import PATIENCE, STILL_RANGE, STILL_TIME, End, StillWatch, land, towards
 from legbench.plants import CanChoice

@@ -21,10 +21,10 @@ from legbench.commissioning import configure, jitter, zero
 from legbench.commissioning.home import home
 from legbench.commissioning.jog import jog
 from legbench.design import load_design
-from legbench.drives.bus_file import load_bus
-from legbench.drives.master.lock import ChannelLock
-from legbench.drives.session import Session
-from legbench.drives.unix_bus import UnixBus
+from legbench.drives.master.session import Session
+from legbench.drives.setup.bus_file import load_bus
+from legbench.drives.transport.lock import ChannelLock
+from legbench.drives.transport.unix_bus import UnixBus
 from legbench.errors import PlantFault
 from legbench.plants import limits_for
 from legbench.recording.events import read_events

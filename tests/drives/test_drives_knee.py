@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from legbench.control import JumpConfig
-from legbench.drives.guard import Guard
-from legbench.drives.knee import knee_of, project
-from legbench.drives.limits import SafetyLimits
 from legbench.errors import ConfigError, PlantFault
+from legbench.limits.guard import Guard
+from legbench.limits.knee import knee_of, project
+from legbench.limits.safety import SafetyLimits
 from legbench.plant.design_limits import knee_ranges
 from legbench.plants import limits_for
 

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 from legbench.control import JumpConfig
 from legbench.design.setup import Setup, SetupKind
-from legbench.drives.limits import SafetyLimits
 from legbench.experiment import (
     Experiment,
     canonical_text,
@@ -24,6 +23,7 @@ from legbench.experiment import (
     save_experiment,
 )
 from legbench.experiment.tables import read_tables, write_tables
+from legbench.limits.safety import SafetyLimits
 from legbench.mjcf import Ground, Linkage, LinkageKind, Numerics
 from legbench.plants import SimChoice
 from legbench.recording.reader import load

@@ -15,7 +15,7 @@ from legbench.errors import ConfigError
 
 if TYPE_CHECKING:
     from legbench.commissioning.jitter import Timing
-    from legbench.drives.session import Session
+    from legbench.drives.master.session import Session
     from legbench.recording.writer import RunWriter
 
 WITH, WITHOUT = "with", "without"

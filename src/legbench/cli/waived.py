@@ -3,10 +3,10 @@
 from pathlib import Path
 
 from legbench.cli.output import report_error
-from legbench.drives.bus_file import load_bus, load_limits
-from legbench.drives.config import BusConfig
-from legbench.drives.limits import SafetyLimits
-from legbench.drives.waivers import describe_waivers
+from legbench.drives.setup.bus_file import load_bus, load_limits
+from legbench.drives.setup.config import BusConfig
+from legbench.drives.setup.waivers import describe_waivers
+from legbench.limits.safety import SafetyLimits
 from legbench.plants import LIMITS_NAME, CanChoice, PlantSettings
 
 

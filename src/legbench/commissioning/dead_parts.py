@@ -12,15 +12,14 @@ from legbench.commissioning.broken_plant import BrokenPlant, Part
 from legbench.control import AbstractController, BangBangConfig, JumpConfig, PositionJumpConfig
 from legbench.design import LegDesign
 from legbench.design.setup import Setup
-from legbench.drives.bus import LockstepBus
-from legbench.drives.bus_file import load_bus
-from legbench.drives.config import BusConfig
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.emulated.faults import NodeFault, NodeFaultKind
 from legbench.drives.emulated.network import Network
-from legbench.drives.limits import SafetyLimits
-from legbench.drives.session import Session
+from legbench.drives.master.session import Session
+from legbench.drives.setup.bus_file import load_bus
+from legbench.drives.setup.config import BusConfig
 from legbench.errors import PlantFault
 from legbench.experiment import (
     ControllerSettings,
@@ -29,6 +28,7 @@ from legbench.experiment import (
     start_of,
     targets_of,
 )
+from legbench.limits.safety import SafetyLimits
 from legbench.plant.abstract import AbstractPlant
 from legbench.plant.analytic import AnalyticPlant
 from legbench.plant.can import CanPlant

@@ -10,10 +10,7 @@ from typing import Protocol
 
 from legbench.control import JumpConfig
 from legbench.design import LegDesign
-from legbench.drives.bus import LockstepBus
-from legbench.drives.bus_file import load_bus, load_limits
-from legbench.drives.cia402 import DriveState
-from legbench.drives.config import BusConfig
+from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.emulated.faults import (
     FOREVER_NS,
     Babble,
@@ -25,10 +22,13 @@ from legbench.drives.emulated.faults import (
 )
 from legbench.drives.emulated.network import Network
 from legbench.drives.errors import DriveError
-from legbench.drives.limits import SafetyLimits
+from legbench.drives.protocol.cia402 import DriveState
+from legbench.drives.setup.bus_file import load_bus, load_limits
+from legbench.drives.setup.config import BusConfig
 from legbench.errors import ConfigError
 from legbench.experiment import Experiment, make_controller, start_of, targets_of
 from legbench.interrupts import StopFlag
+from legbench.limits.safety import SafetyLimits
 from legbench.loop import Outcome, run
 from legbench.plant.can import CanPlant
 from legbench.plant.landing import End
@@ -270,7 +270,7 @@ def try_fault(
         cause=outcome.cause,
         cycles=(reaction_ns - strike_ns) // MS + 1 if ended else None,
         drives=tuple(drive.axis.power.state for drive in network.drives),
-        excess=_excess(writer.path / BUS_LOG, config, limits),
+        excess=excess_of(writer.path / BUS_LOG, config, limits),
         intact=intact and found.manifest["cause"] == outcome.cause,
         lost_cycles=max(opened.events()["bus"]["lost_cycles"]),
         run=writer.path,
@@ -323,7 +323,7 @@ def _wait_for_drives(network: Network) -> int:
     return network.now_ns
 
 
-def _excess(log: Path, config: BusConfig, limits: SafetyLimits) -> float:
+def excess_of(log: Path, config: BusConfig, limits: SafetyLimits) -> float:
     """From the raw frames: how far a command to an enabled drive went beyond the limits [rad]."""
     worst = -1.0
     step_max = limits.command_speed * config.period

@@ -7,7 +7,13 @@ when this master falls silent; it is always led out by quick stop.
 from dataclasses import dataclass
 from typing import final
 
-from legbench.drives.cia402 import (
+from legbench.drives.errors import DriveError
+from legbench.drives.master.bring_up import BringUp
+from legbench.drives.master.sdo_port import SdoPort
+from legbench.drives.master.sdo_stop import SdoStop, leave_operational
+from legbench.drives.master.session import Session
+from legbench.drives.master.stop_report import Lead
+from legbench.drives.protocol.cia402 import (
     DriveState,
     Goal,
     Mode,
@@ -17,17 +23,11 @@ from legbench.drives.cia402 import (
     describe_statusword,
     next_controlword,
 )
-from legbench.drives.codec.datatypes import DataType
-from legbench.drives.codec.nmt import NmtCommand, NmtState, heartbeat_frame, nmt_frame
-from legbench.drives.config import NodeConfig
-from legbench.drives.errors import DriveError
-from legbench.drives.master.bring_up import BringUp
-from legbench.drives.master.sdo_port import SdoPort
-from legbench.drives.master.sdo_stop import SdoStop, leave_operational
-from legbench.drives.master.stop_report import Lead
-from legbench.drives.master_watch import check_master_watch
-from legbench.drives.objects import name_of
-from legbench.drives.session import Session
+from legbench.drives.protocol.datatypes import DataType
+from legbench.drives.protocol.nmt import NmtCommand, NmtState, heartbeat_frame, nmt_frame
+from legbench.drives.protocol.objects import name_of
+from legbench.drives.setup.config import NodeConfig
+from legbench.drives.setup.master_watch import check_master_watch
 from legbench.errors import ConfigError
 from legbench.interrupts import shielded
 

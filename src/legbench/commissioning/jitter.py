@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from legbench.drives.errors import DriveError
-from legbench.drives.limits import SafetyLimits
-from legbench.drives.link import Link, Sample
-from legbench.drives.session import Session
+from legbench.drives.master.link import Link, Sample
+from legbench.drives.master.session import Session
+from legbench.limits.safety import SafetyLimits
 from legbench.recording.writer import RunWriter
 from legbench.signals import Command, Floats, Observation
 

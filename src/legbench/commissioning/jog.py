@@ -5,11 +5,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from legbench.commissioning.status import read_counts
-from legbench.drives.checks import check_together
-from legbench.drives.knee import knee_of
-from legbench.drives.limits import START_TOLERANCE, SafetyLimits
-from legbench.drives.session import Session
+from legbench.drives.master.session import Session
+from legbench.drives.setup.checks import check_together
 from legbench.errors import ConfigError
+from legbench.limits.knee import knee_of
+from legbench.limits.safety import START_TOLERANCE, SafetyLimits
 
 FARTHEST = 0.3
 """A jog goes no farther [rad]."""

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from legbench.commissioning.status import read_counts
-from legbench.drives.config import NodeConfig
 from legbench.drives.errors import DriveError
-from legbench.drives.session import Session
-from legbench.drives.units import AxisUnits, wrap
+from legbench.drives.master.session import Session
+from legbench.drives.setup.config import NodeConfig
+from legbench.drives.setup.units import AxisUnits, wrap
 from legbench.errors import ConfigError, RecordingError
 from legbench.recording.files import write_whole
 

@@ -5,8 +5,8 @@ from typing import final
 
 import numpy as np
 
-from legbench.drives.link import Link, LinkState, Sample
-from legbench.drives.session import Session
+from legbench.drives.master.link import Link, LinkState, Sample
+from legbench.drives.master.session import Session
 from legbench.plant.abstract import AbstractPlant
 from legbench.plant.landing import PATIENCE, STILL_RANGE, Landing, land
 from legbench.plant.start import Start

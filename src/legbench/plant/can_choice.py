@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Final
 
 from legbench.drives.emulated.faults import Fault
-from legbench.drives.limits import SafetyLimits
 from legbench.guests import WHERE, load_text
+from legbench.limits.safety import SafetyLimits
 from legbench.plant.landing import End
 from legbench.plant.opening import Leg, OpenPlant
 
 if TYPE_CHECKING:
-    from legbench.drives.config import BusConfig
+    from legbench.drives.setup.config import BusConfig
 
 EMULATED: Final = "legbench"
 """Interface of the emulated leg in this process, in virtual time."""

@@ -3,18 +3,18 @@
 from collections import deque
 from typing import final
 
-from legbench.drives.cia402 import DriveState, Mode, StatusBit
-from legbench.drives.codec.frame import Frame
-from legbench.drives.codec.sdo import Abort
-from legbench.drives.config import NodeConfig
 from legbench.drives.emulated.alarms import Alarms
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.homing import Homing, HomingState
 from legbench.drives.emulated.motion import Motion
 from legbench.drives.emulated.power import HALT, PowerStage
 from legbench.drives.emulated.sensors import Sensors
-from legbench.drives.objects import LINK_SHORT, Key
-from legbench.drives.units import wrap
+from legbench.drives.protocol.cia402 import DriveState, Mode, StatusBit
+from legbench.drives.protocol.frame import Frame
+from legbench.drives.protocol.objects import LINK_SHORT, Key
+from legbench.drives.protocol.sdo import Abort
+from legbench.drives.setup.config import NodeConfig
+from legbench.drives.setup.units import wrap
 
 MODES = (Mode.NONE, Mode.HOMING, Mode.CYCLIC_SYNCHRONOUS_POSITION)
 FOLLOWING_ERROR, SETPOINTS_MISSING, SYNC_MISSING = 0x8611, 0xFF10, 0xFF11

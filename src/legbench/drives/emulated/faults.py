@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import ClassVar
 
-from legbench.drives.codec.frame import Frame
+from legbench.drives.protocol.frame import Frame
 
 FOREVER_NS = 1 << 62
 

@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Sequence
 from typing import final
 
-from legbench.drives.codec.frame import Frame
 from legbench.drives.emulated.drive import OVER_TEMPERATURE, UNDER_VOLTAGE, EmulatedDrive
 from legbench.drives.emulated.faults import (
     Babble,
@@ -14,6 +13,7 @@ from legbench.drives.emulated.faults import (
     NodeFaultKind,
 )
 from legbench.drives.emulated.sensors import Ailment
+from legbench.drives.protocol.frame import Frame
 
 _TRIPS = {
     NodeFaultKind.UNDER_VOLTAGE: UNDER_VOLTAGE,

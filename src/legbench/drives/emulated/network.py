@@ -9,12 +9,12 @@ from collections.abc import Callable, Sequence
 from enum import Enum
 from typing import Protocol, final
 
-from legbench.drives.codec.frame import Frame
 from legbench.drives.emulated.drive import EmulatedDrive
 from legbench.drives.emulated.faults import Fault, NodeFault
 from legbench.drives.emulated.injector import Injector
 from legbench.drives.errors import BusError
-from legbench.drives.wire import ERROR_BITS, exact_bits, plain_bits, worst_bits
+from legbench.drives.protocol.frame import Frame
+from legbench.drives.setup.wire import ERROR_BITS, exact_bits, plain_bits, worst_bits
 
 Body = Callable[[tuple[float, ...]], tuple[Sequence[float], Sequence[float]]]
 """Moves one body period with the motors at these positions [rad]; link positions [rad] and

@@ -2,12 +2,12 @@
 
 from typing import final
 
-from legbench.drives.codec.frame import COB_INVALID, COB_MASK
-from legbench.drives.codec.pdo import Mapped, PdoMap, split_word
-from legbench.drives.codec.sdo import Abort
 from legbench.drives.emulated.store import ObjectStore
 from legbench.drives.errors import CodecError
-from legbench.drives.objects import MAX_MAPPED, PDO_COUNT, Access, Key
+from legbench.drives.protocol.frame import COB_INVALID, COB_MASK
+from legbench.drives.protocol.objects import MAX_MAPPED, PDO_COUNT, Access, Key
+from legbench.drives.protocol.pdo import Mapped, PdoMap, split_word
+from legbench.drives.protocol.sdo import Abort
 
 RPDO, TPDO = 0x1400, 0x1800
 LAST_SYNCHRONOUS = 240

@@ -3,7 +3,7 @@
 from enum import Enum
 from typing import final
 
-from legbench.drives.config import NodeConfig
+from legbench.drives.setup.config import NodeConfig
 
 SECOND_NS = 1_000_000_000
 

@@ -2,7 +2,9 @@
 
 from typing import final
 
-from legbench.drives.codec.slcan import (
+from legbench.drives.emulated.network import Network, Station
+from legbench.drives.errors import BusError
+from legbench.drives.protocol.slcan import (
     BITRATES,
     OK,
     REFUSED,
@@ -10,8 +12,6 @@ from legbench.drives.codec.slcan import (
     format_frame,
     parse_frame,
 )
-from legbench.drives.emulated.network import Network, Station
-from legbench.drives.errors import BusError
 
 LONGEST = 32
 """Of a line: an extended frame has 27 characters. Whatever is longer is garbage."""

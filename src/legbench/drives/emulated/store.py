@@ -3,10 +3,10 @@
 from collections.abc import Callable, Iterable
 from typing import final
 
-from legbench.drives.codec.datatypes import Value, pack, range_of, size_of, unpack
-from legbench.drives.codec.sdo import Abort, abort_error
 from legbench.drives.errors import CodecError
-from legbench.drives.objects import Access, Key, ObjectEntry
+from legbench.drives.protocol.datatypes import Value, pack, range_of, size_of, unpack
+from legbench.drives.protocol.objects import Access, Key, ObjectEntry
+from legbench.drives.protocol.sdo import Abort, abort_error
 
 Check = Callable[[Key, int], Abort | None]
 """Why an object may not become a value now; none if it may."""

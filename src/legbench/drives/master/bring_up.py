@@ -6,13 +6,6 @@ from typing import final
 
 import can
 
-from legbench.drives.cia402 import POWERED, Mode, decode_state
-from legbench.drives.codec.datatypes import DataType
-from legbench.drives.codec.emcy import MEANINGS
-from legbench.drives.codec.nmt import NmtCommand, nmt_frame
-from legbench.drives.codec.sdo import Abort
-from legbench.drives.config import BusConfig, Identity, NodeConfig, Parameter
-from legbench.drives.configuration import configuration
 from legbench.drives.errors import BusError, DriveError, SdoAbortError
 from legbench.drives.master.first_contact import first_contact
 from legbench.drives.master.lookout import Lookout
@@ -20,7 +13,14 @@ from legbench.drives.master.parking import is_parked
 from legbench.drives.master.port import Port
 from legbench.drives.master.sdo_port import SdoPort
 from legbench.drives.master.sdo_stop import SdoStop
-from legbench.drives.objects import name_of
+from legbench.drives.protocol.cia402 import POWERED, Mode, decode_state
+from legbench.drives.protocol.datatypes import DataType
+from legbench.drives.protocol.emcy import MEANINGS
+from legbench.drives.protocol.nmt import NmtCommand, nmt_frame
+from legbench.drives.protocol.objects import name_of
+from legbench.drives.protocol.sdo import Abort
+from legbench.drives.setup.config import BusConfig, Identity, NodeConfig, Parameter
+from legbench.drives.setup.configuration import configuration
 from legbench.interrupts import shielded
 
 PROFILE_402 = 0x0192

@@ -10,7 +10,13 @@ from typing import NamedTuple, final
 
 import can
 
-from legbench.drives.codec.frame import (
+from legbench.drives.errors import BusError
+from legbench.drives.master.axis_link import AxisLink
+from legbench.drives.master.notices import Notices
+from legbench.drives.master.port import Port
+from legbench.drives.master.temperature import TemperaturePoll
+from legbench.drives.master.watch import NodeWatch
+from legbench.drives.protocol.frame import (
     EMCY_BASE,
     HEARTBEAT_BASE,
     LAST_NODE,
@@ -19,14 +25,8 @@ from legbench.drives.codec.frame import (
     SDO_REQUEST_BASE,
     SYNC_ID,
 )
-from legbench.drives.codec.nmt import NmtState, heartbeat_frame
-from legbench.drives.config import BusConfig
-from legbench.drives.errors import BusError
-from legbench.drives.master.axis_link import AxisLink
-from legbench.drives.master.notices import Notices
-from legbench.drives.master.port import Port
-from legbench.drives.master.temperature import TemperaturePoll
-from legbench.drives.master.watch import NodeWatch
+from legbench.drives.protocol.nmt import NmtState, heartbeat_frame
+from legbench.drives.setup.config import BusConfig
 
 ERROR_FRAME_BUS_OFF = 0x40
 """Class of a SocketCAN error frame: this controller has left the bus."""

@@ -5,8 +5,8 @@ from typing import Any, final
 
 import can
 
-from legbench.drives.cia402 import StatusBit
 from legbench.drives.master.axis_link import AxisLink
+from legbench.drives.protocol.cia402 import StatusBit
 
 WARNING, INTERNAL_LIMIT = int(StatusBit.WARNING), int(StatusBit.INTERNAL_LIMIT)
 TOLD = WARNING | INTERNAL_LIMIT

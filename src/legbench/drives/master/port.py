@@ -7,10 +7,10 @@ from typing import final
 
 import can
 
-from legbench.drives.codec.frame import Frame
 from legbench.drives.errors import BusError, DriveError
 from legbench.drives.master.read_only import MaySend
-from legbench.drives.timebase import Timebase
+from legbench.drives.protocol.frame import Frame
+from legbench.drives.transport.timebase import Timebase
 from legbench.errors import LegbenchError
 
 Listener = Callable[[can.Message], None]

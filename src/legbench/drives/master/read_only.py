@@ -2,14 +2,14 @@
 
 from collections.abc import Callable
 
-from legbench.drives.codec.frame import (
+from legbench.drives.protocol.frame import (
     HEARTBEAT_BASE,
     LAST_NODE,
     NMT_ID,
     SDO_REQUEST_BASE,
     SYNC_ID,
 )
-from legbench.drives.codec.nmt import NmtCommand
+from legbench.drives.protocol.nmt import NmtCommand
 
 MaySend = Callable[[int, bytes | bytearray], bool]
 """Whether a frame, by identifier and data, may go out."""

@@ -4,15 +4,15 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import final
 
-from legbench.drives.cia402 import POWERED, Controlword, decode_state, describe_statusword
-from legbench.drives.codec.datatypes import DataType, pack
-from legbench.drives.codec.frame import SDO_REQUEST_BASE, Frame
-from legbench.drives.codec.sdo_client import Download
-from legbench.drives.config import NodeConfig
 from legbench.drives.errors import BusError
 from legbench.drives.master.port import Port
 from legbench.drives.master.sdo_port import SdoPort
 from legbench.drives.master.stop_report import StopReport
+from legbench.drives.protocol.cia402 import POWERED, Controlword, decode_state, describe_statusword
+from legbench.drives.protocol.datatypes import DataType, pack
+from legbench.drives.protocol.frame import SDO_REQUEST_BASE, Frame
+from legbench.drives.protocol.sdo_client import Download
+from legbench.drives.setup.config import NodeConfig
 
 RAMP_NS = 35_000_000
 """Longest that a quick-stop ramp is waited for, so that with the time of the questions every

@@ -3,19 +3,19 @@
 from collections.abc import Callable, Sequence
 from typing import final
 
-from legbench.drives.cia402 import (
+from legbench.drives.errors import DriveError
+from legbench.drives.master.axis_link import AxisLink
+from legbench.drives.master.cycle import Cycle, Tick
+from legbench.drives.master.port import Port
+from legbench.drives.protocol.cia402 import (
     DriveState,
     Goal,
     StatusBit,
     decode_state,
     describe_statusword,
 )
-from legbench.drives.codec.nmt import NmtCommand, nmt_frame
-from legbench.drives.config import BusConfig
-from legbench.drives.errors import DriveError
-from legbench.drives.master.axis_link import AxisLink
-from legbench.drives.master.cycle import Cycle, Tick
-from legbench.drives.master.port import Port
+from legbench.drives.protocol.nmt import NmtCommand, nmt_frame
+from legbench.drives.setup.config import BusConfig
 from legbench.errors import PlantFault
 
 SETTLE_PATIENCE = 2000

@@ -3,10 +3,10 @@
 from collections.abc import Callable
 from typing import final
 
-from legbench.drives.cia402 import POWERED, Goal, decode_state, describe_statusword
 from legbench.drives.master.axis_link import AxisLink
 from legbench.drives.master.cycle import Cycle
 from legbench.drives.master.stop_report import StopReport
+from legbench.drives.protocol.cia402 import POWERED, Goal, decode_state, describe_statusword
 
 RAMP_CYCLES = 40
 """Longest that a quick-stop ramp is waited for. A drive that still has power then loses its

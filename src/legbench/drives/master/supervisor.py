@@ -3,12 +3,12 @@
 import math
 from typing import final
 
-from legbench.drives.cia402 import StatusBit, Way, describe_statusword
-from legbench.drives.config import BusConfig
-from legbench.drives.limits import SafetyLimits
 from legbench.drives.master.cycle import Cycle, Tick
-from legbench.drives.timebase import Timebase
+from legbench.drives.protocol.cia402 import StatusBit, Way, describe_statusword
+from legbench.drives.setup.config import BusConfig
+from legbench.drives.transport.timebase import Timebase
 from legbench.errors import PlantFault
+from legbench.limits.safety import SafetyLimits
 
 FOLLOWS = int(StatusBit.FOLLOWS_COMMAND)
 MISSING_TEMPERATURES = 3

@@ -2,11 +2,11 @@
 
 from typing import final
 
-from legbench.drives.codec.datatypes import unpack
-from legbench.drives.codec.frame import SDO_REQUEST_BASE, Frame
-from legbench.drives.codec.sdo_client import Progress, Upload
-from legbench.drives.config import NodeConfig
 from legbench.drives.errors import CodecError, SdoAbortError
+from legbench.drives.protocol.datatypes import unpack
+from legbench.drives.protocol.frame import SDO_REQUEST_BASE, Frame
+from legbench.drives.protocol.sdo_client import Progress, Upload
+from legbench.drives.setup.config import NodeConfig
 
 EVERY_CYCLES = 200
 

@@ -2,9 +2,9 @@
 
 from typing import final
 
-from legbench.drives.codec.emcy import Emergency, decode_emcy
-from legbench.drives.codec.nmt import HeartbeatWatch, NmtState, decode_heartbeat
-from legbench.drives.config import BusConfig, NodeConfig
+from legbench.drives.protocol.emcy import Emergency, decode_emcy
+from legbench.drives.protocol.nmt import HeartbeatWatch, NmtState, decode_heartbeat
+from legbench.drives.setup.config import BusConfig, NodeConfig
 
 HEARTBEATS = 3
 """Overdue by so many, a drive is lost."""
