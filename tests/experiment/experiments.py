@@ -15,6 +15,7 @@ from legbench.drives.emulated.faults import (
 from legbench.drives.setup.bus_file import load_limits
 from legbench.experiment import Conventions, Experiment
 from legbench.guests import module_of_file
+from legbench.plant.landing import End
 from legbench.plants import AnalyticChoice, CanChoice, PlantSettings, SimChoice
 
 ROOT = Path(__file__).parents[2]
@@ -36,6 +37,7 @@ PLANTS: dict[str, PlantSettings] = {
     "limited": SimChoice(limits=LIMITS),
     "analytic": AnalyticChoice(),
     "can": CanChoice(
+        end=End.STOP,
         bus=HARDWARE / "leg.toml",
         interface="legbench",
         faults=(

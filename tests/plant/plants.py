@@ -13,9 +13,19 @@ import numpy as np
 from legbench.control import Jump, JumpConfig, LegTargets
 from legbench.design import LegDesign, load_design
 from legbench.design.setup import Setup, SetupKind
+from legbench.drives.emulated.behaviour import Behaviour
+from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.bus import LockstepBus
+from legbench.drives.master.session import Session
+from legbench.drives.setup.bus_file import load_bus
+from legbench.limits.safety import SafetyLimits
 from legbench.mjcf import BuildOptions, Linkage, LinkageKind
 from legbench.plant.abstract import AbstractPlant
+from legbench.plant.analytic import AnalyticPlant
 from legbench.plant.batch import BatchPlant
+from legbench.plant.can import CanPlant
+from legbench.plant.emulated_leg import EmulatedLeg
+from legbench.plant.limited import LimitedPlant
 from legbench.plant.sim import SimPlant
 from legbench.plant.start import Start
 from legbench.servo import ServoConfig
@@ -70,6 +80,13 @@ class Case:
     make: Callable[[ServoConfig], AbstractPlant]
     stiffness: Floats
     """Of its springs (..., 2) [N m/rad]."""
+    computed: bool = True
+    """Whether nothing happens between calls, so that a reset repeats a run bit by bit and the
+    servo is a setting; drives go on by themselves, and the servo is theirs."""
+    delay: int = 0
+    """Cycles of its own between a command and the motors' first reaction."""
+    resolution: float = 0.0
+    """Angle that a count of its encoders stands for [rad]; 0: they resolve everything."""
 
 
 def sim(setup: Setup, linkage: LinkageKind, design: LegDesign = PROTOTYPE) -> Case:
@@ -89,6 +106,45 @@ def rows(setup: Setup, linkage: LinkageKind, count: int) -> Case:
     return Case(make=make, stiffness=np.array([design.stiffness for design in designs]))
 
 
+def analytic(setup: Setup) -> Case:
+    def make(servo: ServoConfig) -> AbstractPlant:
+        return AnalyticPlant(PROTOTYPE, setup, standing(PROTOTYPE, setup), servo)
+
+    return Case(make=make, stiffness=np.array(PROTOTYPE.stiffness))
+
+
+def limited(inner: Case) -> Case:
+    """Another plant behind limits that nothing reaches."""
+
+    def make(servo: ServoConfig) -> AbstractPlant:
+        limits = SafetyLimits()
+        return LimitedPlant(inner.make(servo), limits, delay_cycles=servo.delay_cycles)
+
+    return replace(inner, make=make)
+
+
+def emulated(setup: Setup) -> Case:
+    """The bench's bus, drives without limits of their own, motors that are where they are told."""
+    bench = load_bus(MODELS.parent / "hardware" / "leg.toml")
+    bus = replace(bench, nodes=tuple(replace(node, parameters=()) for node in bench.nodes))
+    start = standing(PROTOTYPE, setup)
+
+    def make(servo: ServoConfig) -> AbstractPlant:
+        assert servo == ServoConfig(), "the servo is the drives' own"
+        motors = [Behaviour.ideal(float(angle)) for angle in start.motor_pos]
+        body = EmulatedLeg(PROTOTYPE, built(setup), start)
+        session = Session(LockstepBus("leg", network=emulate(bus, motors, body=body)), bus)
+        return CanPlant(session, session.link(SafetyLimits(), PROTOTYPE.stiffness), start)
+
+    return Case(
+        make=make,
+        stiffness=np.array(PROTOTYPE.stiffness),
+        computed=False,
+        delay=1,
+        resolution=max(node.motor.resolution for node in bus.nodes),
+    )
+
+
 PLANTS: dict[str, Case] = {
     "sim jump bars": sim(JUMP, LinkageKind.BARS),
     "sim jump reduced": sim(JUMP, LinkageKind.REDUCED, OPTIMAL),
@@ -98,6 +154,11 @@ PLANTS: dict[str, Case] = {
     "sim boom": sim(Setup(kind=SetupKind.FFS, boom_radius=1.0), LinkageKind.BARS),
     "batch jump bars": rows(JUMP, LinkageKind.BARS, 3),
     "batch hfts": rows(Setup(kind=SetupKind.HFTS), LinkageKind.REDUCED, 2),
+    "analytic jump": analytic(JUMP),
+    "analytic vfts": analytic(Setup(kind=SetupKind.VFTS)),
+    "limited sim": limited(sim(JUMP, LinkageKind.BARS)),
+    "limited analytic": limited(analytic(Setup(kind=SetupKind.FFS))),
+    "emulated can": emulated(JUMP),
 }
 
 

@@ -26,7 +26,7 @@ class Bench:
     channel: str | None = None
     """Such as can0; else the bus file's."""
     bitrate: int | None = None
-    """Of interfaces that set their own; else the bus file's [bit/s]."""
+    """Bitrate of interfaces that set their own; else the bus file's [bit/s]."""
     design: Path = Path("models/optimal.toml")
     """Design file: springs, and the limits that no limits file may exceed."""
     limits: Path | None = None
@@ -36,7 +36,7 @@ class Bench:
 
     @property
     def choice(self) -> CanChoice:
-        """The same for plants."""
+        """Plant choice that these flags make."""
         return CanChoice(
             bus=self.bus, interface=self.interface, channel=self.channel, bitrate=self.bitrate
         )

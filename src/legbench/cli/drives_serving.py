@@ -116,7 +116,7 @@ class Monitor:
     seconds: float = math.inf
     """End after so long [s]."""
     every: float = 0.2
-    """Between two looks [s]."""
+    """Time between two looks [s]."""
 
     def run(self, bench: Bench) -> int:
         """Print a line a drive, in place on a terminal, until ^C."""

@@ -64,7 +64,7 @@ class Emulation(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bench:
-    """Where trials are made."""
+    """Emulated bench on which trials are made."""
 
     design: LegDesign
     bus_file: Path
@@ -93,11 +93,11 @@ class Found:
     cause: str | None
     """Why the run ended; None if nothing ended it."""
     time: float | None
-    """From the contradiction to the end of the run, 0 if the end came before; None if nothing
+    """Time from the contradiction to the end of the run, 0 if the end came before; None if nothing
     ended it [s]. Steps and drifts contradict a healthy leg from the moment on in which they
     begin, other parts once they differ from healthy ones by `EXCITATION`."""
     since_death: float | None
-    """From the moment on in which the part died [s]."""
+    """Time since the part died [s]."""
     excited: bool
     """Whether there ever was a contradiction."""
 

@@ -15,7 +15,7 @@ from legbench.drives.transport.realtime import PRIORITY, ask
 from legbench.onlooker import Onlooker
 
 Server = UnixServer | SlcanServer | BusServer
-"""Where the drives are reached."""
+"""Server through which the drives are reached."""
 Report = Callable[[float, str, str], None]
 """Called with time since the start [s], node and its new state."""
 

@@ -37,9 +37,9 @@ from legbench.recording.reader import load
 from legbench.recording.writer import RunWriter
 
 CYCLES = 900
-"""Of a trial that nothing ends."""
+"""Number of cycles of a trial that nothing ends."""
 STRIKE_NS = 1_000_000_000
-"""When a fault comes, on the bus's time: half a second into the run, in a jump."""
+"""Time at which a fault strikes, on the bus's clock: half a second into the run, in a jump [ns]."""
 BRIEF_NS = 2_000_000
 """A disturbance that the link has to bridge."""
 SILENCE_NS = 200_000_000
@@ -59,7 +59,7 @@ class Trial:
     name: str
     faults: tuple[Fault, ...] = ()
     cause: str | None = None
-    """That has to end the run; none: the run has to bridge it."""
+    """Cause that has to end the run; none: the run has to bridge the fault."""
     gone: bool = False
     """The master itself stops without a word, as by SIGKILL or SIGSTOP."""
     interrupted: bool = False
@@ -73,7 +73,7 @@ class View(Protocol):
 
     @property
     def pid(self) -> int:
-        """Of the process."""
+        """Process id of the view."""
         ...
 
     def stop(self) -> None:
@@ -93,9 +93,9 @@ class Result:
     status: str
     cause: str | None
     cycles: int | None
-    """From the fault to the reaction; none if the run bridged it."""
+    """Number of cycles from the fault to the reaction; none if the run bridged it."""
     drives: tuple[DriveState, ...]
-    """In the end, as they are and not as the master believes."""
+    """States of the drives in the end, as they are and not as the master believes."""
     excess: float
     """Largest command beyond a limit, in range or in step, below zero [rad]."""
     intact: bool
@@ -324,7 +324,7 @@ def _wait_for_drives(network: Network) -> int:
 
 
 def excess_of(log: Path, config: BusConfig, limits: SafetyLimits) -> float:
-    """From the raw frames: how far a command to an enabled drive went beyond the limits [rad]."""
+    """Largest excess of a command to an enabled drive over the limits, from raw frames [rad]."""
     worst = -1.0
     step_max = limits.command_speed * config.period
     lines = log.read_text(encoding="ascii").split()

@@ -24,9 +24,9 @@ class Timing:
     """What a measurement found; arrays have one value a cycle."""
 
     late_us: Floats
-    """SYNC after its place on the grid."""
+    """Lateness of SYNC after its place on the grid."""
     exchange_us: Floats
-    """From SYNC to the last process data."""
+    """Time from SYNC to the last process data."""
     skipped: int
     """Ticks that this computer missed."""
     silent: int

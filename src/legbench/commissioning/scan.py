@@ -12,7 +12,7 @@ from legbench.drives.protocol.frame import LAST_NODE
 from legbench.drives.setup.config import BusConfig
 
 PROBE_MS = 15
-"""For a node that may not be there, twice; a drive that has booted answers within 5 ms."""
+"""Patience with a node that may not be there, asked twice; a booted drive answers within 5 ms."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

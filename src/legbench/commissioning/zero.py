@@ -15,7 +15,7 @@ from legbench.errors import ConfigError, RecordingError
 from legbench.recording.files import write_whole
 
 READS = 5
-"""Of every encoder; they have to agree."""
+"""Number of reads of every encoder, which have to agree."""
 STILL_COUNTS = 40
 """Largest spread of these reads."""
 _SECTION = re.compile(r"^\s*\[+\s*([\w.]+)\s*\]+")

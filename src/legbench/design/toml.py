@@ -150,7 +150,7 @@ def design_from_mapping(content: Mapping[str, Any]) -> LegDesign:
     return design
 
 
-def load_design(path: Path) -> LegDesign:
+def load_design(path: Path | str) -> LegDesign:
     """Read a design file.
 
     Raises:
@@ -161,7 +161,7 @@ def load_design(path: Path) -> LegDesign:
         "no such design file; the paper's are models/optimal.toml, models/table2.toml and "
         "models/prototype.toml"
     )
-    return load_tables(path, design_from_mapping, hint)
+    return load_tables(Path(path), design_from_mapping, hint)
 
 
 def load_tables(path: Path, build: Callable[[Mapping[str, Any]], Built], hint: str) -> Built:
@@ -194,9 +194,9 @@ def design_to_mapping(design: LegDesign) -> dict[str, Any]:
     return tables
 
 
-def save_design(design: LegDesign, path: Path) -> None:
+def save_design(design: LegDesign, path: Path | str) -> None:
     """Write a design file in SI units; `load_design` gives the same design back, bit for bit."""
-    path.write_text(tables_to_toml(design_to_mapping(design)), encoding="utf-8")
+    Path(path).write_text(tables_to_toml(design_to_mapping(design)), encoding="utf-8")
 
 
 def tables_to_toml(tables: Mapping[str, Any]) -> str:

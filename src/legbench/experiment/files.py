@@ -14,13 +14,14 @@ from legbench.recording.files import reason, write_whole
 HEADER = "# An experiment of legbench; units are in brackets, paths are relative to this file.\n"
 
 
-def load_experiment(path: Path) -> Experiment:
+def load_experiment(path: Path | str) -> Experiment:
     """Read an experiment file.
 
     Raises:
         ConfigError: it is missing, no TOML, of a newer version, or something in it is wrong; all
             of it is told, each with its dotted key.
     """
+    path = Path(path)
     tables = read_toml(path)
     try:
         return read_tables(Experiment, tables, path.parent)
@@ -28,12 +29,13 @@ def load_experiment(path: Path) -> Experiment:
         raise ConfigError(f"{path}: {error}") from error
 
 
-def save_experiment(experiment: Experiment, path: Path) -> None:
+def save_experiment(experiment: Experiment, path: Path | str) -> None:
     """Write an experiment file; `load_experiment` gives the same experiment back, bit for bit.
 
     Raises:
         ConfigError: the file cannot be written, or a guest lives in no file.
     """
+    path = Path(path)
     try:
         write_whole(path, experiment_text(experiment, path.parent).encode())
     except OSError as error:

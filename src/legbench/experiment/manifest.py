@@ -64,7 +64,7 @@ def _reference(registry: Registry, guest: type[Any], copy: str) -> str:
 
 
 def manifest_of(
-    experiment: Experiment, start: Start, xml: str, facts: Mapping[str, Any], folder: Path
+    experiment: Experiment, start: Start, xml: str, facts: Mapping[str, Any], folder: Path | None
 ) -> dict[str, Any]:
     """What a run has to say of itself; everything that a reader needs to judge or repeat it.
 
@@ -73,13 +73,14 @@ def manifest_of(
         start: the state that it begins in.
         xml: the model.
         facts: what the opened plant has to say.
-        folder: the run folder, or one beside it; paths are told relative to it.
+        folder: the run folder, or one beside it; paths are told relative to it. None: the run is
+            kept in memory, files are left out, and guests are called by their kind alone.
 
     Raises:
         ConfigError: a guest that lives in no file, so that nobody could find it again.
     """
-    tables = write_tables(experiment, folder)
-    guests = list(guests_of(experiment))
+    tables = write_tables(experiment, folder, where=folder is not None)
+    guests = [] if folder is None else list(guests_of(experiment))
     for guest in guests:
         tables[guest.what]["kind"] = guest.reference
     described = experiment.controller.describe()

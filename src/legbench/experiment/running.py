@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from legbench.clock import AbstractClock
-from legbench.control import make_controller
-from legbench.errors import RecordingError
+from legbench.control import AbstractController, make_controller
+from legbench.errors import ConfigError, RecordingError
 from legbench.experiment.data import Experiment
 from legbench.experiment.manifest import guests_of, manifest_of
 from legbench.experiment.start import start_of, targets_of
@@ -16,8 +16,10 @@ from legbench.interrupts import StopFlag, shielded
 from legbench.loop import Outcome, Progress, run
 from legbench.mjcf import model_text
 from legbench.onlooker import Onlooker
-from legbench.plant.start import PERIOD
+from legbench.plant.start import PERIOD, Start
 from legbench.plants import Leg, OpenPlant, open_plant
+from legbench.recording.memory import MemoryRun
+from legbench.recording.reader import Recording
 from legbench.recording.writer import RunWriter
 from legbench.verdict import answered, stopped_well
 
@@ -28,6 +30,27 @@ class Finished:
 
     path: Path
     outcome: Outcome
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Prepared:
+    """An experiment whose plant is open and waits for its reset."""
+
+    experiment: Experiment
+    controller: AbstractController
+    start: Start
+    xml: str
+    """The model."""
+    opened: OpenPlant
+
+    @property
+    def name(self) -> str:
+        """Hint in the name of the run."""
+        return f"{self.experiment.controller.kind}-{self.experiment.design.name}"
+
+    def manifest(self, folder: Path | None) -> dict[str, Any]:
+        """What the run has to say of itself in `folder`; raises as `manifest_of`."""
+        return manifest_of(self.experiment, self.start, self.xml, self.opened.facts, folder)
 
 
 def record(
@@ -62,37 +85,81 @@ def record(
         RecordingError: the folder cannot be written, or the disk failed on the way; what was
             written by then stays readable.
     """
-    controller = make_controller(experiment.controller, targets_of(experiment))
+    watching, starting = Onlooker("progress", progress), Onlooker("on_started", on_started)
+    with _prepared(experiment) as ready:
+        manifest, realtime = ready.manifest(out / "run"), ready.opened.realtime
+        with _recording(out, manifest, ready.name, realtime=realtime) as writer:
+            _begin(writer, ready)
+            starting(writer.path)
+            outcome = _driven(ready, writer, (starting, watching), clock, stop)
+    return Finished(path=writer.path, outcome=outcome)
+
+
+def record_in_memory(
+    experiment: Experiment, *, stop: StopFlag | None = None, progress: Progress | None = None
+) -> Recording:
+    """Run an experiment in virtual time and leave nothing on disk.
+
+    Args:
+        experiment: what to run; a controller or plant that was written in a notebook will do.
+        stop: ends the run when it is set.
+        progress: told now and then how far the run is; its first failure is an event of the run.
+
+    Raises:
+        ConfigError: settings that the leg or the plant refuses, or drives whose pace is the
+            machine's clock: a run on the bench must survive the end of this process.
+        PlantFault: something went wrong on the way to the start posture.
+    """
+    watching = Onlooker("progress", progress)
+    with _prepared(experiment) as ready:
+        if ready.opened.realtime:
+            raise ConfigError("drives run in real time and are recorded in a folder only; give out")
+        writer = MemoryRun(ready.manifest(None), name=ready.name)
+        _driven(ready, writer, (watching,), None, stop)
+    return writer.recording()
+
+
+@contextmanager
+def _prepared(experiment: Experiment) -> Iterator[Prepared]:
+    """Build the controller and open the plant of an experiment; it is closed in the end."""
     start = start_of(experiment)
     leg = Leg(
         design=experiment.design, options=experiment.options, start=start, servo=experiment.servo
     )
+    controller = make_controller(experiment.controller, targets_of(experiment))
     xml = model_text(experiment.design, experiment.options)
-    watching, starting = Onlooker("progress", progress), Onlooker("on_started", on_started)
     opened = open_plant(experiment.plant, leg)
     with opened.plant:
-        manifest = manifest_of(experiment, start, xml, opened.facts, out / "run")
-        name = f"{experiment.controller.kind}-{experiment.design.name}"
-        with _recording(out, manifest, name, realtime=opened.realtime) as writer:
-            _begin(writer, experiment, xml, opened)
-            starting(writer.path)
-            try:
-                outcome = run(
-                    opened.plant,
-                    controller,
-                    round(experiment.duration / PERIOD),
-                    clock=clock or opened.clock,
-                    sink=writer,
-                    stop=stop,
-                    progress=watching,
-                )
-            except BaseException as error:
-                opened.plant.close()
-                _tell(writer, opened, (starting, watching), writer.rows * PERIOD)
-                _add_trouble(error, opened.trouble())
-                raise
-            outcome = _end(writer, opened, (starting, watching), outcome)
-    return Finished(path=writer.path, outcome=outcome)
+        yield Prepared(
+            experiment=experiment, controller=controller, start=start, xml=xml, opened=opened
+        )
+
+
+def _driven(
+    ready: Prepared,
+    writer: RunWriter | MemoryRun,
+    onlookers: Sequence[Onlooker],
+    clock: AbstractClock | None,
+    stop: StopFlag | None,
+) -> Outcome:
+    """Run the loop and end the run; the last of the onlookers is told the progress."""
+    opened = ready.opened
+    try:
+        outcome = run(
+            opened.plant,
+            ready.controller,
+            round(ready.experiment.duration / PERIOD),
+            clock=clock or opened.clock,
+            sink=writer,
+            stop=stop,
+            progress=onlookers[-1],
+        )
+    except BaseException as error:
+        opened.plant.close()
+        _tell(writer, opened, onlookers, writer.rows * PERIOD)
+        _add_trouble(error, opened.trouble())
+        raise
+    return _end(writer, opened, onlookers, outcome)
 
 
 @contextmanager
@@ -107,31 +174,37 @@ def _recording(
         yield writer
 
 
-def _begin(writer: RunWriter, experiment: Experiment, xml: str, opened: OpenPlant) -> None:
+def _begin(writer: RunWriter, ready: Prepared) -> None:
     """Put model, guests and logs into the run folder; raises RecordingError."""
     try:
-        (writer.path / "leg.xml").write_text(xml, encoding="utf-8")
-        for guest in guests_of(experiment):
+        (writer.path / "leg.xml").write_text(ready.xml, encoding="utf-8")
+        for guest in guests_of(ready.experiment):
             (writer.path / guest.name).write_bytes(guest.content)
-        opened.start_log(writer.path)
+        ready.opened.start_log(writer.path)
     except OSError as error:
         raise RecordingError(f"{writer.path}: {error}") from error
 
 
 def _end(
-    writer: RunWriter, opened: OpenPlant, onlookers: Sequence[Onlooker], outcome: Outcome
+    writer: RunWriter | MemoryRun,
+    opened: OpenPlant,
+    onlookers: Sequence[Onlooker],
+    outcome: Outcome,
 ) -> Outcome:
     """Close the plant, then the run, with what both have to tell; how it has really ended."""
     outcome = answered(outcome, opened.gone())
     opened.plant.close()
     outcome = stopped_well(outcome, opened.trouble())
     _tell(writer, opened, onlookers, outcome.time)
-    writer.event(outcome.time, "end", status=outcome.status, cause=outcome.cause)
+    message = {} if outcome.message is None else {"message": outcome.message}
+    writer.event(outcome.time, "end", status=outcome.status, cause=outcome.cause, **message)
     writer.close(outcome.status, outcome.cause)
     return outcome
 
 
-def _tell(writer: RunWriter, opened: OpenPlant, onlookers: Sequence[Onlooker], time: float) -> None:
+def _tell(
+    writer: RunWriter | MemoryRun, opened: OpenPlant, onlookers: Sequence[Onlooker], time: float
+) -> None:
     """Write what the plant and the onlookers have to tell of a run that ended at `time` [s]."""
     for event, detail in opened.events().items():
         writer.event(time, event, **detail)

@@ -117,7 +117,7 @@ class Guard:
         return clamped if self._knee is None else project(clamped, self._knee, boxes)
 
     def check_start(self, motor_pos: Sequence[float]) -> None:
-        """Where the motors stand before they are enabled [rad].
+        """Refuse motors that stand outside their range before they are enabled [rad].
 
         Raises:
             PlantFault: one is outside its range.

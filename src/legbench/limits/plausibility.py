@@ -15,7 +15,7 @@ STANDING_CYCLES = 20
 STANDING_BAND = 0.002
 """A link within this band stands: more than one count of an encoder of 4 096 a turn [rad]."""
 SWAY_CYCLES = 4
-"""So long the sway lasts before it counts; process data that come late repeat for up to three."""
+"""Cycles that a sway lasts before it counts; late process data repeat for up to three."""
 MEMORY = 1.0
 """Time constant in which the sway's reference follows what lasts, such as an offset [s]."""
 SWAY_DELAY = 0.25

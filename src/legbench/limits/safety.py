@@ -35,20 +35,20 @@ class SafetyLimits:
     """
 
     motor_range: tuple[Range, ...] = (UNLIMITED, UNLIMITED)
-    """Of the commanded motor positions, clamped, one pair an axis [rad]."""
+    """Range to which commanded motor positions are clamped, one pair an axis [rad]."""
     joint_range: tuple[Range, ...] = (UNLIMITED, UNLIMITED)
-    """Of the link angles q1, q2; beyond it the run ends [rad]."""
+    """Range of the link angles q1, q2; beyond it the run ends [rad]."""
     motor_knee_range: Range = UNLIMITED
-    """Of q2 - q1 of the commanded motor positions; both motors give way alike [rad]."""
+    """Range of q2 - q1 of the commanded motor positions; both motors give way alike [rad]."""
     joint_knee_range: Range = UNLIMITED
-    """Of q2 - q1 of the link angles; beyond it the run ends [rad]."""
+    """Range of q2 - q1 of the link angles; beyond it the run ends [rad]."""
     command_speed: float = math.inf
     """Highest speed of the command, a faster one is slewed [rad/s]."""
     command_step: float = math.inf
     """Largest jump of the wish in one cycle, from where the motors are at first; a larger one
     ends the run [rad]."""
     spring_torque: float = math.inf
-    """Beyond it the run ends [N m]."""
+    """Highest torque of a series spring; beyond it the run ends [N m]."""
     following_error: float = math.inf
     """Distance of a motor from all that a healthy position loop would show; beyond it the run
     ends [rad]."""
@@ -65,7 +65,7 @@ class SafetyLimits:
     """Motion of q1 + q2 that nobody has commanded, besides what the leg did in the seconds before;
     beyond it the run ends [rad]."""
     temperature: float = math.inf
-    """Of a drive that reports it; beyond it the run ends [deg C]."""
+    """Highest temperature of a drive that reports it; beyond it the run ends [deg C]."""
     overrun_cycles: int = 3
     """Consecutive missed ticks that end the run."""
     lost_frames: int = 3

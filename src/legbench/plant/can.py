@@ -18,9 +18,9 @@ VELOCITY_BANDWIDTH = 200.0
 STILL_SPEED = 0.05
 """A leg at rest moves slower than this [rad/s]."""
 STILL_CYCLES = 100
-"""So long it must rest before a run begins."""
+"""Number of cycles for which the leg must rest before a run begins."""
 STILL_PATIENCE = 5000
-"""After so many cycles a run begins anyway; a leg that swings for long is no fault."""
+"""Number of cycles after which a run begins anyway; a leg that swings for long is no fault."""
 
 
 @final

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 EMULATED: Final = "legbench"
 """Interface of the emulated leg in this process, in virtual time."""
 LIMITS_NAME: Final = "limits.toml"
-"""Beside the bus file, unless other limits are chosen."""
+"""Name of the limits file beside the bus file."""
 BUS_LOG: Final = "bus.log"
 """Raw frames in the run folder, candump format."""
 _WHERE: Final[Mapping[str, bool]] = WHERE

@@ -1,6 +1,7 @@
 """The names inside a run folder."""
 
 import re
+from datetime import UTC, datetime
 from typing import Final
 
 FORMAT: Final = 2
@@ -28,3 +29,8 @@ CLOSING: Final = (COMPLETE, INTERRUPTED, FAULT)
 def file_safe(name: str) -> str:
     """Return `name` with everything but letters, digits, dots and dashes turned into dashes."""
     return re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("-.")
+
+
+def run_name(start: datetime, hint: str | None = None) -> str:
+    """Return `<UTC time>_<hint>`, the name of a run that began at `start`."""
+    return "_".join(filter(None, (f"{start.astimezone(UTC):%Y%m%d-%H%M%S}", file_safe(hint or ""))))

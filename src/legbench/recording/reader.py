@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -13,6 +14,7 @@ from legbench.recording.archive import read_archive
 from legbench.recording.columns import ONE_LEG, Layout
 from legbench.recording.description import RunDescription, describe
 from legbench.recording.events import Event, read_events
+from legbench.recording.export import Rows, arrow_table, as_html, as_text, pandas_frame
 from legbench.recording.files import reason
 from legbench.recording.layout import ARCHIVE, COMPLETE, EVENTS, RUN, STREAM, TIME
 from legbench.recording.manifest import Manifest, read_manifest
@@ -27,12 +29,12 @@ class UnknownSignalError(LegbenchError, KeyError):
         return str(self.args[0])
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class Recording:
     """What a run left; `recording["joint_pos"]` is a signal as one array."""
 
     path: Path
-    """The run folder."""
+    """The run folder; the name alone of a run that was kept in memory."""
     manifest: Manifest
     """`run.json` as it is written, or the copy in the samples as of the start of the run; for
     provenance, since `description` says what it means."""
@@ -103,13 +105,53 @@ class Recording:
         contact = self.columns.get("contact")
         return contact is not None and len(contact) > 0 and bool(np.all(contact >= 0))
 
+    def to_arrow(self) -> pa.Table:
+        """Return every column as an Arrow table: time as whole nanoseconds, unknown contact null.
+
+        Each field's metadata has its unit, the table's has the manifest.
+        """
+        return arrow_table(self.columns, self.layout.units, self.manifest)
+
+    def to_pandas(self) -> Any:
+        """Return every column but the time as a pandas DataFrame; its index is the time `t` [s].
+
+        Raises:
+            MissingExtraError: pandas is not installed.
+        """
+        return pandas_frame(self.to_arrow(), self.time)
+
+    def __repr__(self) -> str:
+        """Return the run in a few lines: what ran, how long, how it ended."""
+        return as_text(self._rows())
+
+    def _repr_html_(self) -> str:
+        """Return the same table for a notebook."""
+        return as_html(self._rows())
+
+    def _rows(self) -> Rows:
+        span = f"{self.time[-1] - self.time[0]:.4g} s, " if len(self.time) else ""
+        rows = [("run", self.path.name)]
+        if isinstance(self.described, FormatError):
+            rows.append(("not understood", str(self.described)))
+        else:
+            run = self.described
+            rows += [
+                ("leg", f"{run.title}, {run.setup.kind.value}"),
+                ("controller", run.controller),
+                ("ended", ": ".join(filter(None, (run.status or "unknown", run.cause)))),
+            ]
+        messages = [str(event["message"]) for event in self.events if "message" in event]
+        rows += [("message", text) for text in messages]
+        rows += [("rows", f"{span}{len(self.time)} rows"), ("signals", ", ".join(self.signals))]
+        return [*rows, *([] if self.torn is None else [("torn", self.torn)])]
+
     def _columns_of(self, name: str) -> tuple[str, ...]:
         """Columns of a signal of one leg; the name itself for anything else."""
         signals = {signal.name: signal for signal in self.layout.signals}
         return self.layout.columns_of(signals[name])[0] if name in signals else (name,)
 
 
-def load(path: Path) -> Recording:
+def load(path: Path | str) -> Recording:
     """Read the run in the folder `path`, or the run whose `run.json` or samples `path` is.
 
     A run that is being written or was torn gives its whole batches; one that ended before its
@@ -119,7 +161,7 @@ def load(path: Path) -> Recording:
         RecordingError: `path` is no run folder, has no samples, or a file in it is damaged.
         FormatError: a newer version wrote it.
     """
-    run = run_folder(path)
+    run = run_folder(Path(path))
     manifest = read_manifest(run)
     table, torn = _samples(run, manifest)
     if manifest is None:
@@ -155,7 +197,6 @@ def run_folder(path: Path) -> Path:
     Raises:
         RecordingError: there is no run; names those that lie below, if any.
     """
-    path = Path(path)
     run = path.parent if path.name in (RUN, ARCHIVE, STREAM) else path
     if any((run / name).is_file() for name in (RUN, ARCHIVE, STREAM)):
         return run

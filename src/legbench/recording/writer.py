@@ -24,7 +24,7 @@ from legbench.recording.layout import (
     FAULT,
     INTERRUPTED,
     STREAM,
-    file_safe,
+    run_name,
 )
 from legbench.recording.manifest import Manifest, new_manifest, write_manifest
 from legbench.recording.process_disk import ProcessDisk
@@ -81,7 +81,7 @@ class RunWriter:
             ConfigError: the manifest names a key that is filled in here.
         """
         start = (created or datetime.now(UTC)).astimezone(UTC)
-        stem = "_".join(filter(None, (f"{start:%Y%m%d-%H%M%S}", file_safe(name or ""))))
+        stem = run_name(start, name)
         full = new_manifest(manifest, id=stem, created=start.isoformat(timespec="seconds"))
         try:
             run = _fresh_folder(parent, stem)

@@ -1,7 +1,8 @@
 """The one door to matplotlib; figures are objects, no window and no global state."""
 
 from contextlib import AbstractContextManager
-from typing import Any
+from io import BytesIO
+from typing import Any, final
 
 from legbench.errors import MissingExtraError
 
@@ -12,7 +13,7 @@ try:
     from matplotlib.cm import ScalarMappable
     from matplotlib.collections import LineCollection
     from matplotlib.colors import BoundaryNorm, ListedColormap
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as PlainFigure
     from matplotlib.lines import Line2D
 except ImportError as error:
     raise MissingExtraError(
@@ -27,6 +28,7 @@ __all__ = [
     "Line2D",
     "LineCollection",
     "ListedColormap",
+    "PlainFigure",
     "ScalarMappable",
     "styled",
 ]
@@ -44,6 +46,21 @@ STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "legbench",
 }
+
+
+SCREEN_DPI = 110
+"""Dots of a figure that a notebook shows [1/inch]."""
+
+
+@final
+class Figure(PlainFigure):
+    """Figure of matplotlib that a notebook shows by itself, in the look of every figure here."""
+
+    def _repr_png_(self) -> bytes:
+        """Return the figure as a PNG."""
+        with styled(), BytesIO() as stream:
+            FigureCanvasAgg(self).print_figure(stream, format="png", dpi=SCREEN_DPI)
+            return stream.getvalue()
 
 
 def styled() -> AbstractContextManager[None]:

@@ -4,14 +4,14 @@ from pathlib import Path
 
 from legbench.errors import ConfigError
 from legbench.viz.drafts import draft_of
-from legbench.viz.print._matplotlib import Figure, styled
+from legbench.viz.print._matplotlib import PlainFigure, styled
 
 SUFFIXES = (".png", ".svg", ".pdf")
 DPI = 200
 """Dots of a .png, and of what is drawn as dots in the others [1/inch]."""
 
 
-def save_figure(figure: Figure, path: Path, dpi: int = DPI) -> Path:
+def save_figure(figure: PlainFigure, path: Path, dpi: int = DPI) -> Path:
     """Write a figure as .png, .svg or .pdf, the same bytes every time; make its folder if need be.
 
     Raises:
