@@ -15,16 +15,17 @@ import pytest
 from can_rig import BUS, LIMITS, ROOT
 from drives_rig import MS, START, Rig, config, rig
 
-from legbench import plants
 from legbench.cli import main
 from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.emulated.drive import EmulatedDrive
 from legbench.drives.emulated.network import Network
 from legbench.drives.errors import StopError
 from legbench.drives.master.link import LinkState
+from legbench.drives.master.session import Session
 from legbench.drives.protocol.cia402 import POWERED, DriveState
 from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.setup.config import Parameter
+from legbench.plant import can_open
 from legbench.recording.reader import load
 
 SO, OE = DriveState.SWITCH_ON_DISABLED, DriveState.OPERATION_ENABLED
@@ -129,7 +130,7 @@ def test_drives_that_are_found_with_power_are_stopped_together(
         started(it)
         it.bus.shutdown()
         bus = LockstepBus("second", network=it.network)
-        with plants.Session(bus, it.config) as session:
+        with Session(bus, it.config) as session:
             up = session.bring_up()
             real, sent = bus.send, 0
 
@@ -229,14 +230,14 @@ def bench(folder: Path) -> list[str]:
 
 def opened(monkeypatch: pytest.MonkeyPatch, then: Callable[[Network], None]) -> None:
     """Do something to the emulated leg as soon as a command has made it."""
-    real = plants.emulate
+    real = can_open.emulate
 
     def emulate(*arguments: Any, **more: Any) -> Network:
         network = real(*arguments, **more)
         then(network)
         return network
 
-    monkeypatch.setattr(plants, "emulate", emulate)
+    monkeypatch.setattr(can_open, "emulate", emulate)
 
 
 def run_flags(folder: Path) -> list[str]:

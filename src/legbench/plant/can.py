@@ -8,6 +8,7 @@ import numpy as np
 from legbench.drives.master.link import Link, LinkState, Sample
 from legbench.drives.master.session import Session
 from legbench.plant.abstract import AbstractPlant
+from legbench.plant.gone_drive import gone_drive
 from legbench.plant.landing import PATIENCE, STILL_RANGE, Landing, land
 from legbench.plant.start import Start
 from legbench.plant.velocity import VelocityEstimate
@@ -119,6 +120,8 @@ class CanPlant(AbstractPlant):
         """
         if not self._lands or self.link.state is not LinkState.RUNNING:
             return None
+        if gone_drive(self.link) is not None:
+            return None  # A leg of which one drive is gone is led nowhere.
         self.landing = landing = land(
             self._lead,
             motor_pos.tolist(),

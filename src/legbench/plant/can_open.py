@@ -21,9 +21,10 @@ from legbench.errors import ConfigError
 from legbench.limits.safety import SafetyLimits
 from legbench.plant.can import CanPlant
 from legbench.plant.can_choice import BUS_LOG, LIMITS_NAME, CanChoice
-from legbench.plant.can_events import bus_events, gone_drive
+from legbench.plant.can_events import bus_events
 from legbench.plant.design_limits import joint_ranges, limits_events, limits_within
 from legbench.plant.emulated_leg import EmulatedLeg
+from legbench.plant.gone_drive import gone_drive
 from legbench.plant.landing import End
 from legbench.plant.limits_file import limits_for
 from legbench.plant.opening import Leg, OpenPlant
