@@ -22,14 +22,14 @@ import numpy as np
 
 from legbench.control import JumpConfig
 from legbench.design import load_design
-from legbench.drives.bus import LockstepBus
-from legbench.drives.bus_file import load_bus, load_limits
-from legbench.drives.codec.frame import Frame
-from legbench.drives.config import BusConfig
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.build import emulate
-from legbench.drives.session import Session
-from legbench.drives.unix_bus import PACKET, UnixBus, pack_frame, unpack_frame
+from legbench.drives.emulated.bus import LockstepBus
+from legbench.drives.master.session import Session
+from legbench.drives.protocol.frame import Frame
+from legbench.drives.setup.bus_file import load_bus, load_limits
+from legbench.drives.setup.config import BusConfig
+from legbench.drives.transport.unix_bus import PACKET, UnixBus, pack_frame, unpack_frame
 from legbench.experiment import Experiment, make_controller, start_of, targets_of
 from legbench.plant.can import CanPlant
 from legbench.plant.emulated_leg import EmulatedLeg

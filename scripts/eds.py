@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from legbench.drives.bus_file import load_bus
-from legbench.drives.eds import dcf_text, eds_text
+from legbench.drives.setup.bus_file import load_bus
+from legbench.drives.setup.eds import dcf_text, eds_text
 
 HARDWARE = Path(__file__).parents[1] / "hardware"
 

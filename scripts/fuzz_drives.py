@@ -11,18 +11,18 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from legbench.drives.bus import LockstepBus
-from legbench.drives.codec.frame import Frame
-from legbench.drives.config import BusConfig, Identity, NodeConfig
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.emulated.drive import EmulatedDrive
 from legbench.drives.emulated.network import Network
-from legbench.drives.limits import SafetyLimits
-from legbench.drives.link import Link
-from legbench.drives.master.lock import ChannelLock
-from legbench.drives.units import AxisUnits
+from legbench.drives.master.link import Link
+from legbench.drives.protocol.frame import Frame
+from legbench.drives.setup.config import BusConfig, Identity, NodeConfig
+from legbench.drives.setup.units import AxisUnits
+from legbench.drives.transport.lock import ChannelLock
 from legbench.errors import LegbenchError, PlantFault
+from legbench.limits.safety import SafetyLimits
 
 START = (-0.5, 1.9)
 RANGES = ((-2.0, 1.0), (0.0, 3.0))

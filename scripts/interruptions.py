@@ -20,11 +20,21 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from interruption_trial import Injector, Point, Theatre
+from interruption_points import Injector, Point
+from interruption_trial import Theatre
 
 from legbench.interrupts import STOP_SIGNALS, stop_on_interrupt
 
-WEIGHTS = {"run": 6, "jog": 9, "home": 9, "script": 4, "zero": 1, "configure": 2, "jitter": 2}
+WEIGHTS = {
+    "run": 4,
+    "rest": 4,
+    "jog": 9,
+    "home": 9,
+    "script": 4,
+    "zero": 1,
+    "configure": 2,
+    "jitter": 2,
+}
 """Share of each command among the points."""
 KINDS = ("call",) * 9 + ("line",) * 9 + ("driver",) * 2
 """Where a signal comes from, and how often."""
@@ -37,7 +47,7 @@ def points(found: dict[str, Injector], count: int, seed: int) -> Iterator[Point]
     """Draw moments: every phase of a command, and every line, is as likely as another."""
     chance = random.Random(seed)
     for _ in range(count):
-        (command,) = chance.choices(list(WEIGHTS), list(WEIGHTS.values()))
+        (command,) = chance.choices(list(found), [WEIGHTS[name] for name in found])
         injector, kind = found[command], chance.choice(KINDS)
         # A user's own program has Python's handler for ^C, and none for the others.
         number = STOP_SIGNALS[-1] if command == "script" else chance.choice(STOP_SIGNALS)
@@ -86,13 +96,16 @@ def main() -> int:
     )
     parser.add_argument("--points", type=int, default=3000, help="how many")
     parser.add_argument("--seed", type=int, default=0, help="of the choice of moments")
+    parser.add_argument(
+        "--commands", nargs="+", choices=list(WEIGHTS), default=list(WEIGHTS), help="which; all"
+    )
     chosen = parser.parse_args()
     seen, bad, missed = Counter[tuple[str, str, bool]](), 0, 0
     began = time.monotonic()
     with tempfile.TemporaryDirectory() as name:
         theatre = Theatre(Path(name))
         found: dict[str, Injector] = {}
-        for command in WEIGHTS:
+        for command in chosen.commands:
             theatre.play(command)  # What is imported late is there afterwards.
             found[command] = theatre.play(command, lines=True).injector
         with stop_on_interrupt() as stop, contextlib.suppress(KeyboardInterrupt):

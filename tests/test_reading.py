@@ -9,7 +9,7 @@ import pytest
 
 from legbench.design import load_design
 from legbench.design.requirements import load_requirements
-from legbench.drives.bus_file import load_bus, load_limits
+from legbench.drives.setup.bus_file import load_bus, load_limits
 from legbench.errors import LegbenchError, RecordingError
 from legbench.reading import (
     DEEPEST,

@@ -197,8 +197,12 @@ def trace(file: Path) -> list[Passed]:
             return status
 
         CACHE.mkdir(parents=True, exist_ok=True)
-        if _child(work, 600.0) != 0:
+        status = _child(work, 600.0)
+        if not kept.exists():
             sys.exit(f"{file}: its tests cannot be traced; run them with pytest first")
+        if status != 0:
+            # Such as one that looks at a process of its own while all are slow under the trace.
+            print(f"{file.name}: a test fails under the trace and is left out", file=sys.stderr)
     return [
         Passed(
             name=test["name"],

@@ -16,8 +16,8 @@ import pytest
 from processes import BUS, CHANNEL, Child, Drives, drives_on, forked, ip, legbench
 
 from legbench.design import load_design
-from legbench.drives.bus_file import load_bus, load_limits
-from legbench.drives.session import Session
+from legbench.drives.master.session import Session
+from legbench.drives.setup.bus_file import load_bus, load_limits
 from legbench.errors import PlantFault
 from legbench.plant.can_choice import CanChoice
 from legbench.plant.can_open import open_session

@@ -26,7 +26,7 @@ class VirtualClock(AbstractClock):
         """Nothing to remember."""
 
     def wait(self, cycle: int) -> float:
-        """At once."""
+        """Return at once."""
         return 0.0
 
 

@@ -39,3 +39,6 @@ class PlantFault(LegbenchError, RuntimeError):
     def __init__(self, cause: str, message: str) -> None:
         super().__init__(message)
         self.cause = cause
+
+    def __reduce__(self) -> tuple[type["PlantFault"], tuple[str, str]]:
+        return type(self), (self.cause, str(self))

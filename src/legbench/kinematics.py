@@ -1,4 +1,4 @@
-"""Where the leg is: joint angles q, polar coordinates x, modal coordinates z.
+"""Kinematics of the leg: joint angles q, polar coordinates x, modal coordinates z.
 
 Pure and batched: every function takes arrays whose last axis holds the two components and works
 on any number of leading axes. Angles are absolute, from straight down, positive forward.

@@ -10,14 +10,14 @@ from typing import Any
 import pytest
 from commands import Done, called
 
-from legbench.drives.bus_file import load_bus
-from legbench.drives.config import BusConfig
 from legbench.drives.emulated.network import Network
-from legbench.drives.master.lock import ChannelLock
-from legbench.drives.realtime import Granted
-from legbench.drives.session import Session
+from legbench.drives.master.session import Session
+from legbench.drives.setup.bus_file import load_bus
+from legbench.drives.setup.config import BusConfig
+from legbench.drives.transport.lock import ChannelLock
+from legbench.drives.transport.realtime import Granted
 from legbench.plant import can_open
-from legbench.plants import IDLE_POS
+from legbench.plant.can_open import IDLE_POS
 from legbench.recording.reader import load
 
 HARDWARE = Path(__file__).parents[2] / "hardware"

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,8 @@ from commands import DESIGN, MODELS, Done, called
 from legbench.recording.reader import load
 
 GUESTS = Path(__file__).parents[1] / "control" / "guests"
+OLD = Path(__file__).parents[1] / "recording" / "format_1" / "bang-bang"
+"""A run of the first format."""
 SINE = f"{GUESTS / 'sine.py'}:Sine"
 FILE = """
 format = 1
@@ -275,12 +278,9 @@ def test_a_file_that_does_not_import_shows_its_own_lines(
 
 
 def test_a_run_from_before_experiments_were_recorded_whole(
-    file: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    done = called(capfd, "run", file, "--out", tmp_path / "runs", "--json")
-    run = Path(json.loads(done.out)["run"])
-    manifest = json.loads((run / "run.json").read_text(encoding="utf-8"))
-    del manifest["experiment"]
-    (run / "run.json").write_text(json.dumps(manifest), encoding="utf-8")
+    run = tmp_path / "old"
+    shutil.copytree(OLD, run)
     called(capfd, "run", "--again", run).refused("before runs held their whole experiment")
     assert called(capfd, "replay", run).status == 0

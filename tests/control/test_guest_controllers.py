@@ -21,6 +21,7 @@ from legbench.loop import run
 from legbench.metrics import summarise
 from legbench.mjcf import BuildOptions
 from legbench.plant.batch import BatchPlant
+from legbench.plant.landing import End
 from legbench.plant.sim import SimPlant
 from legbench.plant.start import Start
 from legbench.plants import AnalyticChoice, CanChoice, PlantSettings, SimChoice
@@ -39,7 +40,11 @@ def own(design: LegDesign, **choices: Any) -> Experiment:
 
 @pytest.mark.parametrize(
     "plant",
-    [SimChoice(), AnalyticChoice(), CanChoice(bus=HARDWARE / "leg.toml", interface="legbench")],
+    [
+        SimChoice(),
+        AnalyticChoice(),
+        CanChoice(bus=HARDWARE / "leg.toml", interface="legbench", end=End.STOP),
+    ],
     ids=lambda plant: plant.kind,
 )
 def test_a_law_of_25_lines_is_run_and_rated_on_every_plant(

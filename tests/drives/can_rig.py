@@ -10,30 +10,30 @@ from typing import final
 from legbench.control import AbstractController
 from legbench.design import LegDesign, load_design
 from legbench.design.setup import Setup
-from legbench.drives.bus import LockstepBus
-from legbench.drives.bus_file import load_bus, load_limits
-from legbench.drives.codec.datatypes import DataType
-from legbench.drives.codec.pdo import Mapped
-from legbench.drives.config import (
+from legbench.drives.emulated.behaviour import Behaviour
+from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.bus import LockstepBus
+from legbench.drives.emulated.network import Network
+from legbench.drives.emulated.network_time import NetworkTime
+from legbench.drives.master.session import Session
+from legbench.drives.protocol.datatypes import DataType
+from legbench.drives.protocol.pdo import Mapped
+from legbench.drives.setup.bus_file import load_bus, load_limits
+from legbench.drives.setup.config import (
     LINK_POSITION,
     POSITION_ACTUAL,
     STATUSWORD,
     BusConfig,
     PdoConfig,
 )
-from legbench.drives.emulated.behaviour import Behaviour
-from legbench.drives.emulated.build import emulate
-from legbench.drives.emulated.network import Network
-from legbench.drives.limits import SafetyLimits
-from legbench.drives.session import Session
-from legbench.drives.timebase import NetworkTime
-from legbench.drives.units import AxisUnits
+from legbench.drives.setup.units import AxisUnits
 from legbench.experiment import (
     ControllerSettings,
     Experiment,
     make_controller,
     targets_of,
 )
+from legbench.limits.safety import SafetyLimits
 from legbench.plant.can import CanPlant
 from legbench.plant.emulated_leg import EmulatedLeg
 from legbench.plant.start import Start
@@ -114,8 +114,12 @@ def stage(
     limits: SafetyLimits | None = None,
     behaviours: Sequence[Behaviour] | None = None,
     ideal: bool = False,
+    lands: bool = True,
 ) -> Iterator[Stage]:
-    """An emulated leg for an experiment, drives at its start posture."""
+    """An emulated leg for an experiment, drives at its start posture.
+
+    Without `lands` a run ends at its last row, which is quicker where its end is not the matter.
+    """
     bus = config or load_bus(BUS)
     controller, start = staged(chosen)
     motors = [float(value) for value in start.motor_pos]
@@ -124,7 +128,7 @@ def stage(
     network = emulate(bus, behaviours or usual, body=body, keep_log=True)
     session = Session(LockstepBus("leg", network=network), bus)
     link = session.link(limits or load_limits(LIMITS), chosen.design.stiffness)
-    plant = CanPlant(session, link, start)
+    plant = CanPlant(session, link, start, lands=lands)
     with plant:
         yield Stage(
             plant=plant,

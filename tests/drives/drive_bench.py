@@ -4,16 +4,16 @@ import math
 
 from drives_rig import MS, config, node
 
-from legbench.drives.cia402 import DriveState
-from legbench.drives.codec.datatypes import Value, pack, unpack
-from legbench.drives.codec.emcy import decode_emcy
-from legbench.drives.codec.frame import Frame
-from legbench.drives.codec.nmt import NmtCommand, NmtState, heartbeat_frame, nmt_frame
-from legbench.drives.codec.sdo_client import Download, Progress, Upload
-from legbench.drives.configuration import configuration
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.drive import EmulatedDrive
-from legbench.drives.objects import OBJECTS
+from legbench.drives.protocol.cia402 import DriveState
+from legbench.drives.protocol.datatypes import Value, pack, unpack
+from legbench.drives.protocol.emcy import decode_emcy
+from legbench.drives.protocol.frame import Frame
+from legbench.drives.protocol.nmt import NmtCommand, NmtState, heartbeat_frame, nmt_frame
+from legbench.drives.protocol.objects import OBJECTS
+from legbench.drives.protocol.sdo_client import Download, Progress, Upload
+from legbench.drives.setup.configuration import configuration
 
 OE, SOD = DriveState.OPERATION_ENABLED, DriveState.SWITCH_ON_DISABLED
 PER_RAD = (1 << 20) / (2.0 * math.pi)

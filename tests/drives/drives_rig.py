@@ -5,16 +5,16 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from legbench.drives.bus import LockstepBus
-from legbench.drives.cia402 import DriveState, decode_state
-from legbench.drives.config import BusConfig, Identity, NodeConfig
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.emulated.network import Body, Network, stiff_body
-from legbench.drives.limits import SafetyLimits
-from legbench.drives.link import Link
-from legbench.drives.master.lock import ChannelLock
-from legbench.drives.units import AxisUnits
+from legbench.drives.master.link import Link
+from legbench.drives.protocol.cia402 import DriveState, decode_state
+from legbench.drives.setup.config import BusConfig, Identity, NodeConfig
+from legbench.drives.setup.units import AxisUnits
+from legbench.drives.transport.lock import ChannelLock
+from legbench.limits.safety import SafetyLimits
 
 START = (-0.5, 1.9)
 """Where the motors stand at power-on [rad]."""

@@ -6,8 +6,8 @@ from dataclasses import replace
 import pytest
 from drives_rig import config
 
-from legbench.drives.codec.frame import Frame
-from legbench.drives.wire import (
+from legbench.drives.protocol.frame import Frame
+from legbench.drives.setup.wire import (
     ERROR_BITS,
     MAX_LOAD,
     bus_load,

@@ -14,20 +14,20 @@ from can_rig import BUS, LIMITS, MS, ROOT
 from legbench.cli import main
 from legbench.commissioning.home import Homed, home
 from legbench.commissioning.jog import jog
-from legbench.drives.bus import LockstepBus
-from legbench.drives.bus_file import load_bus, load_limits
-from legbench.drives.cia402 import POWERED, DriveState
-from legbench.drives.codec.datatypes import DataType
-from legbench.drives.codec.frame import HEARTBEAT_BASE, SDO_REQUEST_BASE
-from legbench.drives.config import BusConfig, Parameter
-from legbench.drives.configuration import configuration
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.emulated.network import Network
 from legbench.drives.errors import BusError, DriveError
-from legbench.drives.limits import SafetyLimits
-from legbench.drives.session import Session
+from legbench.drives.master.session import Session
+from legbench.drives.protocol.cia402 import POWERED, DriveState
+from legbench.drives.protocol.datatypes import DataType
+from legbench.drives.protocol.frame import HEARTBEAT_BASE, SDO_REQUEST_BASE
+from legbench.drives.setup.bus_file import load_bus, load_limits
+from legbench.drives.setup.config import BusConfig, Parameter
+from legbench.drives.setup.configuration import configuration
 from legbench.errors import ConfigError
+from legbench.limits.safety import SafetyLimits
 from legbench.plant import can_open
 
 STIFFNESS = (4.0, 5.0)

@@ -10,13 +10,14 @@ import pytest
 from can_rig import BUS, experiment, fine_bus, stage, staged
 
 from legbench.control import BangBangConfig, JumpConfig
-from legbench.drives.bus_file import load_bus
-from legbench.drives.limits import SafetyLimits
+from legbench.drives.setup.bus_file import load_bus
 from legbench.experiment import ControllerSettings, Experiment, record
+from legbench.limits.safety import SafetyLimits
 from legbench.loop import run
 from legbench.metrics import summarise
 from legbench.plant.abstract import AbstractPlant
 from legbench.plant.emulated_leg import EmulatedLeg
+from legbench.plant.landing import End
 from legbench.plant.sim import SimPlant
 from legbench.plants import CanChoice
 from legbench.recording.manifest import OWN_KEYS
@@ -89,12 +90,14 @@ class Settled(AbstractPlant):
 
 def both(chosen: Experiment, folder: Path) -> tuple[Recording, Recording]:
     """The same run over CAN frames and in a simulation with one cycle of delay."""
-    brief = replace(chosen, duration=0.01, plant=CanChoice(bus=BUS, interface="legbench"))
+    brief = replace(
+        chosen, duration=0.01, plant=CanChoice(bus=BUS, interface="legbench", end=End.STOP)
+    )
     manifest = load(record(brief, folder / "manifest").path).manifest
     manifest = {key: value for key, value in manifest.items() if key not in OWN_KEYS}
     cycles = round(chosen.duration / 1e-3)
     with (
-        stage(chosen, config=fine_bus(), limits=SafetyLimits(), ideal=True) as it,
+        stage(chosen, config=fine_bus(), limits=SafetyLimits(), ideal=True, lands=False) as it,
         RunWriter.create(folder / "can", manifest) as can,
     ):
         rows = FirstRow(can, it.body)
@@ -108,7 +111,7 @@ def both(chosen: Experiment, folder: Path) -> tuple[Recording, Recording]:
 
 @pytest.mark.parametrize(
     ("config", "duration"),
-    [(BangBangConfig(), 8.0), (JumpConfig(), 2.0)],
+    [(BangBangConfig(), 3.0), (JumpConfig(), 1.5)],
     ids=["bang-bang", "jump"],
 )
 def test_drives_are_a_simulation_with_one_cycle_of_delay(
@@ -128,7 +131,7 @@ def test_drives_are_a_simulation_with_one_cycle_of_delay(
 def test_a_run_over_frames_repeats_to_the_byte(tmp_path: Path) -> None:
     seen = []
     for attempt in ("first", "second"):
-        plant = CanChoice(bus=BUS, interface="legbench")
+        plant = CanChoice(bus=BUS, interface="legbench", end=End.STOP)
         chosen = replace(experiment(JumpConfig(), 0.5), plant=plant)
         run_folder = record(chosen, tmp_path / attempt).path
         recording = load(run_folder)

@@ -11,10 +11,10 @@ from can_rig import BUS, LIMITS, ROOT
 
 from legbench.cli import main
 from legbench.design import load_design
-from legbench.drives.bus_file import load_bus
-from legbench.drives.eds import dcf_text, eds_text
-from legbench.drives.stopping import check_stopping
-from legbench.drives.wire import check_load
+from legbench.drives.setup.bus_file import load_bus
+from legbench.drives.setup.eds import dcf_text, eds_text
+from legbench.drives.setup.stopping import check_stopping
+from legbench.drives.setup.wire import check_load
 from legbench.plants import limits_for
 
 HARDWARE = ROOT / "hardware"

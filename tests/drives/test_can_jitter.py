@@ -10,14 +10,14 @@ import pytest
 from can_rig import BUS, LateTime
 
 from legbench.commissioning.jitter import Timing, measure_link
-from legbench.drives.bus import LockstepBus
-from legbench.drives.bus_file import load_bus
 from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.emulated.faults import FrameFault, FrameFaultKind
 from legbench.drives.emulated.network import Network
 from legbench.drives.errors import DriveError
-from legbench.drives.limits import SafetyLimits
-from legbench.drives.session import Session
+from legbench.drives.master.session import Session
+from legbench.drives.setup.bus_file import load_bus
+from legbench.limits.safety import SafetyLimits
 from legbench.recording.reader import load
 from legbench.recording.writer import RunWriter
 

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 
 from legbench.control import BangBangConfig, JumpConfig, PositionJumpConfig
 from legbench.design.setup import Setup, SetupKind
-from legbench.drives.bus_file import load_bus, load_limits
-from legbench.drives.cia402 import DriveState
 from legbench.drives.emulated.faults import NodeFault, NodeFaultKind
-from legbench.drives.limits import SafetyLimits
-from legbench.experiment import ControllerConfig, record
+from legbench.drives.protocol.cia402 import DriveState
+from legbench.drives.setup.bus_file import load_bus, load_limits
+from legbench.experiment import ControllerSettings, record
+from legbench.limits.safety import SafetyLimits
 from legbench.loop import Outcome, StopFlag, run
 from legbench.plant.landing import PATIENCE, STILL_RANGE, STILL_TIME, End, StillWatch, land, towards
 from legbench.plants import CanChoice
@@ -58,7 +58,7 @@ def stands(it: Stage) -> None:
 
 
 @settings(
-    max_examples=8,
+    max_examples=4,
     deadline=None,
     derandomize=True,
     suppress_health_check=[HealthCheck.too_slow],
@@ -121,13 +121,14 @@ def test_a_run_that_is_to_stop_stops_in_mid_flight(tmp_path: Path) -> None:
         seen = load(finished.path)
         ends[end] = seen
         assert seen.complete
-        assert seen.manifest["bus"]["end"] == end
+        assert seen.manifest["plant"]["bus"]["end"] == end
         names = [event["name"] for event in seen.events]
-        assert names == (["rest", "bus", "end"] if end is End.REST else ["bus", "end"])
+        after = ["rest", "bus", "end"] if end is End.REST else ["bus", "end"]
+        assert names == ["limited", *after]
     # The rows are the same; what came after them is in the bus log and in one event.
     for name in ("command_pos", "joint_pos", "spring_torque", "phase", "t"):
         np.testing.assert_array_equal(ends["rest"][name], ends["stop"][name])
-    event = ends["rest"].events[0]
+    (event,) = [event for event in ends["rest"].events if event["name"] == "rest"]
     assert event["rested"] is True
     assert event["interrupted"] is False
     lines = {
@@ -139,7 +140,7 @@ def test_a_run_that_is_to_stop_stops_in_mid_flight(tmp_path: Path) -> None:
 @pytest.mark.parametrize("kind", [SetupKind.HFTS, SetupKind.VFTS, SetupKind.FFS])
 @pytest.mark.parametrize("config", [PositionJumpConfig(), BangBangConfig()])
 def test_a_leg_that_is_held_ends_in_its_rest_posture(
-    kind: SetupKind, config: ControllerConfig
+    kind: SetupKind, config: ControllerSettings
 ) -> None:
     chosen = replace(experiment(config), setup=Setup(kind=kind))
     with stage(chosen) as it:

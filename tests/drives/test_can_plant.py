@@ -9,11 +9,11 @@ import pytest
 from can_rig import BUS, LIMITS, MS, Stage, experiment, stage
 
 from legbench.control import BangBangConfig, JumpConfig, PositionJumpConfig
-from legbench.drives.bus_file import load_bus, load_limits
-from legbench.drives.cia402 import DriveState
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.faults import NodeFault, NodeFaultKind
-from legbench.drives.link import LinkState
+from legbench.drives.master.link import LinkState
+from legbench.drives.protocol.cia402 import DriveState
+from legbench.drives.setup.bus_file import load_bus, load_limits
 from legbench.errors import ConfigError, PlantFault
 from legbench.experiment import record, start_of
 from legbench.loop import run

@@ -21,10 +21,10 @@ from legbench.commissioning import configure, jitter, zero
 from legbench.commissioning.home import home
 from legbench.commissioning.jog import jog
 from legbench.design import load_design
-from legbench.drives.bus_file import load_bus
-from legbench.drives.master.lock import ChannelLock
-from legbench.drives.session import Session
-from legbench.drives.unix_bus import UnixBus
+from legbench.drives.master.session import Session
+from legbench.drives.setup.bus_file import load_bus
+from legbench.drives.transport.lock import ChannelLock
+from legbench.drives.transport.unix_bus import UnixBus
 from legbench.errors import PlantFault
 from legbench.plants import limits_for
 from legbench.recording.events import read_events
@@ -257,7 +257,11 @@ def test_nobody_acts_beside_a_master_of_another_computer(tmp_path: Path) -> None
     assert [state for _, state in drives.seen].count("operation enabled") == 2
     # What the files waive is said before the run, in its manifest and in its events.
     assert "the bus file waives the master watch: drives may go on for 601 ms" in trouble
-    assert manifest["bus"]["waived"] == ["master watch", "drive heartbeat"]
-    assert manifest["limits"]["waive"] == ["lost_frames", "overrun_cycles", "following_cycles"]
+    assert manifest["plant"]["bus"]["waived"] == ["master watch", "drive heartbeat"]
+    assert manifest["plant"]["limits"]["waive"] == [
+        "lost_frames",
+        "overrun_cycles",
+        "following_cycles",
+    ]
     (told,) = [event for event in read_events(run_folder(tmp_path))[0] if event["name"] == "waived"]
     assert len(told["protections"]) == 5

@@ -10,14 +10,15 @@ import pytest
 from can_rig import BUS, MS, LateTime, experiment, fine_bus, stage, staged
 
 from legbench.control import BangBangConfig
-from legbench.drives.bus import LockstepBus
-from legbench.drives.bus_file import load_bus
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.emulated.faults import FrameFault, FrameFaultKind
 from legbench.drives.emulated.network import Network
-from legbench.drives.limits import SafetyLimits
-from legbench.drives.session import Session
+from legbench.drives.master.session import Session
+from legbench.drives.setup.bus_file import load_bus
+from legbench.limits.safety import SafetyLimits
+from legbench.limits.upper_ends import DRIVE_HEARTBEAT
 from legbench.plant.can import VELOCITY_BANDWIDTH, CanPlant
 from legbench.signals import Command, Observation
 
@@ -46,7 +47,7 @@ class Turning:
 @contextmanager
 def turning() -> Iterator[Turning]:
     # A heartbeat that is on the wire holds SYNC up by 0.1 ms, which no master can know.
-    bus = replace(fine_bus(), heartbeat_ms=10_000)
+    bus = replace(fine_bus(), heartbeat_ms=2000, waive=(DRIVE_HEARTBEAT,))
     chosen = experiment(BangBangConfig())
     _, start = staged(chosen)
 

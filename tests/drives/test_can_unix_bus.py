@@ -10,18 +10,18 @@ import can
 import pytest
 from can_rig import BUS, MS
 
-from legbench.drives.bus_file import load_bus
-from legbench.drives.bus_server import BusServer
-from legbench.drives.codec.frame import Frame
 from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.bus_server import BusServer
+from legbench.drives.emulated.pacer import FORGIVEN_NS
+from legbench.drives.emulated.unix_server import UnixServer
 from legbench.drives.errors import BusError
-from legbench.drives.limits import SafetyLimits
-from legbench.drives.pacer import FORGIVEN_NS
-from legbench.drives.session import Session
-from legbench.drives.stopping import check_stopping
-from legbench.drives.unix_bus import UnixBus, pack_frame, unpack_frame
-from legbench.drives.unix_server import UnixServer
+from legbench.drives.master.session import Session
+from legbench.drives.protocol.frame import Frame
+from legbench.drives.setup.bus_file import load_bus
+from legbench.drives.setup.stopping import check_stopping
+from legbench.drives.transport.unix_bus import UnixBus, pack_frame, unpack_frame
 from legbench.errors import ConfigError
+from legbench.limits.safety import SafetyLimits
 
 
 @final

@@ -13,16 +13,16 @@ from pathlib import Path
 import pytest
 from drives_rig import LIMITS, STIFFNESS, config
 
-from legbench.drives.bus import LockstepBus
 from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.errors import BusError
-from legbench.drives.master.lock import ASKED_AT_MOST, LONGEST_ADDRESS, ChannelLock
-from legbench.drives.session import Session
+from legbench.drives.master.session import Session
+from legbench.drives.transport.lock import ASKED_AT_MOST, LONGEST_ADDRESS, ChannelLock
 
 NOBODY = 65534
 HOLDER = (
     "import os, sys; from pathlib import Path;"
-    "from legbench.drives.master.lock import ChannelLock;"
+    "from legbench.drives.transport.lock import ChannelLock;"
     "os.umask(0o077);"
     "lock = ChannelLock(sys.argv[1], Path(sys.argv[2]));"
     "len(sys.argv) > 3 and os.seteuid(int(sys.argv[3]));"

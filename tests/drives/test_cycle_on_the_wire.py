@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 from drives_rig import LIMITS, MS, START, Rig, config, node, rig
 
-from legbench.drives.codec.datatypes import DataType
-from legbench.drives.codec.frame import Frame
-from legbench.drives.codec.pdo import Mapped
-from legbench.drives.config import BusConfig
 from legbench.drives.emulated.faults import FrameFault, FrameFaultKind
+from legbench.drives.protocol.datatypes import DataType
+from legbench.drives.protocol.frame import Frame
+from legbench.drives.protocol.pdo import Mapped
+from legbench.drives.setup.config import BusConfig
 from legbench.errors import PlantFault
 
 TEMPERATURE = Mapped(0x2070, 0, DataType.INTEGER16)

@@ -8,19 +8,19 @@ import pytest
 from can_rig import BUS, MS
 from drives_rig import STIFFNESS, config
 
-from legbench.drives.bus import LockstepBus
-from legbench.drives.bus_file import bus_from_mapping, load_bus
-from legbench.drives.cia402 import DriveState
-from legbench.drives.codec.frame import Frame
-from legbench.drives.codec.nmt import NmtCommand, nmt_frame
 from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.emulated.faults import NodeFault, NodeFaultKind
 from legbench.drives.emulated.network import BUS_OFF, BUS_OFF_FRAME, ERROR_FRAME, PASSIVE
+from legbench.drives.emulated.unix_server import UnixServer
 from legbench.drives.errors import BusError
-from legbench.drives.link import Link
-from legbench.drives.master.lock import ChannelLock
-from legbench.drives.unix_bus import UnixBus
-from legbench.drives.unix_server import UnixServer
+from legbench.drives.master.link import Link
+from legbench.drives.protocol.cia402 import DriveState
+from legbench.drives.protocol.frame import Frame
+from legbench.drives.protocol.nmt import NmtCommand, nmt_frame
+from legbench.drives.setup.bus_file import bus_from_mapping, load_bus
+from legbench.drives.transport.lock import ChannelLock
+from legbench.drives.transport.unix_bus import UnixBus
 from legbench.errors import ConfigError
 
 BEAT = bytes.fromhex("2B17100014000000")

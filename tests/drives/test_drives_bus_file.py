@@ -5,20 +5,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from legbench.drives.bus_file import (
+from legbench.drives.protocol.datatypes import FORMATS, DataType, size_of
+from legbench.drives.protocol.frame import COB_INVALID
+from legbench.drives.protocol.objects import OBJECTS
+from legbench.drives.protocol.pdo import Mapped
+from legbench.drives.setup.bus_file import (
     bus_from_mapping,
     format_object,
     load_bus,
     load_limits,
     parse_object,
 )
-from legbench.drives.codec.datatypes import FORMATS, DataType, size_of
-from legbench.drives.codec.frame import COB_INVALID
-from legbench.drives.codec.pdo import Mapped
-from legbench.drives.config import LINK_POSITION, PdoConfig
-from legbench.drives.configuration import configuration, interpolation_time
-from legbench.drives.eds import dcf_text, eds_text
-from legbench.drives.objects import OBJECTS
+from legbench.drives.setup.config import LINK_POSITION, PdoConfig
+from legbench.drives.setup.configuration import configuration, interpolation_time
+from legbench.drives.setup.eds import dcf_text, eds_text
 from legbench.errors import ConfigError
 
 TEXT = """

@@ -7,13 +7,18 @@ from pathlib import Path
 import pytest
 from can_rig import BUS, LIMITS
 
-from legbench.drives.bus_file import bus_from_mapping, limits_from_mapping, load_bus, load_limits
-from legbench.drives.bus_numbers import BUS_NUMBERS
-from legbench.drives.cob_ids import FREE, check_cob_id
-from legbench.drives.config import BusConfig
-from legbench.drives.limits import SafetyLimits
-from legbench.drives.upper_ends import LIMIT_ENDS
+from legbench.drives.setup.bus_file import (
+    bus_from_mapping,
+    limits_from_mapping,
+    load_bus,
+    load_limits,
+)
+from legbench.drives.setup.bus_numbers import BUS_NUMBERS
+from legbench.drives.setup.cob_ids import FREE, check_cob_id
+from legbench.drives.setup.config import BusConfig
 from legbench.errors import ConfigError
+from legbench.limits.safety import SafetyLimits
+from legbench.limits.upper_ends import LIMIT_ENDS
 from legbench.reading import read_toml
 
 NONSENSE = (-5, 0, -0.0, float("nan"), float("inf"), -float("inf"), 10**19, 10**400, True, "1", [])

@@ -9,11 +9,11 @@ import can
 import pytest
 from drives_rig import MS, START, config
 
-from legbench.drives.bus import LockstepBus
-from legbench.drives.cia402 import DriveState
-from legbench.drives.eds import dcf_text, eds_text
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.bus import LockstepBus
+from legbench.drives.protocol.cia402 import DriveState
+from legbench.drives.setup.eds import dcf_text, eds_text
 
 canopen = pytest.importorskip("canopen")
 p402 = pytest.importorskip("canopen.profiles.p402")

@@ -3,7 +3,8 @@ from collections import Counter
 
 import pytest
 
-from legbench.drives.cia402 import (
+from legbench.drives.emulated.power import PowerStage
+from legbench.drives.protocol.cia402 import (
     HOLD_CYCLES,
     PATTERNS,
     RESET_PATIENCE,
@@ -16,7 +17,6 @@ from legbench.drives.cia402 import (
     describe_statusword,
     next_controlword,
 )
-from legbench.drives.emulated.power import PowerStage
 
 BITS_OF_STATE = 0b0110_1111
 
@@ -172,3 +172,13 @@ def test_an_unknown_statusword_changes_nothing() -> None:
             before = machine.step(known).controlword
         assert machine.step(word).controlword == before
         assert machine.step(word).state is None
+
+
+def test_a_stop_is_sent_at_once_even_if_the_state_cannot_be_read() -> None:
+    for goal, word in ((Goal.QUICK_STOP, 0x02), (Goal.DISABLED, 0x00)):
+        for age in (1, 2, 3):
+            machine = PowerMachine()
+            machine.seek(Goal.ENABLED)
+            assert [machine.step(0x40).controlword for _ in range(age)] == [0x06] * age
+            machine.seek(goal)
+            assert machine.step(0x01).controlword == word

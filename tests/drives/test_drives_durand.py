@@ -8,16 +8,16 @@ from typing import Any
 import pytest
 from drives_rig import START, STIFFNESS, config
 
-from legbench.drives.bus import LockstepBus
-from legbench.drives.cia402 import DriveState
-from legbench.drives.codec.frame import Frame
-from legbench.drives.config import RPDO, NodeConfig
+from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.emulated.network import Network
 from legbench.drives.emulated.power import PowerStage
-from legbench.drives.limits import SafetyLimits
-from legbench.drives.link import Link
-from legbench.drives.master.lock import ChannelLock
-from legbench.drives.objects import OBJECTS, Access
+from legbench.drives.master.link import Link
+from legbench.drives.protocol.cia402 import DriveState
+from legbench.drives.protocol.frame import Frame
+from legbench.drives.protocol.objects import OBJECTS, Access
+from legbench.drives.setup.config import RPDO, NodeConfig
+from legbench.drives.transport.lock import ChannelLock
+from legbench.limits.safety import SafetyLimits
 
 durand = pytest.importorskip("durand")
 scheduling = pytest.importorskip("durand.scheduler")

@@ -6,16 +6,16 @@ import pytest
 from drive_bench import OE, OFFSET, PER_RAD, SOD, Bench, counts
 from drives_rig import MS, node
 
-from legbench.drives.cia402 import Controlword, DriveState, StatusBit, decode_state
-from legbench.drives.codec.datatypes import DataType, unpack
-from legbench.drives.codec.frame import Frame
-from legbench.drives.codec.nmt import NmtCommand, NmtState, nmt_frame
-from legbench.drives.codec.sdo import Abort
-from legbench.drives.codec.sdo_client import Download, Upload
 from legbench.drives.emulated.behaviour import Behaviour, MissingSetpoint
 from legbench.drives.emulated.drive import OVER_TEMPERATURE, UNDER_VOLTAGE, EmulatedDrive
 from legbench.drives.errors import SdoAbortError
-from legbench.drives.objects import OBJECTS
+from legbench.drives.protocol.cia402 import Controlword, DriveState, StatusBit, decode_state
+from legbench.drives.protocol.datatypes import DataType, unpack
+from legbench.drives.protocol.frame import Frame
+from legbench.drives.protocol.nmt import NmtCommand, NmtState, nmt_frame
+from legbench.drives.protocol.objects import OBJECTS
+from legbench.drives.protocol.sdo import Abort
+from legbench.drives.protocol.sdo_client import Download, Upload
 
 
 def test_boot_up_comes_first_and_only_once() -> None:

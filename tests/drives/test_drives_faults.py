@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 from drives_rig import MS, START, Rig, rig
 
-from legbench.drives.cia402 import Controlword, DriveState
 from legbench.drives.emulated.faults import (
     Babble,
     Fault,
@@ -15,6 +14,7 @@ from legbench.drives.emulated.faults import (
     NodeFault,
     NodeFaultKind,
 )
+from legbench.drives.protocol.cia402 import Controlword, DriveState
 from legbench.errors import PlantFault
 
 OE = DriveState.OPERATION_ENABLED

@@ -14,19 +14,19 @@ from hypothesis import strategies as st
 from legbench.cli import main
 from legbench.commissioning.status import status
 from legbench.design import load_design
-from legbench.drives.bus import LockstepBus
-from legbench.drives.bus_file import load_bus, load_limits
-from legbench.drives.codec.datatypes import FORMATS, DataType, pack
-from legbench.drives.codec.pdo import Mapped
-from legbench.drives.config import LINK_POSITION, BusConfig, NodeConfig, PdoConfig
 from legbench.drives.emulated.build import emulate
-from legbench.drives.field_ranges import check_field_ranges
-from legbench.drives.limits import SafetyLimits
+from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.master.axis_link import AxisLink
+from legbench.drives.master.session import Session
 from legbench.drives.master.temperature import TemperaturePoll
-from legbench.drives.session import Session
-from legbench.drives.units import AxisUnits
+from legbench.drives.protocol.datatypes import FORMATS, DataType, pack
+from legbench.drives.protocol.pdo import Mapped
+from legbench.drives.setup.bus_file import load_bus, load_limits
+from legbench.drives.setup.config import LINK_POSITION, BusConfig, NodeConfig, PdoConfig
+from legbench.drives.setup.field_ranges import check_field_ranges
+from legbench.drives.setup.units import AxisUnits
 from legbench.errors import ConfigError
+from legbench.limits.safety import SafetyLimits
 from legbench.plants import limits_for
 
 angles = st.floats(-2.2, 2.2)

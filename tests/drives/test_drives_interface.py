@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 from drives_rig import config
 
-from legbench.drives import open_bus
 from legbench.drives.errors import BusError
-from legbench.drives.interface import ask_ip, bitrate_of, check_interface
-from legbench.drives.open_bus import Adapter
+from legbench.drives.transport import open_bus
+from legbench.drives.transport.interface import ask_ip, bitrate_of, check_interface
+from legbench.drives.transport.open_bus import Adapter
 
 UP, DOWN = "0x40081", "0x40080"
 

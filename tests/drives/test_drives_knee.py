@@ -10,11 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from legbench.control import JumpConfig
-from legbench.drives.guard import Guard
-from legbench.drives.knee import knee_of, project
-from legbench.drives.limits import SafetyLimits
 from legbench.errors import ConfigError, PlantFault
-from legbench.plants import knee_ranges, limits_for
+from legbench.limits.guard import Guard
+from legbench.limits.knee import knee_of, project
+from legbench.limits.safety import SafetyLimits
+from legbench.plant.design_limits import knee_ranges
+from legbench.plants import limits_for
 
 PERIOD = 1e-3
 BOXES = ((-1.1, 0.8), (-0.8, 1.1))

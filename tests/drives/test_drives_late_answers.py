@@ -11,10 +11,10 @@ import can
 import pytest
 from drives_rig import LIMITS, MS, START, Rig, config, rig
 
-from legbench.drives.cia402 import DriveState
-from legbench.drives.codec.frame import Frame
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.faults import FrameFault, FrameFaultKind
+from legbench.drives.protocol.cia402 import DriveState
+from legbench.drives.protocol.frame import Frame
 from legbench.errors import PlantFault
 
 KNEE = 0x182

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from legbench.drives.guard import Guard
-from legbench.drives.limits import SafetyLimits
 from legbench.errors import ConfigError, PlantFault
+from legbench.limits.guard import Guard
+from legbench.limits.safety import SafetyLimits
 
 PERIOD = 1e-3
 RANGES = ((-1.0, 1.0), (0.0, 2.0))

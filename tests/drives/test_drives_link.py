@@ -7,18 +7,18 @@ import can
 import pytest
 from drives_rig import LIMITS, MS, START, STIFFNESS, config, node, rig
 
-from legbench.drives.bus import LockstepBus
-from legbench.drives.cia402 import Controlword, DriveState, decode_state
-from legbench.drives.config import Identity
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.emulated.faults import FrameFault, FrameFaultKind, NodeFault, NodeFaultKind
 from legbench.drives.errors import BusError, DriveError
-from legbench.drives.limits import SafetyLimits
-from legbench.drives.link import Link, LinkState
 from legbench.drives.master.bus_log import BusLog
-from legbench.drives.master.lock import ChannelLock
+from legbench.drives.master.link import Link, LinkState
+from legbench.drives.protocol.cia402 import Controlword, DriveState, decode_state
+from legbench.drives.setup.config import Identity
+from legbench.drives.transport.lock import ChannelLock
 from legbench.errors import ConfigError, PlantFault
+from legbench.limits.safety import SafetyLimits
 
 SO, OE = DriveState.SWITCH_ON_DISABLED, DriveState.OPERATION_ENABLED
 RESOLUTION = 2.0 * math.pi / (1 << 20)

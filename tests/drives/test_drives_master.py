@@ -10,21 +10,28 @@ import can
 import pytest
 from drives_rig import LIMITS, START, STIFFNESS, config, node, rig
 
-from legbench.drives.bus import LockstepBus
-from legbench.drives.bus_file import parse_object
-from legbench.drives.codec.datatypes import DataType
-from legbench.drives.codec.pdo import Mapped
-from legbench.drives.config import LINK_POSITION, POSITION_ACTUAL, STATUSWORD, BusConfig, PdoConfig
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.emulated.faults import NodeFault, NodeFaultKind
+from legbench.drives.emulated.network_time import NetworkTime
 from legbench.drives.errors import BusError, DriveError
-from legbench.drives.link import Link
 from legbench.drives.master.bus_log import BusLog
-from legbench.drives.master.lock import ChannelLock
+from legbench.drives.master.link import Link
 from legbench.drives.master.port import Port
-from legbench.drives.open_bus import adapter_of, open_bus, timebase_of
-from legbench.drives.timebase import NetworkTime, SystemTime
+from legbench.drives.protocol.datatypes import DataType
+from legbench.drives.protocol.pdo import Mapped
+from legbench.drives.setup.bus_file import parse_object
+from legbench.drives.setup.config import (
+    LINK_POSITION,
+    POSITION_ACTUAL,
+    STATUSWORD,
+    BusConfig,
+    PdoConfig,
+)
+from legbench.drives.transport.lock import ChannelLock
+from legbench.drives.transport.open_bus import adapter_of, open_bus, timebase_of
+from legbench.drives.transport.timebase import SystemTime
 from legbench.errors import ConfigError, PlantFault
 
 
@@ -98,7 +105,7 @@ def test_a_drive_that_does_not_keep_a_value_is_named(tmp_path: Path) -> None:
 def test_the_lock_dies_with_its_process(tmp_path: Path) -> None:
     holder = (
         "import sys, time; from pathlib import Path;"
-        "from legbench.drives.master.lock import ChannelLock;"
+        "from legbench.drives.transport.lock import ChannelLock;"
         f"ChannelLock('vcan0', Path({str(tmp_path)!r})).acquire();"
         "print('held', flush=True); time.sleep(60)"
     )

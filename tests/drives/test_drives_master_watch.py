@@ -10,24 +10,24 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from legbench.commissioning.home import home
-from legbench.drives.bus import LockstepBus
-from legbench.drives.cia402 import POWERED
-from legbench.drives.codec.datatypes import DataType
-from legbench.drives.config import RPDO, BusConfig, Parameter
-from legbench.drives.configuration import configuration
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.emulated.network import Network
-from legbench.drives.master_watch import (
+from legbench.drives.master.session import Session
+from legbench.drives.protocol.cia402 import POWERED
+from legbench.drives.protocol.datatypes import DataType
+from legbench.drives.setup.config import RPDO, BusConfig, Parameter
+from legbench.drives.setup.configuration import configuration
+from legbench.drives.setup.master_watch import (
     LONGEST_STOP_MS,
     check_master_watch,
     means_of,
     stop_ms,
 )
-from legbench.drives.session import Session
-from legbench.drives.upper_ends import MASTER_WATCH
-from legbench.drives.waivers import describe_waivers
+from legbench.drives.setup.waivers import describe_waivers
 from legbench.errors import ConfigError
+from legbench.limits.upper_ends import MASTER_WATCH
 
 SPEED = 5.0
 """Of both motors when their master dies [rad/s]."""

@@ -10,14 +10,14 @@ from legbench.commissioning.fault_trial import Trial, try_fault
 from legbench.control import BangBangConfig
 from legbench.design import load_design
 from legbench.design.setup import Setup, SetupKind
-from legbench.drives.bus_file import load_limits
-from legbench.drives.codec.frame import Frame
 from legbench.drives.emulated.faults import (
     FrameFault,
     FrameFaultKind,
     NodeFault,
     NodeFaultKind,
 )
+from legbench.drives.protocol.frame import Frame
+from legbench.drives.setup.bus_file import load_limits
 from legbench.experiment import Experiment, record
 from legbench.metrics import summarise
 from legbench.plants import AnalyticChoice, SimChoice

@@ -9,12 +9,12 @@ from can_rig import Stage, experiment, stage
 from drives_rig import MS, rig
 
 from legbench.control import JumpConfig
-from legbench.drives.bus import LockstepBus
-from legbench.drives.cia402 import POWERED, DriveState
-from legbench.drives.codec.frame import COB_INVALID
+from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.emulated.faults import NodeFault, NodeFaultKind
 from legbench.drives.master.parking import park
 from legbench.drives.master.port import Port
+from legbench.drives.protocol.cia402 import POWERED, DriveState
+from legbench.drives.protocol.frame import COB_INVALID
 from legbench.loop import run
 
 RPDO_1, SYNC, NMT_START = (0x1400, 1), 0x080, b"\x01"
@@ -66,7 +66,7 @@ def test_without_parking_the_log_does_move_them(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What the test above would show if the drives were left as they are."""
-    monkeypatch.setattr("legbench.drives.link.park", lambda *_arguments: [])
+    monkeypatch.setattr("legbench.drives.master.link.park", lambda *_arguments: [])
     with stage(experiment(JumpConfig())) as it:
         frames = recorded(it, tmp_path / "bus.log")
         stood, furthest = angles(it), 0.0

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from legbench.drives.plausibility import (
+from legbench.limits.plausibility import (
     SWAY_CYCLES,
     Bounds,
     Doubt,

@@ -9,20 +9,20 @@ import pytest
 from drives_rig import LIMITS, MS, START, STIFFNESS, Rig, config, rig
 
 from legbench.commissioning.jitter import measure
-from legbench.drives.bus import LockstepBus
-from legbench.drives.cia402 import DriveState
-from legbench.drives.codec.frame import Frame
-from legbench.drives.codec.nmt import NmtCommand, NmtState, heartbeat_frame, nmt_frame
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.emulated.faults import FrameFault, FrameFaultKind
 from legbench.drives.emulated.network import Network
 from legbench.drives.errors import BusError, DriveError
-from legbench.drives.link import Link, LinkState
 from legbench.drives.master.cycle import Tick
-from legbench.drives.master.lock import ChannelLock
+from legbench.drives.master.link import Link, LinkState
 from legbench.drives.master.read_only import may_pace, may_read
-from legbench.drives.session import Session
+from legbench.drives.master.session import Session
+from legbench.drives.protocol.cia402 import DriveState
+from legbench.drives.protocol.frame import Frame
+from legbench.drives.protocol.nmt import NmtCommand, NmtState, heartbeat_frame, nmt_frame
+from legbench.drives.transport.lock import ChannelLock
 from legbench.errors import PlantFault
 
 OE = DriveState.OPERATION_ENABLED

@@ -9,22 +9,28 @@ import can
 import pytest
 from drives_rig import LIMITS, MS, START, Rig, config, rig
 
-from legbench.drives.bus_file import bus_from_mapping
-from legbench.drives.cia402 import Controlword, DriveState, Goal, PowerMachine, decode_state
-from legbench.drives.codec.datatypes import DataType
-from legbench.drives.codec.frame import Frame
-from legbench.drives.codec.pdo import Mapped
-from legbench.drives.config import BusConfig, Parameter
 from legbench.drives.emulated.faults import FrameFault, FrameFaultKind
 from legbench.drives.errors import BusError, DriveError
-from legbench.drives.limits import SafetyLimits
-from legbench.drives.link import Link, LinkState
 from legbench.drives.master.bus_log import BusLog
-from legbench.drives.master.lock import ChannelLock
+from legbench.drives.master.link import Link, LinkState
 from legbench.drives.master.port import Port
 from legbench.drives.master.sdo_port import SdoPort
-from legbench.drives.stopping import check_stopping
+from legbench.drives.protocol.cia402 import (
+    Controlword,
+    DriveState,
+    Goal,
+    PowerMachine,
+    decode_state,
+)
+from legbench.drives.protocol.datatypes import DataType
+from legbench.drives.protocol.frame import Frame
+from legbench.drives.protocol.pdo import Mapped
+from legbench.drives.setup.bus_file import bus_from_mapping
+from legbench.drives.setup.config import BusConfig, Parameter
+from legbench.drives.setup.stopping import check_stopping
+from legbench.drives.transport.lock import ChannelLock
 from legbench.errors import ConfigError, PlantFault
+from legbench.limits.safety import SafetyLimits
 
 SO, OE = DriveState.SWITCH_ON_DISABLED, DriveState.OPERATION_ENABLED
 HIP = 0x201

@@ -4,10 +4,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from legbench.drives.codec.sdo import MAX_TRANSFER, MEANINGS, Abort, abort_data, abort_error
-from legbench.drives.codec.sdo_client import Download, Progress, Upload
-from legbench.drives.codec.sdo_server import SdoServer
 from legbench.drives.errors import CodecError, SdoAbortError
+from legbench.drives.protocol.sdo import MAX_TRANSFER, MEANINGS, Abort, abort_data, abort_error
+from legbench.drives.protocol.sdo_client import Download, Progress, Upload
+from legbench.drives.protocol.sdo_server import SdoServer
 
 LENGTHS = [*range(1, 300), 888, 889, 890, 4096, MAX_TRANSFER]
 

@@ -13,24 +13,31 @@ from drives_rig import LIMITS, MS, START, STIFFNESS, config
 from legbench.commissioning import configure, jitter, zero
 from legbench.commissioning.home import home
 from legbench.commissioning.jog import jog
-from legbench.drives.bus import LockstepBus
-from legbench.drives.cia402 import DriveState
-from legbench.drives.codec.datatypes import DataType
-from legbench.drives.codec.frame import Frame
-from legbench.drives.config import BusConfig, Parameter
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.emulated.network import Network
-from legbench.drives.link import Link, LinkState
-from legbench.drives.master.lock import ChannelLock
+from legbench.drives.master.link import Link, LinkState
 from legbench.drives.master.sample import Sample
-from legbench.drives.open_bus import LISTEN_NS
-from legbench.drives.session import Session
+from legbench.drives.master.session import Session
+from legbench.drives.protocol.cia402 import DriveState
+from legbench.drives.protocol.datatypes import DataType
+from legbench.drives.protocol.frame import Frame
+from legbench.drives.setup.config import BusConfig, Parameter
+from legbench.drives.transport.lock import ChannelLock
+from legbench.drives.transport.open_bus import LISTEN_NS
 from legbench.errors import LegbenchError, PlantFault
 
 U32 = DataType.UNSIGNED32
 RAMP = Parameter(index=0x6085, sub=0, kind=U32, value=1 << 31)
-FULL = replace(LIMITS, joint_range=LIMITS.motor_range, command_step=0.5)
+FULL = replace(
+    LIMITS,
+    joint_range=LIMITS.motor_range,
+    command_step=0.5,
+    joint_speed=60.0,
+    standing=0.02,
+    sway=0.05,
+)
 CYCLES = 300
 FOREIGN = 5
 """A node that the bus file does not name."""

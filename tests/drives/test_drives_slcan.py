@@ -13,16 +13,16 @@ from can.interfaces import slcan
 from can.interfaces.slcan import slcanBus
 from can_rig import BUS, MS
 
-from legbench.drives.bus_file import load_bus
-from legbench.drives.codec.frame import Frame
-from legbench.drives.codec.slcan import bitrate_of_registers, format_frame, parse_frame
 from legbench.drives.emulated.build import emulate
 from legbench.drives.emulated.network import Network
 from legbench.drives.emulated.slcan import SlcanAdapter
+from legbench.drives.emulated.slcan_server import FULL, SlcanServer
 from legbench.drives.errors import BusError
-from legbench.drives.open_bus import Adapter, open_bus
-from legbench.drives.slcan_bus import SlcanBus
-from legbench.drives.slcan_server import FULL, SlcanServer
+from legbench.drives.protocol.frame import Frame
+from legbench.drives.protocol.slcan import bitrate_of_registers, format_frame, parse_frame
+from legbench.drives.setup.bus_file import load_bus
+from legbench.drives.transport.open_bus import Adapter, open_bus
+from legbench.drives.transport.slcan_bus import SlcanBus
 
 ASK = can.Message(
     arbitration_id=0x601, data=bytes.fromhex("4000100000000000"), is_extended_id=False

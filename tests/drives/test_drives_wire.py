@@ -4,8 +4,8 @@ import random
 import pytest
 from drives_rig import config
 
-from legbench.drives.codec.frame import Frame
-from legbench.drives.wire import (
+from legbench.drives.protocol.frame import Frame
+from legbench.drives.setup.wire import (
     bus_load,
     check_load,
     exact_bits,

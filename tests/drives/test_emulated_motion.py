@@ -9,8 +9,8 @@ from legbench.drives.emulated.alarms import Alarms
 from legbench.drives.emulated.behaviour import Behaviour, MissingSetpoint
 from legbench.drives.emulated.homing import Homing, HomingState
 from legbench.drives.emulated.motion import Motion
-from legbench.drives.objects import Key
-from legbench.drives.units import AxisUnits
+from legbench.drives.protocol.objects import Key
+from legbench.drives.setup.units import AxisUnits
 
 STEP_NS = 1_000_000
 UNITS = AxisUnits(counts_per_rev=1000, offset_counts=300)

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import pytest
 from drives_rig import MS, config
 
-from legbench.drives.codec.frame import Frame
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.build import emulate
 from legbench.drives.emulated.faults import (
@@ -19,7 +18,8 @@ from legbench.drives.emulated.faults import (
 from legbench.drives.emulated.injector import Injector
 from legbench.drives.emulated.network import Network, Station, Stuffing
 from legbench.drives.errors import BusError
-from legbench.drives.wire import exact_bits, plain_bits, worst_bits
+from legbench.drives.protocol.frame import Frame
+from legbench.drives.setup.wire import exact_bits, plain_bits, worst_bits
 from legbench.errors import ConfigError
 
 US = 1000

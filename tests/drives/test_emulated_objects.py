@@ -6,15 +6,15 @@ import pytest
 from drive_bench import OE, SOD, Bench, counts
 from drives_rig import MS
 
-from legbench.drives.cia402 import DriveState, decode_state
-from legbench.drives.codec.datatypes import DataType
-from legbench.drives.codec.frame import Frame
-from legbench.drives.codec.nmt import NmtCommand, NmtState, heartbeat_frame, nmt_frame
-from legbench.drives.codec.sdo import Abort
 from legbench.drives.emulated.drive import OVER_TEMPERATURE, UNDER_VOLTAGE
 from legbench.drives.emulated.store import ObjectStore
 from legbench.drives.errors import SdoAbortError
-from legbench.drives.objects import Access, Key, ObjectEntry
+from legbench.drives.protocol.cia402 import DriveState, decode_state
+from legbench.drives.protocol.datatypes import DataType
+from legbench.drives.protocol.frame import Frame
+from legbench.drives.protocol.nmt import NmtCommand, NmtState, heartbeat_frame, nmt_frame
+from legbench.drives.protocol.objects import Access, Key, ObjectEntry
+from legbench.drives.protocol.sdo import Abort
 
 U8, U16, I16 = DataType.UNSIGNED8, DataType.UNSIGNED16, DataType.INTEGER16
 GONE = 1 << 31

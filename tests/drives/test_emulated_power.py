@@ -4,8 +4,8 @@ import itertools
 
 import pytest
 
-from legbench.drives.cia402 import DriveState
 from legbench.drives.emulated.power import PowerStage
+from legbench.drives.protocol.cia402 import DriveState
 
 S = DriveState
 POWERED = (S.OPERATION_ENABLED, S.QUICK_STOP_ACTIVE, S.FAULT_REACTION_ACTIVE)

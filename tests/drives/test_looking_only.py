@@ -8,12 +8,12 @@ import can
 import pytest
 from drives_rig import config
 
-from legbench.drives.codec.slcan import BITRATES, bitrate_of_registers
 from legbench.drives.errors import BusError, NoAnswerError
 from legbench.drives.master.cycle import Tick
 from legbench.drives.master.first_contact import first_contact
 from legbench.drives.master.read_only import may_pace, may_read
 from legbench.drives.master.sample import sample_of
+from legbench.drives.protocol.slcan import BITRATES, bitrate_of_registers
 
 
 def test_of_all_frames_only_questions_may_be_sent() -> None:

@@ -6,12 +6,12 @@ from collections.abc import Callable, Iterator
 import can
 import pytest
 
-from legbench.drives.codec.datatypes import DataType
-from legbench.drives.codec.frame import Frame
-from legbench.drives.codec.sdo import Abort, abort_data
 from legbench.drives.errors import BusError, DriveError, NoAnswerError, SdoAbortError
 from legbench.drives.master.port import Port
 from legbench.drives.master.sdo_port import SdoPort
+from legbench.drives.protocol.datatypes import DataType
+from legbench.drives.protocol.frame import Frame
+from legbench.drives.protocol.sdo import Abort, abort_data
 
 MS = 1_000_000
 RESPONSE = 0x581
@@ -192,8 +192,8 @@ def test_a_listener_that_fails_is_told_once_and_hears_nothing_more(wire: Wire) -
 
     port = port_of(wire)
     port.listener = fail
-    with pytest.raises(BusError, match="wire: a listener failed: disk full"):
-        port.send(0x080)
+    port.send(0x080)
+    assert port.listener_error == "OSError: disk full"
     port.send(0x080)
     assert port.listener is None
     assert len(wire.sent) == 2

@@ -8,10 +8,10 @@ import random
 
 import pytest
 
-from legbench.drives.codec.sdo import Abort
-from legbench.drives.codec.sdo_client import Download, Progress, Upload
-from legbench.drives.codec.sdo_server import SdoServer
 from legbench.drives.errors import SdoAbortError
+from legbench.drives.protocol.sdo import Abort
+from legbench.drives.protocol.sdo_client import Download, Progress, Upload
+from legbench.drives.protocol.sdo_server import SdoServer
 
 INDEX, SUB = 0x2345, 0x67
 MUX = bytes.fromhex("452367")

@@ -8,9 +8,9 @@ import numpy as np
 from can_rig import MS, experiment, stage
 
 from legbench.control import CONTROLLERS, AbstractController
-from legbench.drives.cia402 import DriveState
 from legbench.drives.emulated.network import Network
-from legbench.drives.timebase import NetworkTime
+from legbench.drives.emulated.network_time import NetworkTime
+from legbench.drives.protocol.cia402 import DriveState
 from legbench.experiment.running import record_in_memory
 from legbench.loop import run
 from legbench.recording.controller_table import controller_table

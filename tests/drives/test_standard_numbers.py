@@ -8,7 +8,13 @@ import itertools
 
 import pytest
 
-from legbench.drives.cia402 import (
+from legbench.drives.emulated import axis, drive
+from legbench.drives.emulated.alarms import register_of
+from legbench.drives.emulated.power import POWERED as POWERED_INSIDE
+from legbench.drives.emulated.power import PowerStage
+from legbench.drives.errors import CodecError
+from legbench.drives.protocol import emcy, frame, nmt, sdo
+from legbench.drives.protocol.cia402 import (
     HOLD,
     POWERED,
     Controlword,
@@ -22,9 +28,8 @@ from legbench.drives.cia402 import (
     describe_statusword,
     next_controlword,
 )
-from legbench.drives.codec import emcy, frame, nmt, sdo
-from legbench.drives.codec.datatypes import DataType, pack, range_of, size_of, unpack
-from legbench.drives.config import (
+from legbench.drives.protocol.datatypes import DataType, pack, range_of, size_of, unpack
+from legbench.drives.setup.config import (
     CONTROLWORD,
     LINK_POSITION,
     LINK_POSITION_SHORT,
@@ -32,11 +37,6 @@ from legbench.drives.config import (
     STATUSWORD,
     TARGET_POSITION,
 )
-from legbench.drives.emulated import axis, drive
-from legbench.drives.emulated.alarms import register_of
-from legbench.drives.emulated.power import POWERED as POWERED_INSIDE
-from legbench.drives.emulated.power import PowerStage
-from legbench.drives.errors import CodecError
 
 S = DriveState
 

@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 from drives_rig import MS, START, Rig, config, rig
 
-from legbench.drives.cia402 import DriveState, Goal
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.faults import FrameFault, FrameFaultKind
 from legbench.drives.errors import DriveError
-from legbench.drives.link import LinkState
+from legbench.drives.master.link import LinkState
+from legbench.drives.protocol.cia402 import DriveState, Goal
 
 OE, SOD = DriveState.OPERATION_ENABLED, DriveState.SWITCH_ON_DISABLED
 NAMES = ("hip", "knee")

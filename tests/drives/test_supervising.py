@@ -7,13 +7,13 @@ from typing import Any, cast
 import pytest
 from drives_rig import LIMITS, config, node
 
-from legbench.drives.cia402 import Goal
-from legbench.drives.config import BusConfig
-from legbench.drives.limits import SafetyLimits
 from legbench.drives.master.axis_link import AxisLink
 from legbench.drives.master.cycle import Tick
 from legbench.drives.master.supervisor import Supervisor
+from legbench.drives.protocol.cia402 import Goal
+from legbench.drives.setup.config import BusConfig
 from legbench.errors import PlantFault
+from legbench.limits.safety import SafetyLimits
 
 ENABLED, FOLLOWS = 0x0237, 1 << 12
 
@@ -181,6 +181,18 @@ def test_a_drive_that_left_operation_enabled_ends_a_run_at_once(place: int) -> N
     with pytest.raises(PlantFault, match=words) as caught:
         watched.states()
     assert caught.value.cause == "drive not enabled"
+
+
+@pytest.mark.parametrize("place", [0, 1])
+def test_a_drive_without_data_hides_nothing_of_the_other_one(place: int) -> None:
+    for shown, limit, found in ((0x0250, 5, "drive not enabled"), (ENABLED, 1, "command ignored")):
+        scene = Scene()
+        enabled(scene)
+        watched = scene.supervisor(following_cycles=limit)
+        scene.axes[1 - place].fresh = False
+        scene.axes[place].statusword = shown
+        told = [cause(watched.states) for _ in range(2)]
+        assert told == ([found] * 2 if shown != ENABLED else [None, found])
 
 
 @pytest.mark.parametrize("place", [0, 1])

@@ -6,11 +6,14 @@ from dataclasses import replace
 import pytest
 from drives_rig import MS, config, node
 
-from legbench.drives.codec.datatypes import DataType
-from legbench.drives.codec.frame import Frame
-from legbench.drives.codec.pdo import Mapped
-from legbench.drives.codec.sdo import Abort, abort_data
-from legbench.drives.config import (
+from legbench.drives.master.axis_link import AxisLink
+from legbench.drives.master.temperature import TemperaturePoll
+from legbench.drives.master.watch import NodeWatch
+from legbench.drives.protocol.datatypes import DataType
+from legbench.drives.protocol.frame import Frame
+from legbench.drives.protocol.pdo import Mapped
+from legbench.drives.protocol.sdo import Abort, abort_data
+from legbench.drives.setup.config import (
     CONTROLWORD,
     LINK_POSITION,
     POSITION_ACTUAL,
@@ -19,10 +22,7 @@ from legbench.drives.config import (
     NodeConfig,
     PdoConfig,
 )
-from legbench.drives.master.axis_link import AxisLink
-from legbench.drives.master.temperature import TemperaturePoll
-from legbench.drives.master.watch import NodeWatch
-from legbench.drives.units import AxisUnits, unwrap, wrap
+from legbench.drives.setup.units import AxisUnits, unwrap, wrap
 
 WHO = "drive 'knee' (node 2)"
 NEVER = 1 << 30

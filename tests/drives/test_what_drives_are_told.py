@@ -10,9 +10,10 @@ from dataclasses import replace
 import pytest
 from drives_rig import config, node
 
-from legbench.drives.codec.datatypes import DataType
-from legbench.drives.codec.pdo import Mapped
-from legbench.drives.config import (
+from legbench.drives.protocol.datatypes import DataType
+from legbench.drives.protocol.objects import OBJECTS
+from legbench.drives.protocol.pdo import Mapped
+from legbench.drives.setup.config import (
     CONTROLWORD,
     POSITION_ACTUAL,
     STATUSWORD,
@@ -22,9 +23,8 @@ from legbench.drives.config import (
     Parameter,
     PdoConfig,
 )
-from legbench.drives.configuration import configuration, interpolation_time
-from legbench.drives.eds import BAUD_RATES, dcf_text, eds_text
-from legbench.drives.objects import OBJECTS
+from legbench.drives.setup.configuration import configuration, interpolation_time
+from legbench.drives.setup.eds import BAUD_RATES, dcf_text, eds_text
 from legbench.errors import ConfigError
 
 Told = list[tuple[str, str, int]]

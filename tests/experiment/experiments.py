@@ -5,7 +5,6 @@ from pathlib import Path
 from legbench.control import BangBangConfig, ControllerSettings, JumpConfig, PositionJumpConfig
 from legbench.design import load_design
 from legbench.design.setup import Setup, SetupKind
-from legbench.drives.bus_file import load_limits
 from legbench.drives.emulated.faults import (
     Babble,
     FrameFault,
@@ -13,8 +12,10 @@ from legbench.drives.emulated.faults import (
     NodeFault,
     NodeFaultKind,
 )
+from legbench.drives.setup.bus_file import load_limits
 from legbench.experiment import Conventions, Experiment
 from legbench.guests import module_of_file
+from legbench.plant.landing import End
 from legbench.plants import AnalyticChoice, CanChoice, PlantSettings, SimChoice
 
 ROOT = Path(__file__).parents[2]
@@ -36,6 +37,7 @@ PLANTS: dict[str, PlantSettings] = {
     "limited": SimChoice(limits=LIMITS),
     "analytic": AnalyticChoice(),
     "can": CanChoice(
+        end=End.STOP,
         bus=HARDWARE / "leg.toml",
         interface="legbench",
         faults=(

@@ -13,12 +13,12 @@ import numpy as np
 from legbench.control import Jump, JumpConfig, LegTargets
 from legbench.design import LegDesign, load_design
 from legbench.design.setup import Setup, SetupKind
-from legbench.drives.bus import LockstepBus
-from legbench.drives.bus_file import load_bus
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.build import emulate
-from legbench.drives.limits import SafetyLimits
-from legbench.drives.session import Session
+from legbench.drives.emulated.bus import LockstepBus
+from legbench.drives.master.session import Session
+from legbench.drives.setup.bus_file import load_bus
+from legbench.limits.safety import SafetyLimits
 from legbench.mjcf import BuildOptions, Linkage, LinkageKind
 from legbench.plant.abstract import AbstractPlant
 from legbench.plant.analytic import AnalyticPlant

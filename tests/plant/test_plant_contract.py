@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from plants import PLANTS, Case, arrays, copied, same, wobble
 
-from legbench.drives.limits import SafetyLimits
+from legbench.limits.safety import SafetyLimits
 from legbench.plant.abstract import AbstractPlant
 from legbench.plant.limited import LimitedPlant
 from legbench.plant.start import PERIOD

@@ -31,19 +31,22 @@ RISING, FALLING = hy.event_direction.positive, hy.event_direction.negative
 EITHER = hy.event_direction.any
 TIME_LIMIT = int(hy.taylor_outcome.time_limit)
 NEVER = 1e6
-"""A level that no probe reaches [rad]."""
+"""Probe level that is never reached [rad]."""
 COOLDOWN = 1e-8
-"""For which an event does not repeat itself; long against rounding, short against a leg [s]."""
+"""Time within which an event does not repeat itself; long against rounding, short against the
+leg's motion [s]."""
 TIE = 1e-6
-"""On the radial mode force and released acceleration vanish together, up to rounding [m/s^2, N]."""
+"""Size below which force and released acceleration are rounding: on the radial mode both vanish
+together [N, m/s^2]."""
 AT_STOP = 1e-12
 """Depth that may be rounding: the speed then says whether the stop is touched [rad]."""
 NOWHERE: Pair = (math.nan, math.nan)
-"""Motors that have yet to be set; equal to none."""
+"""Placeholder for motor positions that have not been set; unequal to every position."""
 MAX_EVENTS = 10_000
-"""That one go may step over [-]."""
+"""Largest number of events that one integration may pass [-]."""
 MAX_STEPS = 100_000
-"""In one go: a leg takes a hundred a second, one that runs away any number [-]."""
+"""Largest number of steps of one integration [-]; a leg takes about a hundred a second, a diverging
+one any number."""
 MOTOR, FALL, UPPER, LOWER, TURNS, STOPS = 0, 2, 4, 5, 6, 7
 """Places of the parameters: two motor positions, height and rise of the falling centre of mass,
 two levels, whether turning counts (of a leg at rest the probe would turn all the time), and for
@@ -69,7 +72,7 @@ class Watched(IntEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Levels:
-    """At which values of the probe to stop [rad]; and whether where it turns."""
+    """Probe values at which an integration stops [rad], and whether turning stops it, too."""
 
     upper: float = NEVER
     lower: float = -NEVER
@@ -245,7 +248,9 @@ class Compiled:
 
 
 def _steady_point(model: LegModel, regime: Regime) -> tuple[Pair, float]:
-    """Where it lies along the angles, seen from the hip [m], and how fast it falls [m/s^2]."""
+    """First moments per mass of the point that moves steadily, seen from the hip [m], and its fall
+    [m/s^2].
+    """
     match regime:
         case Regime.FLIGHT:
             mass, first = model.floating.mass, model.floating.first

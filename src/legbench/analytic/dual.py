@@ -61,7 +61,7 @@ class Dual(float):
 
 
 def gradient(value: float) -> Floats:
-    """Of a number; zero, which fits every shape, of a plain one."""
+    """Gradient of a dual number; a plain float has gradient 0."""
     return value.gradient if isinstance(value, Dual) else np.zeros(1)
 
 

@@ -82,7 +82,7 @@ def pair_kinetic(ops: Ops, terms: PairTerms, q: Pair, v: Pair) -> Term:
 
 
 def pair_potential(ops: Ops, terms: PairTerms, q: Pair) -> Term:
-    """Of gravity; its gradient is `g(q)` of Appendix I [J]."""
+    """Potential energy of gravity [J]; its gradient is `g(q)` of Appendix I."""
     return -terms.moment[0] * ops.cos(q[0]) - terms.moment[1] * ops.cos(q[1])
 
 
@@ -119,7 +119,7 @@ def sweep_acceleration(ops: Ops, q: Pair, v: Pair, a: Pair, along: Pair) -> Pair
 
 
 def trunk_acceleration(ops: Ops, terms: FloatingTerms, q: Pair, v: Pair, a: Pair) -> Pair:
-    """Of the trunk while nothing touches the ground (forward, up) [m/s^2].
+    """Acceleration of the trunk while nothing touches the ground (forward, up) [m/s^2].
 
     Seen from the falling centre of mass the angles move as in eq. (1) without gravity; their
     accelerations `a` give the trunk by `m (a_t + g) + d^2/dt^2 sum_i first_i dir(q_i) = 0`.
@@ -138,7 +138,7 @@ def contact_force(ops: Ops, terms: FloatingTerms, q: Pair, v: Pair, a: Pair) -> 
 
 
 def free_foot_acceleration(ops: Ops, terms: FloatingTerms, q: Pair, v: Pair, a: Pair) -> Pair:
-    """Of the foot tip if nothing held it (forward, up) [m/s^2]; the angles accelerate by `a`."""
+    """Acceleration of a foot tip that nothing holds, angles accelerating by `a` [m/s^2]."""
     trunk = trunk_acceleration(ops, terms, q, v, a)
     inner = sweep_acceleration(ops, q, v, a, (terms.reach, terms.reach))
     return trunk[0] + inner[0], trunk[1] + inner[1]

@@ -210,7 +210,7 @@ def _hanging(model: LegModel, state: LegState, motor: Pair) -> _Leg:
 
 
 def _first_fall(event: Callable[[list[float]], float], solver: OdeSolver) -> float | None:
-    """When the event function first falls through zero in the solver's last step [s]."""
+    """Time at which the event function first falls through zero in the solver's last step [s]."""
     inside = solver.dense_output()
 
     def value(time: float) -> float:

@@ -1,4 +1,4 @@
-"""The same equations as matrices: batched arrays (..., n, n), for analysis and for checks.
+"""Equations of motion as matrices: batched arrays (..., n, n), for analysis and for checks.
 
 Joint arrays (..., 2) hold q1, q2; floating ones (..., 4) hold x_t, z_t, q1, q2.
 """
@@ -10,7 +10,7 @@ from legbench.errors import ConfigError
 from legbench.signals import Floats
 
 STRAIGHT = 1e-9
-"""Below this |sin(q1 - q2)| the leg is straight or folded and eq. (19) has no inverse [-]."""
+"""Smallest |sin(q1 - q2)| for which eq. (19) has an inverse: neither straight nor folded [-]."""
 
 
 def pair_mass(terms: PairTerms, joint_pos: Floats) -> Floats:

@@ -79,7 +79,7 @@ class LegModel:
         return damped(spring_torque(self.stiffness, motor, q), self.damping, v)
 
     def acceleration(self, terms: PairTerms, motor: Pair, q: Pair, v: Pair) -> Pair:
-        """Of q1 and q2 of one leg, turning as `terms` say, joint stops included [rad/s^2]."""
+        """Accelerations of q1 and q2 under the inertia `terms`, joint stops included [rad/s^2]."""
         beyond = [stop.depth(q) > 0.0 for stop in self.stops]
         if any(beyond):
             return self.pushed(terms, motor, q, v, beyond)[1]
@@ -93,15 +93,15 @@ class LegModel:
         return pushes(self.ops, terms, self.stops, beyond, q, v, a)
 
     def stance_acceleration(self, motor: Pair, q: Pair, v: Pair) -> Pair:
-        """Of q1 and q2 while the foot stands [rad/s^2]."""
+        """Accelerations of q1 and q2 while the foot stands [rad/s^2]."""
         return self.acceleration(self.stance, motor, q, v)
 
     def hanging_acceleration(self, motor: Pair, q: Pair, v: Pair) -> Pair:
-        """Of q1 and q2 while the trunk is held [rad/s^2]."""
+        """Accelerations of q1 and q2 while the trunk is held [rad/s^2]."""
         return self.acceleration(self.hanging, motor, q, v)
 
     def flight_acceleration(self, motor: Pair, q: Pair, v: Pair) -> tuple[Pair, Pair]:
-        """Of trunk [m/s^2] and of q1, q2 [rad/s^2] while nothing touches the ground."""
+        """Accelerations of trunk [m/s^2] and of q1, q2 [rad/s^2] in flight."""
         a = self.acceleration(self.falling, motor, q, v)
         return trunk_acceleration(self.ops, self.floating, q, v, a), a
 

@@ -1,4 +1,4 @@
-"""Where a leg is, what it touches, and what happened on the way."""
+"""State of a leg: posture, contact regime, and the transitions on the way."""
 
 import math
 from enum import StrEnum
@@ -45,7 +45,7 @@ class LegState(NamedTuple):
     trunk_vel: Pair
     """[m/s]"""
     since: float = -math.inf
-    """When the regime began; a start has always been in it [s]."""
+    """Time at which the regime began [s]; minus infinity for a start."""
 
 
 class Transition(NamedTuple):

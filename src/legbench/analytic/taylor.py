@@ -19,7 +19,7 @@ from legbench.errors import ConfigError, PlantFault
 __all__ = ["MAP_TOLERANCE", "SILENT", "Levels", "TaylorLeg", "Watched"]
 
 MAP_TOLERANCE = 1e-9
-"""For maps of many hops: a hop then errs by some 1e-8 and costs two thirds."""
+"""Tolerance for maps of many hops: a hop then errs by about 1e-8 and costs two thirds."""
 
 
 @final
@@ -51,7 +51,7 @@ class TaylorLeg:
 
     @property
     def varied(self) -> "TaylorLeg":
-        """The same leg on dual numbers: what it returns carries derivatives (see `variation`).
+        """This leg on dual numbers: what it returns carries derivatives (see `variation`).
 
         Given are the times and the state to start from, and levels; motors are plain numbers.
         """
@@ -101,7 +101,7 @@ class TaylorLeg:
     def _piece(
         self, state: LegState, until: float, motor: Pair, levels: Levels
     ) -> tuple[LegState, Watched | None]:
-        """As `watch`, but no further than a stop's next event."""
+        """Integrate as `watch` does, but no further than the next event of a joint stop."""
         leg = self._leg(state.regime)
         leg.load(state)
         leg.set(motor, levels)
@@ -124,7 +124,7 @@ class TaylorLeg:
         return self._compiled[kind]
 
     def order(self, regime: Regime) -> int:
-        """Of the Taylor series that the tolerance asks for."""
+        """Order of the Taylor series that the tolerance asks for."""
         return int(self._leg(regime).integrator.order)
 
     def fixed_steps(self, state: LegState, step: float, count: int, motor: Pair) -> LegState:

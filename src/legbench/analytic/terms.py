@@ -22,7 +22,7 @@ class Bars:
     density: float
     """Mass per length [kg/m]."""
     crank_length: float = 0.02
-    """Of hip crank and thigh extension [m]."""
+    """Length of hip crank and thigh extension [m]."""
 
     def __post_init__(self) -> None:
         if not self.density >= 0.0:
@@ -44,7 +44,7 @@ class PairTerms:
     coupling: float
     """[kg m^2]"""
     moment: tuple[float, float]
-    """Of gravity [N m]."""
+    """Moments of gravity about q1 and q2 at sin(q) = 1 [N m]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,7 +52,7 @@ class FloatingTerms:
     """The leg with a free trunk, `[x_t, z_t, q1, q2]` (section IV-A)."""
 
     mass: float
-    """Of the whole system [kg]."""
+    """Mass of the whole system [kg]."""
     first: tuple[float, float]
     """`sum m along_i`: first moments about the hip [kg m]."""
     inertia: tuple[float, float]

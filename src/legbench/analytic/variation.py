@@ -62,5 +62,5 @@ class Variation:
 
 
 def _gradients(values: list[float]) -> Floats:
-    """Of several numbers (n, m)."""
+    """Gradients of several numbers, one a row (n, m)."""
     return np.stack(np.broadcast_arrays(*(gradient(value) for value in values)))

@@ -38,7 +38,7 @@ class CheckArguments:
     legs: int = 1000
     """How many are made."""
     seed: int = 0
-    """Of the scatter."""
+    """Seed of the scatter."""
     json: bool = False
     """Print one JSON object on stdout."""
 

@@ -34,7 +34,7 @@ class DesignArguments:
     mass: float | None = None
     """Body mass of the quadruped [kg]."""
     seed: int = 0
-    """Of the search."""
+    """Seed of the search."""
     restarts: int = 0
     """Further searches with doubled populations; the best counts."""
     evaluations: int | None = None

@@ -6,9 +6,9 @@ from pathlib import Path
 from legbench.cli.drives_reading import Bench
 from legbench.cli.output import note, print_json
 from legbench.cli.waived import tell_waived
-from legbench.drives.config import NodeConfig
-from legbench.drives.realtime import Granted
-from legbench.drives.session import Session
+from legbench.drives.master.session import Session
+from legbench.drives.setup.config import NodeConfig
+from legbench.drives.transport.realtime import Granted
 from legbench.errors import ConfigError
 from legbench.plants import LIMITS_NAME, limits_for
 

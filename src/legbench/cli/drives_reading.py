@@ -7,9 +7,9 @@ from pathlib import Path
 from legbench.cli.output import note, print_json
 from legbench.cli.waived import tell_waived
 from legbench.design import LegDesign, load_design
-from legbench.drives.bus_file import load_bus
-from legbench.drives.config import BusConfig
-from legbench.drives.session import Session
+from legbench.drives.master.session import Session
+from legbench.drives.setup.bus_file import load_bus
+from legbench.drives.setup.config import BusConfig
 from legbench.errors import ConfigError
 from legbench.plant.can_choice import CanChoice
 from legbench.plant.can_open import open_session
@@ -26,7 +26,7 @@ class Bench:
     channel: str | None = None
     """Such as can0; else the bus file's."""
     bitrate: int | None = None
-    """Of interfaces that set their own; else the bus file's [bit/s]."""
+    """Bitrate of interfaces that set their own; else the bus file's [bit/s]."""
     design: Path = Path("models/optimal.toml")
     """Design file: springs, and the limits that no limits file may exceed."""
     limits: Path | None = None
@@ -36,7 +36,7 @@ class Bench:
 
     @property
     def choice(self) -> CanChoice:
-        """The same for plants."""
+        """Plant choice that these flags make."""
         return CanChoice(
             bus=self.bus, interface=self.interface, channel=self.channel, bitrate=self.bitrate
         )
@@ -67,7 +67,7 @@ class Scan:
     def run(self, bench: Bench) -> int:
         """Print every node; 1 if a node of the bus file is not there."""
         from legbench.commissioning.scan import scan
-        from legbench.drives.codec.frame import LAST_NODE
+        from legbench.drives.protocol.frame import LAST_NODE
 
         if not 1 <= self.last <= LAST_NODE:
             raise ConfigError(f"last is {self.last}; node ids are 1 to {LAST_NODE}")
@@ -126,9 +126,9 @@ class Budget:
 
     def run(self, bench: Bench) -> int:
         """Print every frame; raises ConfigError above 80 %, or where the files do not fit."""
-        from legbench.drives.checks import check_together
-        from legbench.drives.master_watch import means_of
-        from legbench.drives.wire import MAX_LOAD, bus_load, check_load, schedule
+        from legbench.drives.setup.checks import check_together
+        from legbench.drives.setup.master_watch import means_of
+        from legbench.drives.setup.wire import MAX_LOAD, bus_load, check_load, schedule
         from legbench.plants import LIMITS_NAME, joint_ranges, limits_for
 
         config = bench.config().at(bench.bitrate)

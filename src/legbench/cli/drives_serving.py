@@ -42,10 +42,10 @@ class Emulate:
         """Serve until ^C or SIGTERM, printing every change of a drive's state."""
         from legbench.commissioning.emulate import Server, serve
         from legbench.control import JumpConfig
-        from legbench.drives.bus_server import BusServer
+        from legbench.drives.emulated.bus_server import BusServer
         from legbench.drives.emulated.network import Network, stiff_body
-        from legbench.drives.slcan_server import SlcanServer
-        from legbench.drives.unix_server import UnixServer
+        from legbench.drives.emulated.slcan_server import SlcanServer
+        from legbench.drives.emulated.unix_server import UnixServer
         from legbench.experiment import Experiment, start_of
         from legbench.interrupts import stop_on_interrupt
         from legbench.plant.can_open import open_session
@@ -116,7 +116,7 @@ class Monitor:
     seconds: float = math.inf
     """End after so long [s]."""
     every: float = 0.2
-    """Between two looks [s]."""
+    """Time between two looks [s]."""
 
     def run(self, bench: Bench) -> int:
         """Print a line a drive, in place on a terminal, until ^C."""

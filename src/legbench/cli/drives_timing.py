@@ -15,7 +15,7 @@ from legbench.errors import ConfigError
 
 if TYPE_CHECKING:
     from legbench.commissioning.jitter import Timing
-    from legbench.drives.session import Session
+    from legbench.drives.master.session import Session
     from legbench.recording.writer import RunWriter
 
 WITH, WITHOUT = "with", "without"
@@ -90,7 +90,7 @@ class Jitter:
                 note(f"wrote {writer.path}")
 
     def _draw(self, timing: "Timing", path: Path) -> None:
-        from legbench.viz.timing import draw_timing
+        from legbench.viz.print.timing import draw_timing
 
         draw_timing(timing.late_us, timing.exchange_us, path)
         note(f"wrote {path}")

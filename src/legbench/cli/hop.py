@@ -34,7 +34,7 @@ WHY = {
 MATCHED = 1e-5
 """Polar set point of the motors that is smaller than a count of most encoders [rad]."""
 DROPS = (0.02, 0.05, 0.1)
-"""From which leg and template are compared [m]."""
+"""Heights of fall at which leg and template are compared [m]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -29,7 +29,7 @@ class ModesArguments:
     z2: float = 0.9
     """Set point at which the link rests, orthonormal [rad]."""
     energy: float = 0.2
-    """Above rest, up to which the modes are followed [J]."""
+    """Energy above rest up to which the modes are followed [J]."""
     at: float | None = None
     """Show the orbits of just this energy instead of the last ones [J]."""
     reach: float = 0.3

@@ -1,4 +1,4 @@
-"""From dataclasses to flags: one way for every command."""
+"""Flags made from dataclasses, one way for every command."""
 
 from typing import TypeVar
 

@@ -40,7 +40,7 @@ class Part(StrEnum):
 
     @property
     def size(self) -> float:
-        """Of its step [rad] or drift [rad/s]; 0 if it has none."""
+        """Size of its step [rad] or rate of its drift [rad/s]; 0 if it has neither."""
         if self in (Part.MOTOR_STEP, Part.LINK_STEP):
             return STEP
         return DRIFT if self.drifts else 0.0

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from legbench.drives.objects import name_of
-from legbench.drives.session import Session
+from legbench.drives.master.session import Session
+from legbench.drives.protocol.objects import name_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

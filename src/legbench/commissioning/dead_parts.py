@@ -12,24 +12,23 @@ from legbench.commissioning.broken_plant import BrokenPlant, Part
 from legbench.control import AbstractController, BangBangConfig, JumpConfig, PositionJumpConfig
 from legbench.design import LegDesign
 from legbench.design.setup import Setup
-from legbench.drives.bus import LockstepBus
-from legbench.drives.bus_file import load_bus
-from legbench.drives.config import BusConfig
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.emulated.faults import NodeFault, NodeFaultKind
 from legbench.drives.emulated.network import Network
-from legbench.drives.limits import SafetyLimits
-from legbench.drives.session import Session
+from legbench.drives.master.session import Session
+from legbench.drives.setup.bus_file import load_bus
+from legbench.drives.setup.config import BusConfig
 from legbench.errors import PlantFault
 from legbench.experiment import (
-    USUAL_SETUP,
-    ControllerConfig,
+    ControllerSettings,
     Experiment,
     make_controller,
     start_of,
     targets_of,
 )
+from legbench.limits.safety import SafetyLimits
 from legbench.plant.abstract import AbstractPlant
 from legbench.plant.analytic import AnalyticPlant
 from legbench.plant.can import CanPlant
@@ -45,7 +44,7 @@ BOUND, DRIFT_BOUND = 0.05, 0.15
 """Longest times from the contradiction to the end of the run, and for a drift [s]."""
 PATIENCE = 1.5
 """A part that is not found so long after it died is missed [s]."""
-CONTROLLERS: dict[str, ControllerConfig] = {
+CONTROLLERS: dict[str, ControllerSettings] = {
     "jump": JumpConfig(),
     "bang-bang": BangBangConfig(),
     "position-jump": PositionJumpConfig(),
@@ -65,7 +64,7 @@ class Emulation(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bench:
-    """Where trials are made."""
+    """Emulated bench on which trials are made."""
 
     design: LegDesign
     bus_file: Path
@@ -94,11 +93,11 @@ class Found:
     cause: str | None
     """Why the run ended; None if nothing ended it."""
     time: float | None
-    """From the contradiction to the end of the run, 0 if the end came before; None if nothing
+    """Time from the contradiction to the end of the run, 0 if the end came before; None if nothing
     ended it [s]. Steps and drifts contradict a healthy leg from the moment on in which they
     begin, other parts once they differ from healthy ones by `EXCITATION`."""
     since_death: float | None
-    """From the moment on in which the part died [s]."""
+    """Time since the part died [s]."""
     excited: bool
     """Whether there ever was a contradiction."""
 
@@ -171,7 +170,7 @@ def _staged(
 ) -> Iterator[_Stage]:
     config = CONTROLLERS[controller]
     chosen = Experiment(
-        design=bench.design, controller=config, setup=Setup(kind=USUAL_SETUP[type(config)])
+        design=bench.design, controller=config, setup=Setup(kind=config.usual_setup)
     )
     stage = (_on_bus if emulation is Emulation.CAN else _alone)(
         bench, emulation, chosen, servo, death

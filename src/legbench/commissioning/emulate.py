@@ -3,19 +3,19 @@
 import time
 from collections.abc import Callable
 
-from legbench.drives.bus_server import BusServer
-from legbench.drives.cia402 import DriveState
-from legbench.drives.config import BusConfig
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.bus_server import BusServer
 from legbench.drives.emulated.network import Body, Network, stiff_body
-from legbench.drives.realtime import PRIORITY, ask
-from legbench.drives.slcan_server import SlcanServer
-from legbench.drives.unix_server import UnixServer
+from legbench.drives.emulated.slcan_server import SlcanServer
+from legbench.drives.emulated.unix_server import UnixServer
+from legbench.drives.protocol.cia402 import DriveState
+from legbench.drives.setup.config import BusConfig
+from legbench.drives.transport.realtime import PRIORITY, ask
 from legbench.onlooker import Onlooker
 
 Server = UnixServer | SlcanServer | BusServer
-"""Where the drives are reached."""
+"""Server through which the drives are reached."""
 Report = Callable[[float, str, str], None]
 """Called with time since the start [s], node and its new state."""
 

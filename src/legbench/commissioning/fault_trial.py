@@ -10,10 +10,7 @@ from typing import Protocol
 
 from legbench.control import JumpConfig
 from legbench.design import LegDesign
-from legbench.drives.bus import LockstepBus
-from legbench.drives.bus_file import load_bus, load_limits
-from legbench.drives.cia402 import DriveState
-from legbench.drives.config import BusConfig
+from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.emulated.faults import (
     FOREVER_NS,
     Babble,
@@ -25,10 +22,13 @@ from legbench.drives.emulated.faults import (
 )
 from legbench.drives.emulated.network import Network
 from legbench.drives.errors import DriveError
-from legbench.drives.limits import SafetyLimits
+from legbench.drives.protocol.cia402 import DriveState
+from legbench.drives.setup.bus_file import load_bus, load_limits
+from legbench.drives.setup.config import BusConfig
 from legbench.errors import ConfigError
 from legbench.experiment import Experiment, make_controller, start_of, targets_of
 from legbench.interrupts import StopFlag
+from legbench.limits.safety import SafetyLimits
 from legbench.loop import Outcome, run
 from legbench.plant.can import CanPlant
 from legbench.plant.landing import End
@@ -37,9 +37,9 @@ from legbench.recording.reader import load
 from legbench.recording.writer import RunWriter
 
 CYCLES = 900
-"""Of a trial that nothing ends."""
+"""Number of cycles of a trial that nothing ends."""
 STRIKE_NS = 1_000_000_000
-"""When a fault comes, on the bus's time: half a second into the run, in a jump."""
+"""Time at which a fault strikes, on the bus's clock: half a second into the run, in a jump [ns]."""
 BRIEF_NS = 2_000_000
 """A disturbance that the link has to bridge."""
 SILENCE_NS = 200_000_000
@@ -59,7 +59,7 @@ class Trial:
     name: str
     faults: tuple[Fault, ...] = ()
     cause: str | None = None
-    """That has to end the run; none: the run has to bridge it."""
+    """Cause that has to end the run; none: the run has to bridge the fault."""
     gone: bool = False
     """The master itself stops without a word, as by SIGKILL or SIGSTOP."""
     interrupted: bool = False
@@ -73,7 +73,7 @@ class View(Protocol):
 
     @property
     def pid(self) -> int:
-        """Of the process."""
+        """Process id of the view."""
         ...
 
     def stop(self) -> None:
@@ -93,9 +93,9 @@ class Result:
     status: str
     cause: str | None
     cycles: int | None
-    """From the fault to the reaction; none if the run bridged it."""
+    """Number of cycles from the fault to the reaction; none if the run bridged it."""
     drives: tuple[DriveState, ...]
-    """In the end, as they are and not as the master believes."""
+    """States of the drives in the end, as they are and not as the master believes."""
     excess: float
     """Largest command beyond a limit, in range or in step, below zero [rad]."""
     intact: bool
@@ -270,7 +270,7 @@ def try_fault(
         cause=outcome.cause,
         cycles=(reaction_ns - strike_ns) // MS + 1 if ended else None,
         drives=tuple(drive.axis.power.state for drive in network.drives),
-        excess=_excess(writer.path / BUS_LOG, config, limits),
+        excess=excess_of(writer.path / BUS_LOG, config, limits),
         intact=intact and found.manifest["cause"] == outcome.cause,
         lost_cycles=max(opened.events()["bus"]["lost_cycles"]),
         run=writer.path,
@@ -323,8 +323,8 @@ def _wait_for_drives(network: Network) -> int:
     return network.now_ns
 
 
-def _excess(log: Path, config: BusConfig, limits: SafetyLimits) -> float:
-    """From the raw frames: how far a command to an enabled drive went beyond the limits [rad]."""
+def excess_of(log: Path, config: BusConfig, limits: SafetyLimits) -> float:
+    """Largest excess of a command to an enabled drive over the limits, from raw frames [rad]."""
     worst = -1.0
     step_max = limits.command_speed * config.period
     lines = log.read_text(encoding="ascii").split()

@@ -7,7 +7,13 @@ when this master falls silent; it is always led out by quick stop.
 from dataclasses import dataclass
 from typing import final
 
-from legbench.drives.cia402 import (
+from legbench.drives.errors import DriveError
+from legbench.drives.master.bring_up import BringUp
+from legbench.drives.master.sdo_port import SdoPort
+from legbench.drives.master.sdo_stop import SdoStop, leave_operational
+from legbench.drives.master.session import Session
+from legbench.drives.master.stop_report import Lead
+from legbench.drives.protocol.cia402 import (
     DriveState,
     Goal,
     Mode,
@@ -17,17 +23,11 @@ from legbench.drives.cia402 import (
     describe_statusword,
     next_controlword,
 )
-from legbench.drives.codec.datatypes import DataType
-from legbench.drives.codec.nmt import NmtCommand, NmtState, heartbeat_frame, nmt_frame
-from legbench.drives.config import NodeConfig
-from legbench.drives.errors import DriveError
-from legbench.drives.master.bring_up import BringUp
-from legbench.drives.master.sdo_port import SdoPort
-from legbench.drives.master.sdo_stop import SdoStop, leave_operational
-from legbench.drives.master.stop_report import Lead
-from legbench.drives.master_watch import check_master_watch
-from legbench.drives.objects import name_of
-from legbench.drives.session import Session
+from legbench.drives.protocol.datatypes import DataType
+from legbench.drives.protocol.nmt import NmtCommand, NmtState, heartbeat_frame, nmt_frame
+from legbench.drives.protocol.objects import name_of
+from legbench.drives.setup.config import NodeConfig
+from legbench.drives.setup.master_watch import check_master_watch
 from legbench.errors import ConfigError
 from legbench.interrupts import shielded
 
@@ -44,7 +44,7 @@ LONGEST = 600.0
 PATIENCE = 200
 """Looks at a drive for one step."""
 LOOK_NS = 5_000_000
-"""Between two looks, or less, so that every one can bring a heartbeat in time [ns]."""
+"""Longest time between two looks, so that each can bring a heartbeat in time [ns]."""
 U16, U32, I8, I32 = (
     DataType.UNSIGNED16,
     DataType.UNSIGNED32,
@@ -154,7 +154,7 @@ class _Master(Lead):
         self._rest_ns = min(LOOK_NS, 1_000_000 * session.config.master_heartbeat_ms // 2)
 
     def start(self) -> None:
-        """From the first heartbeat on the drive's watchdog runs (1016h)."""
+        """Start the node; from this first heartbeat on the drive's watchdog runs (1016h)."""
         self._begun = True
         self._port.send_frame(self._beat)
         self._port.send_frame(nmt_frame(NmtCommand.START, self._node.node_id))
@@ -169,7 +169,7 @@ class _Master(Lead):
         raise DriveError(f"drive '{self._node.name}' does not enter homing mode (6061h)")
 
     def enable(self) -> None:
-        """Up the ladder, a rung a look."""
+        """Advance the power state by one transition per observed statusword."""
         word = 0
         for _ in range(PATIENCE):
             word = self._look()
@@ -187,7 +187,7 @@ class _Master(Lead):
         )
 
     def await_end(self, timeout: float) -> None:
-        """Until the drive says attained; raises DriveError if it fails or takes too long."""
+        """Wait until the drive says attained; raises DriveError if it fails or takes too long."""
         name, until_ns = self._node.name, self._timebase.now_ns() + round(1e9 * timeout)
         while self._timebase.now_ns() < until_ns:
             word = self._look()

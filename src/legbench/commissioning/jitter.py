@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from legbench.drives.errors import DriveError
-from legbench.drives.limits import SafetyLimits
-from legbench.drives.link import Link, Sample
-from legbench.drives.session import Session
+from legbench.drives.master.link import Link, Sample
+from legbench.drives.master.session import Session
+from legbench.limits.safety import SafetyLimits
 from legbench.recording.writer import RunWriter
 from legbench.signals import Command, Floats, Observation
 
@@ -24,9 +24,9 @@ class Timing:
     """What a measurement found; arrays have one value a cycle."""
 
     late_us: Floats
-    """SYNC after its place on the grid."""
+    """Lateness of SYNC after its place on the grid."""
     exchange_us: Floats
-    """From SYNC to the last process data."""
+    """Time from SYNC to the last process data."""
     skipped: int
     """Ticks that this computer missed."""
     silent: int

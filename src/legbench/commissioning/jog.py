@@ -5,16 +5,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from legbench.commissioning.status import read_counts
-from legbench.drives.checks import check_together
-from legbench.drives.knee import knee_of
-from legbench.drives.limits import START_TOLERANCE, SafetyLimits
-from legbench.drives.session import Session
+from legbench.drives.master.session import Session
+from legbench.drives.setup.checks import check_together
 from legbench.errors import ConfigError
+from legbench.limits.knee import knee_of
+from legbench.limits.safety import START_TOLERANCE, SafetyLimits
 
 FARTHEST = 0.3
-"""A jog goes no farther [rad]."""
+"""Longest jog [rad]."""
 FASTEST = 1.0
-"""And no faster [rad/s]."""
+"""Highest jog speed [rad/s]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,7 +29,7 @@ class Jogged:
     link_pos: tuple[float, ...]
     """Links at the far end [rad]."""
     spring_torque: tuple[float, ...]
-    """At the far end [N m]."""
+    """Torque of the series springs at the far end [N m]."""
 
 
 def jog(

@@ -5,13 +5,13 @@ from typing import final
 
 import can
 
-from legbench.drives.cia402 import describe_statusword
-from legbench.drives.codec.emcy import decode_emcy
-from legbench.drives.codec.frame import EMCY_BASE, HEARTBEAT_BASE, LAST_NODE
-from legbench.drives.codec.nmt import decode_heartbeat
-from legbench.drives.config import NodeConfig
 from legbench.drives.master.axis_link import AxisLink
-from legbench.drives.session import Session
+from legbench.drives.master.session import Session
+from legbench.drives.protocol.cia402 import describe_statusword
+from legbench.drives.protocol.emcy import decode_emcy
+from legbench.drives.protocol.frame import EMCY_BASE, HEARTBEAT_BASE, LAST_NODE
+from legbench.drives.protocol.nmt import decode_heartbeat
+from legbench.drives.setup.config import NodeConfig
 
 
 @final

@@ -3,16 +3,16 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from legbench.drives.codec.datatypes import DataType
-from legbench.drives.codec.frame import LAST_NODE
-from legbench.drives.config import BusConfig
 from legbench.drives.errors import DriveError, NoAnswerError
 from legbench.drives.master.first_contact import first_contact
 from legbench.drives.master.sdo_port import SdoPort
-from legbench.drives.session import Session
+from legbench.drives.master.session import Session
+from legbench.drives.protocol.datatypes import DataType
+from legbench.drives.protocol.frame import LAST_NODE
+from legbench.drives.setup.config import BusConfig
 
 PROBE_MS = 15
-"""For a node that may not be there, twice; a drive that has booted answers within 5 ms."""
+"""Patience with a node that may not be there, asked twice; a booted drive answers within 5 ms."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -2,13 +2,13 @@
 
 from dataclasses import dataclass
 
-from legbench.drives.cia402 import Mode, describe_statusword
-from legbench.drives.codec.datatypes import DataType
-from legbench.drives.codec.emcy import MEANINGS
-from legbench.drives.config import NodeConfig
 from legbench.drives.master.sdo_port import SdoPort
-from legbench.drives.session import Session
-from legbench.drives.units import unwrap
+from legbench.drives.master.session import Session
+from legbench.drives.protocol.cia402 import Mode, describe_statusword
+from legbench.drives.protocol.datatypes import DataType
+from legbench.drives.protocol.emcy import MEANINGS
+from legbench.drives.setup.config import NodeConfig
+from legbench.drives.setup.units import unwrap
 
 MODES = {mode.value: mode.name.lower().replace("_", " ") for mode in Mode}
 

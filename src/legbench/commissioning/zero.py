@@ -7,15 +7,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from legbench.commissioning.status import read_counts
-from legbench.drives.config import NodeConfig
 from legbench.drives.errors import DriveError
-from legbench.drives.session import Session
-from legbench.drives.units import AxisUnits, wrap
+from legbench.drives.master.session import Session
+from legbench.drives.setup.config import NodeConfig
+from legbench.drives.setup.units import AxisUnits, wrap
 from legbench.errors import ConfigError, RecordingError
 from legbench.recording.files import write_whole
 
 READS = 5
-"""Of every encoder; they have to agree."""
+"""Number of reads of every encoder, which have to agree."""
 STILL_COUNTS = 40
 """Largest spread of these reads."""
 _SECTION = re.compile(r"^\s*\[+\s*([\w.]+)\s*\]+")

@@ -18,16 +18,16 @@ RATED_PERIODS = 20
 
 
 class BangBangPhase(IntEnum):
-    """Where bang-bang holds the equilibrium, as recorded."""
+    """Levels of bang-bang, as recorded."""
 
     REST = 0
-    """At z2, before the first switch."""
+    """Equilibrium at z2, before the first switch."""
     MIDDLE = 2
-    """At z2, between the thresholds of three levels."""
+    """Equilibrium at z2, between the thresholds of three levels."""
     FOLDED = 3
-    """At z2 + dz2 (shorter leg)."""
+    """Equilibrium at z2 + dz2 (shorter leg)."""
     STRETCHED = 4
-    """At z2 - dz2 (longer leg)."""
+    """Equilibrium at z2 - dz2 (longer leg)."""
 
 
 PHASES = (
@@ -117,7 +117,7 @@ class BangBang(AbstractController):
 
     @property
     def start_motor_pos(self) -> Floats:
-        """At z2."""
+        """Motor positions for the set point z2 [rad]."""
         return self._middle
 
     def reset(self, observation: Observation) -> None:

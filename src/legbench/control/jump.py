@@ -79,7 +79,7 @@ class Jump(AbstractController):
 
     @property
     def start_motor_pos(self) -> Floats:
-        """At z2 + dz2, standing."""
+        """Motor positions of the leg that stands at z2 + dz2 [rad]."""
         return self._folded
 
     def reset(self, observation: Observation) -> None:

@@ -20,14 +20,14 @@ class PositionJumpPhase(IntEnum):
     """Whether the equilibrium has been moved, as recorded."""
 
     REST = 0
-    """At z2 + dz2."""
+    """Equilibrium at z2 + dz2."""
     STEPPED = 1
-    """At z2."""
+    """Equilibrium at z2."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PositionJumpConfig:
-    """From z2 + dz2 to z2."""
+    """Step of the equilibrium from z2 + dz2 to z2."""
 
     kind: ClassVar[str] = "position-jump"
     usual_setup: ClassVar[SetupKind] = SetupKind.FFS
@@ -81,7 +81,7 @@ class PositionJump(AbstractController):
 
     @property
     def start_motor_pos(self) -> Floats:
-        """At z2 + dz2."""
+        """Equilibrium at z2 + dz2."""
         return self._before
 
     def reset(self, observation: Observation) -> None:

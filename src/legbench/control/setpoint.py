@@ -1,4 +1,4 @@
-"""From a radial set point z2 to motor positions, within what the leg can do."""
+"""Motor positions for a radial set point z2, within what the leg can do."""
 
 import math
 from collections.abc import Iterator, Sequence

@@ -18,7 +18,7 @@ class ControllerSettings(Protocol):
     kind: ClassVar[str]
     """Name in files and on the command line."""
     usual_setup: ClassVar[SetupKind]
-    """Where the controller is at home."""
+    """Setup in which the controller is usually run."""
 
     def build(self, targets: LegTargets) -> AbstractController:
         """The controller for the legs of `targets`; raises ConfigError if they refuse it."""

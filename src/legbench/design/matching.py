@@ -36,7 +36,7 @@ class Inertial:
     length: Floats
     """(..., 3) [m]"""
     com: Floats
-    """From the proximal joint (..., 3) [m]."""
+    """Distance of each centre of mass from the proximal joint (..., 3) [m]."""
     inertia: Floats
     """About the centre of mass (..., 3) [kg m^2]."""
 

@@ -20,7 +20,7 @@ class Mend:
     """A change of one parameter after which a condition is met exactly."""
 
     parameter: str
-    """As in a design file, e.g. `thigh.inertia`, with the paper's symbol."""
+    """Key of the design file, such as `thigh.inertia`, with the paper's symbol."""
     unit: str
     value: float
     """What the parameter is."""
@@ -108,7 +108,7 @@ def _parameters(design: LegDesign) -> list[tuple[str, str, float, Changed]]:
 
 
 def _root(changed: Changed, value: float, index: int, half_angle: float) -> float | None:
-    """Where the condition's residual vanishes, nearest to `value`; none where it never does.
+    """Parameter value nearest to `value` at which the residual vanishes; none where it never does.
 
     Every residual is a polynomial of degree two or less in each parameter, so three values
     determine it; one step of Newton's method removes what rounding left.

@@ -35,7 +35,7 @@ LEG_KEYS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Range:
-    """Where a decision variable may lie, and where the search starts.
+    """Bounds of a decision variable, and the value at which the search starts.
 
     Raises:
         DesignError: an empty range, a start outside it, or a number that is none.
@@ -110,7 +110,7 @@ class Bounds:
 
     @property
     def start(self) -> Floats:
-        """Where the search starts, in the order of `VARIABLES` (7,) [-]."""
+        """Start of the search, in the order of `VARIABLES` (7,) [-]."""
         return np.array([getattr(self, name).start for name in VARIABLES])
 
 
@@ -127,9 +127,9 @@ class Weights:
     """
 
     mass_share: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    """On the squares of `m_i / m_leg - l_i / (l1 + l2 + l3)`."""
+    """Weights of the squares of `m_i / m_leg - l_i / (l1 + l2 + l3)`."""
     thigh_inertia: float = 0.5
-    """On the square of `I1 / (m1 l1^2) - 1/12`."""
+    """Weight of the square of `I1 / (m1 l1^2) - 1/12`."""
 
     def __post_init__(self) -> None:
         weights = (*self.mass_share, self.thigh_inertia)
@@ -159,7 +159,7 @@ class Requirements:
     leg_stiffness: float = 905.0
     """Radial stiffness at the relaxed length, k_leg [N/m]."""
     damping: float = 0.0073
-    """Of both joints, d1 = d2 [N m s/rad]; as little as can be had: the prototype's lower one."""
+    """Damping of both joints, d1 = d2 [N m s/rad]; the lower one of the prototype's."""
     bounds: Bounds = field(default_factory=Bounds)
     weights: Weights = field(default_factory=Weights)
     limits: Limits = field(default_factory=Limits)

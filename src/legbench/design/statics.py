@@ -7,7 +7,7 @@ import numpy as np
 
 from legbench.design.leg import LegDesign
 from legbench.errors import DesignError
-from legbench.signals import Floats
+from legbench.signals import Bools, Floats
 
 GRAVITY = 9.81
 """[m/s^2]"""
@@ -63,11 +63,44 @@ def motor_holding(design: LegDesign, joint_pos: Floats, support: Support) -> Flo
     return joint_pos + load / np.asarray(design.stiffness)
 
 
+def balance(
+    stiffness: Floats, moment: Floats, motor_pos: Floats, joint_pos: Floats, steps: int = 20
+) -> Floats:
+    """Link angles (..., 2) [rad] at which springs and gravity balance, by Newton's method.
+
+    The joints decouple in statics, so each is solved alone; all arrays broadcast. Whether the
+    result is an equilibrium, and a stable one, `is_stable` tells.
+
+    Args:
+        stiffness: of the springs (..., 2) [N m/rad].
+        moment: of gravity, as in `GravityLoad` (..., 2) [N m].
+        motor_pos: motor positions (..., 2) [rad].
+        joint_pos: link angles to start from (..., 2) [rad].
+        steps: largest number of Newton steps.
+    """
+    for _ in range(steps):
+        residual = stiffness * (motor_pos - joint_pos) - moment * np.sin(joint_pos)
+        slope = stiffness + moment * np.cos(joint_pos)
+        last = joint_pos
+        joint_pos = joint_pos + residual / np.where(np.abs(slope) < 1e-9, 1e-9, slope)
+        if (joint_pos == last).all():
+            # Every further step would give the same numbers.
+            break
+    return joint_pos
+
+
+def is_stable(stiffness: Floats, moment: Floats, motor_pos: Floats, joint_pos: Floats) -> Bools:
+    """Whether each joint (..., 2) is balanced to 1e-9 N m, and returns when it is pushed."""
+    residual = stiffness * (motor_pos - joint_pos) - moment * np.sin(joint_pos)
+    slope = stiffness + moment * np.cos(joint_pos)
+    return (np.abs(residual) < 1e-9) & (slope > 0.0)
+
+
 def equilibrium(design: LegDesign, motor_pos: Floats, support: Support) -> Floats:
     """Link posture at which gravity balances the springs for `motor_pos` (..., 2) [rad].
 
-    The joints decouple in statics, so Newton's method runs on each alone. It starts at the motor
-    position and follows the branch that continues into it when gravity is turned up from zero.
+    Newton's method starts at the motor position and follows the branch that continues into it when
+    gravity is turned up from zero.
 
     Raises:
         DesignError: the springs are too soft to hold the leg at that motor position.
@@ -76,18 +109,8 @@ def equilibrium(design: LegDesign, motor_pos: Floats, support: Support) -> Float
     moment = np.asarray(gravity_load(design, support).moment)
     joint_pos = np.array(motor_pos, dtype=np.float64)
     for share in np.linspace(0.1, 1.0, 10):
-        pull = share * moment
-        for _ in range(20):
-            residual = stiffness * (motor_pos - joint_pos) - pull * np.sin(joint_pos)
-            slope = stiffness + pull * np.cos(joint_pos)
-            last = joint_pos
-            joint_pos = joint_pos + residual / np.where(np.abs(slope) < 1e-9, 1e-9, slope)
-            if (joint_pos == last).all():
-                # Every further step would give the same numbers.
-                break
-    residual = stiffness * (motor_pos - joint_pos) - moment * np.sin(joint_pos)
-    slope = stiffness + moment * np.cos(joint_pos)
-    if not (np.all(np.abs(residual) < 1e-9) and np.all(slope > 0.0)):
+        joint_pos = balance(stiffness, share * moment, motor_pos, joint_pos)
+    if not np.all(is_stable(stiffness, moment, motor_pos, joint_pos)):
         raise DesignError(
             f"no stable equilibrium for motor positions {np.round(motor_pos, 3)} rad: stiffness "
             f"{design.stiffness} N m/rad does not carry the leg on its {support.value}"

@@ -35,3 +35,7 @@ class SdoAbortError(DriveError):
     def __init__(self, code: int, index: int, sub: int, meaning: str) -> None:
         super().__init__(f"object {index:04X}h:{sub:02X}: {meaning} (abort {code:08X}h)")
         self.code, self.index, self.sub = code, index, sub
+        self._meaning = meaning
+
+    def __reduce__(self) -> tuple[type["SdoAbortError"], tuple[int, int, int, str]]:
+        return type(self), (self.code, self.index, self.sub, self._meaning)

@@ -1,4 +1,4 @@
-"""From the tables of a file to dataclasses: strict, and every mistake is told at once."""
+"""Strict reading of the tables of a file into dataclasses; every mistake is told at once."""
 
 import difflib
 from collections.abc import Callable, Iterable, Mapping

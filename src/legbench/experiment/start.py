@@ -1,4 +1,4 @@
-"""Where an experiment begins: set points of its leg, and its first posture."""
+"""Start of an experiment: set points of its leg, and its first posture."""
 
 from legbench.control import LegTargets, make_controller
 from legbench.experiment.data import Experiment

@@ -8,11 +8,11 @@ from typing import Any, Final, TypeVar
 from legbench.control import CONTROLLERS
 from legbench.design import LegDesign, load_design
 from legbench.design.toml import UNITS, design_from_mapping, design_to_mapping
-from legbench.drives.limits import SafetyLimits
 from legbench.errors import ConfigError
 from legbench.experiment.reading import Reader, Special, placed
 from legbench.experiment.writing import Writer
 from legbench.guests import load_text
+from legbench.limits.safety import SafetyLimits
 
 Read = TypeVar("Read")
 FORMAT: Final = 1
@@ -33,7 +33,7 @@ _DESIGN: Final = {
 
 
 def _load_limits(path: Path) -> SafetyLimits:
-    return load_text("legbench.drives.bus_file:load_limits")(path)
+    return load_text("legbench.drives.setup.bus_file:load_limits")(path)
 
 
 SPECIALS: Final = {

@@ -1,4 +1,4 @@
-"""From dataclasses to the tables of a file."""
+"""Writing of dataclasses as the tables of a file."""
 
 import os
 from collections.abc import Callable, Mapping

@@ -1,4 +1,4 @@
-"""Where the energy of each jump comes from and goes to: what bounds the hop."""
+"""Energy budget of each jump, which bounds the hop."""
 
 from dataclasses import dataclass
 
@@ -34,7 +34,7 @@ class EnergyBudget:
 
 
 def energy_budget(recording: Recorded, gait: Gait, flows: Flows) -> EnergyBudget:
-    """Where the energy of each complete jump comes from and goes to (m,) [J]."""
+    """Work and losses of each complete jump (m,) [J]."""
     if len(gait.jumps) == 0:
         return EnergyBudget(**{name: np.zeros(0) for name in EnergyBudget.__dataclass_fields__})
     impact, stance = _stance_intervals(recording.time, gait)

@@ -1,4 +1,4 @@
-"""Where a pair of columns changes from row to row."""
+"""Rows at which a pair of columns changes."""
 
 from legbench.signals import Bools, Floats
 

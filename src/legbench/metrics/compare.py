@@ -26,11 +26,11 @@ class Differences:
     """Another run minus a run, row by row, over the time that both have."""
 
     time: Floats
-    """Of the rows of the longer period (n,) [s]."""
+    """Time of the rows of the longer period (n,) [s]."""
     joint: Floats
     """(n, 2) [rad]"""
     z2: Floats
-    """In the run's modal convention (n,) [rad]."""
+    """Difference in z2, in the run's modal convention (n,) [rad]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,11 +51,11 @@ class Comparison:
     unlike: list[str]
     """Entries of the experiment, other than plant and linkage, in which they differ."""
     period: float
-    """Of the rows compared [s]."""
+    """Period of the rows compared [s]."""
     duration: float
     """Time that both have [s]."""
     first_touchdown: float
-    """When the first of them landed first [s]."""
+    """Time of the first touchdown of the run that lands first [s]."""
     joint_before_touchdown: float
     """Largest |dq| before that [rad]."""
     z2_before_touchdown: float
@@ -73,9 +73,9 @@ class Comparison:
     rating_stance: float
     """Difference of the mean P^r of all complete stances [-]."""
     rating_flight: float
-    """Of all complete flights [-]."""
+    """Difference in the mean rating of all complete flights [-]."""
     rating_periods: float
-    """Of all oscillation periods [-]."""
+    """Difference in the mean rating of all oscillation periods [-]."""
 
     def to_json(self) -> dict[str, Any]:
         """Fields by name for strict JSON: NaN is None, alone and in lists."""
@@ -136,7 +136,7 @@ def differences(recording: Recorded, other: Recorded) -> Differences:
 
 
 def first_touchdown(recording: Recorded, other: Recorded) -> float:
-    """When the first of two runs lands first [s]; NaN where none does.
+    """Time at which the first of two runs lands first [s]; NaN where none does.
 
     A leg that is put down at its first rows does not land.
 

@@ -38,7 +38,7 @@ class JumpFigures:
     """Widest horizontal range of the foot tip in one of the last three flights, in the world
     [m]."""
     foot_travel_in_hip: float
-    """The same seen from the hip [m]; known on a real leg, too."""
+    """Widest horizontal range of the foot tip seen from the hip [m]; known on a real leg, too."""
     hop_freq: float
     """Jumps per time, lower apex to lower apex [Hz]."""
     flight_time: float

@@ -29,9 +29,9 @@ class Intervals:
     end: Floats
     """Lift-off of a stance, touchdown of a flight (m,) [s]."""
     apex: Floats
-    """When the trunk is lowest in stance, highest in flight (m,) [s]; NaN for a real flight."""
+    """Time of the lowest trunk in stance, the highest in flight (m,) [s]; NaN for a real flight."""
     apex_height: Floats
-    """Of the hip above the ground at the apex (m,) [m]; NaN for a real flight."""
+    """Height of the hip above the ground at the apex (m,) [m]; NaN for a real flight."""
 
     def __len__(self) -> int:
         return len(self.first)

@@ -47,7 +47,7 @@ def without_short(time: Floats, column: Bools, value: bool, minimum: float) -> B
 
 
 def zeros_before(time: Floats, falling: Floats, rows: Ints, otherwise: float) -> Floats:
-    """When `falling` (n,) reached zero in the step before each of `rows` (m,) [s].
+    """Time at which `falling` (n,) reached zero in the step before each of `rows` (m,) [s].
 
     On the line through the two samples before that step, clipped to it: what follows an event,
     impact or flight, obeys another law and is not interpolated into. Where those samples do not

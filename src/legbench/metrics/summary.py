@@ -42,9 +42,9 @@ class Summary:
     rating_stance: list[float]
     """P^r of each complete stance, eq. (14) [-]."""
     rating_flight: list[float]
-    """Of each complete flight [-]."""
+    """P^r of each complete flight [-]."""
     rating_periods: list[float]
-    """Of each oscillation period in a fixed setup [-]."""
+    """P^r of each oscillation period in a fixed setup [-]."""
     rating_stance_equilibrium: list[float]
     rating_flight_equilibrium: list[float]
     rating_periods_equilibrium: list[float]

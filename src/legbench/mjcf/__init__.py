@@ -1,4 +1,4 @@
-"""From a design to a MuJoCo model; the only writer of MJCF.
+"""MuJoCo model of a design; the only writer of MJCF.
 
 What imports MuJoCo is loaded when it is asked for: choosing a model costs nothing.
 """

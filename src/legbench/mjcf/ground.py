@@ -9,7 +9,7 @@ from legbench.mjcf.look import add_table, add_tip
 from legbench.mjcf.options import Ground, Numerics
 
 HANGING_CLEARANCE = 0.1
-"""Between the ground and the foot of a leg that hangs from a fixed trunk [m]."""
+"""Gap between the ground and the foot of a leg that hangs from a fixed trunk [m]."""
 
 
 def add_world(spec: mujoco.MjSpec, setup: Setup, ground: Ground, numerics: Numerics) -> None:

@@ -50,7 +50,7 @@ class Linkage:
             )
 
     def mass(self, design: LegDesign) -> float:
-        """Of everything that the linkage adds to a leg [kg]."""
+        """Mass of everything that the linkage adds to a leg [kg]."""
         if self.kind is LinkageKind.REDUCED:
             return 0.0
         length = self.crank_length + design.thigh.length + design.shank.length

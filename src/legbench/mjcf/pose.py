@@ -1,4 +1,4 @@
-"""From a posture to MuJoCo's coordinates, loops closed."""
+"""MuJoCo's coordinates of a posture, with the loops closed."""
 
 import mujoco
 import numpy as np

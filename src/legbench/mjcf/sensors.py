@@ -53,9 +53,9 @@ class SensorLayout:
     trunk_vel: slice
     foot_pos: slice
     force: slice
-    """Ground on foot; an empty-handed slice of zeros where nothing touches."""
+    """Force of the ground on the foot; a slice of zeros where nothing touches."""
     found: int | None
-    """Where the contact sensor says whether it touches; none where the setup decides."""
+    """Index of the contact sensor's flag; none where the setup decides about contact."""
     always_contact: bool
     gaps: slice | None
 

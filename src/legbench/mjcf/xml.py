@@ -65,7 +65,7 @@ def _child(root: ET.Element, tag: str) -> ET.Element:
 
 
 def _objects(spec: mujoco.MjSpec) -> dict[tuple[str, str], object]:
-    """By tag and name; geoms that are given by their two ends are looks alone and left out."""
+    """Objects by tag and name; geoms given by their two ends are looks alone and left out."""
     lists: dict[str, Iterable[object]] = {
         "body": spec.bodies,
         "joint": spec.joints,

@@ -98,9 +98,9 @@ class Question:
     across: Axis
     up: Axis
     hops: int = 25
-    """Until a start is said to wander."""
+    """Number of hops after which a start is said to wander."""
     tolerance: float = MAP_TOLERANCE
-    """Of the integration; far below `near`, which decides [-]."""
+    """Tolerance of the integration; far below `near`, which decides [-]."""
     near: float = 0.05
     """Distance from the periodic hop that counts as returned, in units of `hop.UNITS` [-]."""
 

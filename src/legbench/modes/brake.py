@@ -37,11 +37,11 @@ class BrakeOrbit:
     start: Floats
     """Posture at one end (2,) [rad]."""
     end: Floats
-    """At the other (2,) [rad]."""
+    """Posture at the other end (2,) [rad]."""
     period: float
     """[s]"""
     energy: float
-    """Above rest [J]."""
+    """Energy above rest [J]."""
     bend: float
     """Largest |z1| on the way for the radial mode, of z2's excursion from rest for the polar
     one [rad]: distance from the straight line that the mode would be."""

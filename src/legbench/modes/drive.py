@@ -25,7 +25,7 @@ class AbstractDrive(ABC):
     probe: Pair
     """What to watch: `p1 q1 + p2 q2`."""
     alarm: float
-    """When to call `ring` [s]."""
+    """Time at which `ring` is to be called [s]."""
 
     @abstractmethod
     def restart(self) -> None:
@@ -33,7 +33,7 @@ class AbstractDrive(ABC):
 
     @abstractmethod
     def levels(self) -> Levels:
-        """At which probe values to call `happen`."""
+        """Probe values at which `happen` is to be called."""
 
     @abstractmethod
     def happen(self, what: Watched, value: float, time: float) -> None:
@@ -109,7 +109,7 @@ class JumpLaw(AbstractDrive):
         self._enter(JumpPhase.FLIGHT)
 
     def restart(self) -> None:
-        """In flight, unloaded, settled."""
+        """Begin in flight, unloaded and settled."""
         self._enter(JumpPhase.FLIGHT)
 
     def levels(self) -> Levels:
@@ -157,7 +157,7 @@ class JumpLaw(AbstractDrive):
 
     @property
     def settled(self) -> bool:
-        """In flight, or on the way there."""
+        """Whether the leg is in flight, or about to be."""
         return self.phase in (JumpPhase.FLIGHT, JumpPhase.RELEASE)
 
     def _load(self, time: float) -> None:

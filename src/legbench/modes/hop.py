@@ -48,9 +48,9 @@ class Apex:
     """A leg at the highest point of its centre of mass."""
 
     height: float
-    """Of the centre of mass over the ground [m]."""
+    """Height of the centre of mass over the ground [m]."""
     speed: float
-    """Of the centre of mass, forward [m/s]."""
+    """Forward speed of the centre of mass [m/s]."""
     z1: float
     """[rad]"""
     z2: float
@@ -61,7 +61,7 @@ class Apex:
     """[rad/s]"""
 
     def vector(self) -> Floats:
-        """In the order of `NAMES` (6,)."""
+        """State as an array in the order of `NAMES` (6,)."""
         return np.array([getattr(self, name) for name in NAMES])
 
     @classmethod
@@ -102,7 +102,7 @@ class Hop:
 
     ending: Ending
     after: Apex | None
-    """Where it ended, if at an apex."""
+    """Apex at which the hop ended, if it did."""
     duration: float
     """[s]"""
     touchdown: float
@@ -212,14 +212,14 @@ class FixedPoint:
 UNITS = np.array([0.01, 0.1, 0.1, 0.1, 1.0, 1.0])
 """Sizes that count as large: [m, m/s, rad, rad, rad/s, rad/s]."""
 DIFFERENCE = 1e-6
-"""Of central differences, times the unit of each number."""
+"""Step of central differences, in the unit of each number."""
 
 Derivative = Callable[[TaylorLeg, AbstractDrive, Apex], Floats]
-"""Of the map at an apex (6, 6), in `UNITS`."""
+"""Function that gives the map's derivative at an apex (6, 6), in `UNITS`."""
 
 
 def derivative(leg: TaylorLeg, drive: AbstractDrive, at: Apex) -> Floats:
-    """Of the map, exact, from the variational equations (6, 6), in `UNITS`.
+    """Exact derivative of the map from the variational equations (6, 6), in `UNITS`.
 
     The hop is followed on dual numbers; the drive must make its levels and alarms of what it is
     told by sums and products. Not for a touchdown without speed, where the map is not smooth.
@@ -236,7 +236,7 @@ def derivative(leg: TaylorLeg, drive: AbstractDrive, at: Apex) -> Floats:
 
 
 def differences(leg: TaylorLeg, drive: AbstractDrive, at: Apex) -> Floats:
-    """The same by central differences, which are defined where the map is not smooth, too.
+    """Derivative of the map by central differences, which exist where it is not smooth, too (6, 6).
 
     Raises:
         ConfigError: a neighbour does not return to an apex.

@@ -25,7 +25,7 @@ class Slip:
     stiffness: float
     """[N/m]"""
     length: float
-    """Of the relaxed spring [m]."""
+    """Length of the relaxed spring [m]."""
     gravity: float = 9.81
     """[m/s^2]"""
 
@@ -137,7 +137,7 @@ def leg_groups(leg: TaylorLeg, slip: Slip, motor_half: float, drop: float) -> Gr
 
 
 def _lower_apex(leg: TaylorLeg, drive: Passive, state: LegState) -> LegState:
-    """Where the leg turns round in stance; a touch that lets go at once does not count."""
+    """State at which the leg turns round in stance; a touch that lets go at once does not count."""
     for _ in range(CALLS):
         state, what = leg.watch(state, HORIZON, drive.motor, Levels(turns=True))
         if what is Watched.CONTACT:

@@ -5,8 +5,8 @@ from typing import final
 
 import numpy as np
 
-from legbench.drives.link import Link, LinkState, Sample
-from legbench.drives.session import Session
+from legbench.drives.master.link import Link, LinkState, Sample
+from legbench.drives.master.session import Session
 from legbench.plant.abstract import AbstractPlant
 from legbench.plant.landing import PATIENCE, STILL_RANGE, Landing, land
 from legbench.plant.start import Start
@@ -18,9 +18,9 @@ VELOCITY_BANDWIDTH = 200.0
 STILL_SPEED = 0.05
 """A leg at rest moves slower than this [rad/s]."""
 STILL_CYCLES = 100
-"""So long it must rest before a run begins."""
+"""Number of cycles for which the leg must rest before a run begins."""
 STILL_PATIENCE = 5000
-"""After so many cycles a run begins anyway; a leg that swings for long is no fault."""
+"""Number of cycles after which a run begins anyway; a leg that swings for long is no fault."""
 
 
 @final

@@ -6,18 +6,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Final
 
 from legbench.drives.emulated.faults import Fault
-from legbench.drives.limits import SafetyLimits
 from legbench.guests import WHERE, load_text
+from legbench.limits.safety import SafetyLimits
 from legbench.plant.landing import End
 from legbench.plant.opening import Leg, OpenPlant
 
 if TYPE_CHECKING:
-    from legbench.drives.config import BusConfig
+    from legbench.drives.setup.config import BusConfig
 
 EMULATED: Final = "legbench"
 """Interface of the emulated leg in this process, in virtual time."""
 LIMITS_NAME: Final = "limits.toml"
-"""Beside the bus file, unless other limits are chosen."""
+"""Name of the limits file beside the bus file."""
 BUS_LOG: Final = "bus.log"
 """Raw frames in the run folder, candump format."""
 _WHERE: Final[Mapping[str, bool]] = WHERE

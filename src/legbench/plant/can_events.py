@@ -3,9 +3,9 @@
 from dataclasses import asdict
 from typing import Any
 
-from legbench.drives.link import Link
+from legbench.drives.master.link import Link
 from legbench.drives.master.stop_report import StopReport
-from legbench.drives.upper_ends import LIMIT_ENDS
+from legbench.limits.upper_ends import LIMIT_ENDS
 from legbench.plant.can import CanPlant
 
 

@@ -4,21 +4,21 @@ from dataclasses import asdict
 from typing import Any, final
 
 from legbench.clock import AbstractClock
-from legbench.drives.bus import LockstepBus
-from legbench.drives.bus_file import load_bus
-from legbench.drives.checks import check_together
-from legbench.drives.config import BusConfig
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.emulated.network import Network
-from legbench.drives.limits import SafetyLimits
-from legbench.drives.master.lock import ChannelLock
-from legbench.drives.open_bus import adapter_of, open_bus
-from legbench.drives.realtime import Granted
-from legbench.drives.session import Session
-from legbench.drives.waivers import describe_waivers
-from legbench.drives.wire import check_load
+from legbench.drives.master.session import Session
+from legbench.drives.setup.bus_file import load_bus
+from legbench.drives.setup.checks import check_together
+from legbench.drives.setup.config import BusConfig
+from legbench.drives.setup.waivers import describe_waivers
+from legbench.drives.setup.wire import check_load
+from legbench.drives.transport.lock import ChannelLock
+from legbench.drives.transport.open_bus import adapter_of, open_bus
+from legbench.drives.transport.realtime import Granted
 from legbench.errors import ConfigError
+from legbench.limits.safety import SafetyLimits
 from legbench.plant.can import CanPlant
 from legbench.plant.can_choice import BUS_LOG, LIMITS_NAME, CanChoice
 from legbench.plant.can_events import bus_events, gone_drive

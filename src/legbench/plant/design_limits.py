@@ -6,11 +6,11 @@ from dataclasses import asdict, replace
 from typing import Any
 
 from legbench.design import LegDesign
-from legbench.drives.knee import Range
-from legbench.drives.limits import UNLIMITED, SafetyLimits
-from legbench.drives.shortfall import Shortfall
-from legbench.drives.waivers import describe_waivers
+from legbench.drives.setup.waivers import describe_waivers
 from legbench.errors import ConfigError
+from legbench.limits.knee import Range
+from legbench.limits.safety import UNLIMITED, SafetyLimits
+from legbench.limits.shortfall import Shortfall
 from legbench.plant.abstract import AbstractPlant
 from legbench.plant.limited import LimitedPlant
 from legbench.plant.opening import Leg, OpenPlant

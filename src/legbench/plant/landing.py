@@ -9,9 +9,9 @@ STILL_RANGE = 0.01
 """A leg at rest keeps every link within this of where it was [rad]: half a degree, 100 counts of
 the bench's encoders, 1 mm at the foot of the paper's leg."""
 STILL_TIME = 0.5
-"""So long it must [s]; a leg that flies may be as quiet, but comes down within it from 0.3 m."""
+"""Time for which it must [s]; a leg that flies may be as quiet, but falls 0.3 m within it."""
 PATIENCE = 10.0
-"""After so long at the posture power goes anyway [s]. A jump of the paper's leg dies out in 4 to
+"""Time at the posture after which power goes anyway [s]. A jump of the paper's leg dies out in 4 to
 7 s; pinned by its foot it swings for longer, which is no fault."""
 
 
@@ -29,7 +29,7 @@ class Landing:
     """What happened between the last row of a run and the end of its power."""
 
     motor_pos: tuple[float, ...]
-    """Where the motors were led to [rad]."""
+    """Motor positions that the leg was led to [rad]."""
     duration: float
     """How long it took [s]."""
     rested: bool

@@ -7,9 +7,9 @@ from typing import final
 
 import numpy as np
 
-from legbench.drives.guard import Guard
-from legbench.drives.limits import SafetyLimits
-from legbench.drives.shortfall import Shortfall
+from legbench.limits.guard import Guard
+from legbench.limits.safety import SafetyLimits
+from legbench.limits.shortfall import Shortfall
 from legbench.plant.abstract import AbstractPlant
 from legbench.signals import Command, Floats, Observation
 

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from legbench.design import LegDesign
-from legbench.drives.bus_file import load_limits
-from legbench.drives.limits import SafetyLimits
+from legbench.drives.setup.bus_file import load_limits
 from legbench.errors import ConfigError
+from legbench.limits.safety import SafetyLimits
 from legbench.plant.design_limits import limits_within
 
 

@@ -1,4 +1,4 @@
-"""From MuJoCo's arrays to an observation, for one leg or a batch with the same code."""
+"""Observations from MuJoCo's arrays, for one leg or a batch with the same code."""
 
 import math
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ DIVERGED = 1e3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointLayout:
-    """Where the leg's coordinates stand in qpos (and, being all one-dimensional, in qvel)."""
+    """Places of the leg's coordinates in qpos and, since all have one dimension, in qvel."""
 
     hip: int
     knee: int

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from legbench.drives.limits import SafetyLimits
 from legbench.guests import load_text
+from legbench.limits.safety import SafetyLimits
 from legbench.plant.design_limits import open_limited
 from legbench.plant.opening import Leg, OpenPlant
 

@@ -56,7 +56,7 @@ class RunDescription:
     id: str
     """Name of the run: that of its folder when it was written."""
     created: str | None
-    """When it began, ISO 8601."""
+    """Time at which it began, ISO 8601."""
     design: LegDesign
     setup: Setup
     linkage: str | None
@@ -209,7 +209,8 @@ def _crank_length(linkage: Table) -> float | None:
 def _setting(settings: Table, key: str) -> float | None:
     """Setting of a controller when it is a number; a guest may mean anything by the word."""
     found = settings.entries.get(key)
-    return None if isinstance(found, bool) or not isinstance(found, int | float) else float(found)
+    number = isinstance(found, int | float) and not isinstance(found, bool)
+    return settings.number(key) if number else None
 
 
 def _initial_state(table: Table) -> InitialState | None:

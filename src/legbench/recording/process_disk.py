@@ -28,7 +28,7 @@ QUEUE: Final = 1 << 20
 REPORT: Final = struct.Struct("<qddii?")
 """What comes back: rows, first and last time, errnos of samples and events, whether at the end."""
 UNKNOWN: Final = -1
-"""In place of an errno, for what is no error of the operating system."""
+"""Number in place of an errno, for what is no error of the operating system."""
 
 
 @final

@@ -1,1 +1,1 @@
-"""From requirements to a leg that can be built: search, what its bounds cost, its tolerances."""
+"""Synthesis of a leg from requirements: search, cost of its bounds, tolerances, manufacture."""

@@ -1,4 +1,4 @@
-"""The same problem by another method: differential evolution."""
+"""Cross-check of the search by another method, differential evolution."""
 
 import numpy as np
 from scipy.optimize import differential_evolution

@@ -29,7 +29,7 @@ class Row:
     """SI."""
     unit: str
     shown: str
-    """In workshop units."""
+    """Value in workshop units, as text."""
 
 
 def manufacture_table(design: LegDesign) -> tuple[Row, ...]:
@@ -60,7 +60,7 @@ WORKSHOP = {
 }
 """SI unit -> units of a workshop and how many of them make one; the last for large numbers."""
 LARGE = 1e4
-"""From here on the larger unit is used."""
+"""Value from which on the larger unit is used."""
 
 
 def shown(value: float, unit: str) -> str:
@@ -85,7 +85,7 @@ class Adjustment:
 
     segment: str
     mass: float
-    """To be added; negative: to be taken away [kg]."""
+    """Mass to be added; negative: to be taken away [kg]."""
     position: float
     """Centre of the weight, from the proximal joint towards the distal one [m]; NaN if no single
     weight does it."""

@@ -24,7 +24,7 @@ TILT = 1e-4
 AGREES = 1e-9
 """Difference of model and algebra that is rounding, of the scale of the terms [-]."""
 TILT_AGREES = 1e-6
-"""The same for stability, where the model's value is a finite difference [-]."""
+"""Difference that is rounding for stability, where the model's value is a finite difference [-]."""
 
 SETUPS = (SetupKind.HFTS, SetupKind.VFTS, SetupKind.FFS, SetupKind.JUMP)
 

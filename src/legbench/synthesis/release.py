@@ -12,7 +12,7 @@ import numpy as np
 from legbench.control import LegTargets, PositionJump, PositionJumpConfig
 from legbench.design import LegDesign
 from legbench.design.setup import Setup, SetupKind
-from legbench.design.statics import Support, gravity_load
+from legbench.design.statics import Support, balance, gravity_load, is_stable
 from legbench.errors import ConfigError
 from legbench.kinematics import modal_to_joint
 from legbench.metrics import Reference, alignment
@@ -39,7 +39,7 @@ class Release:
     reference: Reference = Reference.EQUILIBRIUM
     """What eq. (14) measures deflection from: gravity's sag, which flatters, is left out."""
     timestep: float = 0.001
-    """Of the simulation [s]: P^r is then within 5e-5 of that at 0.25 ms."""
+    """Time step of the simulation [s]; P^r is then within 5e-5 of that at 0.25 ms."""
 
     @property
     def options(self) -> BuildOptions:
@@ -124,21 +124,15 @@ def released(
 def _resting(
     legs: Sequence[LegDesign], motor_pos: Floats, near: Floats, support: Support
 ) -> Floats:
-    """Where each leg rests for its motor positions (n, 2), close to `near` (n, 2) [rad].
+    """Rest postures (n, 2) of legs for their motor positions (n, 2), close to `near` (n, 2) [rad].
 
     Raises:
         ConfigError: a leg has no stable equilibrium there.
     """
     stiffness = np.array([leg.stiffness for leg in legs])
     moment = np.array([gravity_load(leg, support).moment for leg in legs])
-    joint_pos = near
-    for _ in range(20):
-        slope = stiffness + moment * np.cos(joint_pos)
-        residual = stiffness * (motor_pos - joint_pos) - moment * np.sin(joint_pos)
-        joint_pos = joint_pos + residual / np.where(np.abs(slope) < 1e-9, 1e-9, slope)
-    slope = stiffness + moment * np.cos(joint_pos)
-    residual = stiffness * (motor_pos - joint_pos) - moment * np.sin(joint_pos)
-    held = np.all((np.abs(residual) < 1e-9) & (slope > 0.0), axis=1)
+    joint_pos = balance(stiffness, moment, motor_pos, near)
+    held = np.all(is_stable(stiffness, moment, motor_pos, joint_pos), axis=1)
     if not held.all():
         raise ConfigError(
             f"{int((~held).sum())} of {len(legs)} scattered legs find no equilibrium at their set "

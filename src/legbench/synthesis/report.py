@@ -70,7 +70,7 @@ def model_lines(check: ModelCheck) -> list[str]:
 
 
 def solution_lines(solution: Solution) -> list[str]:
-    """Where the search ended: objective, ratios, bounds and their prices, the cross-check."""
+    """Lines on the end of a search: objective, ratios, bounds and their prices, the cross-check."""
     state = "converged" if solution.complete else "stopped early, best so far"
     lines = [
         f"objective (11)    {solution.objective:.6f}",

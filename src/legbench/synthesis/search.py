@@ -58,7 +58,7 @@ class SearchSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Found:
-    """Where a search ended."""
+    """End of a search."""
 
     free: Floats
     """The best ratios (7,)."""
@@ -116,7 +116,7 @@ def search(
 
 
 def _ratios(bounds: Bounds, unit: Floats) -> Floats:
-    """From the unit cube to the bounds (n, 7)."""
+    """Ratios within the bounds (n, 7) for points of the unit cube (n, 7)."""
     return bounds.lower + np.clip(unit, 0.0, 1.0) * (bounds.upper - bounds.lower)
 
 

@@ -23,7 +23,7 @@ AT_MARGIN = 1e-5
 MARGIN_KEPT = 1e-7
 """What the local search keeps of every margin, so that its result is a leg [-]."""
 STEP = 1e-3
-"""By how much a bound is moved to check its multiplier, of the bounds' width."""
+"""Share of the bounds' width by which a bound is moved to check its multiplier [-]."""
 IMAGINARY = 1e-30
 """Complex step: a derivative without cancellation."""
 
@@ -37,11 +37,11 @@ class ActiveBound:
     side: str
     """`lower`, `upper`, or `zero` for a margin."""
     value: float
-    """Where the bound is [-]."""
+    """Value of the bound [-]."""
     gain: float
     """Objective gained per unit by which the bound moves outwards: the multiplier [-]."""
     gain_measured: float
-    """The same from optimising again with the bound moved; NaN for margins."""
+    """Gain found by optimising again with the bound moved [-]; NaN for margins."""
 
 
 def refine(requirements: Requirements, free: Floats) -> Floats:
@@ -169,10 +169,10 @@ def _stepped(free: Floats) -> Any:
 
 
 def _gradient(requirements: Requirements, free: Floats) -> Floats:
-    """Of objective (11) by the ratios (7,), exact."""
+    """Exact gradient of objective (11) by the ratios (7,)."""
     return _objective(requirements, _stepped(free)).imag / IMAGINARY
 
 
 def _margin_gradients(requirements: Requirements, free: Floats) -> Floats:
-    """Of the margins by the ratios (5, 7), exact."""
+    """Exact gradients of the margins by the ratios (5, 7)."""
     return _margins(requirements, _stepped(free)).imag.T / IMAGINARY

@@ -25,17 +25,18 @@ class Tolerances:
     """
 
     mass: float = 0.02
-    """Of each mass, relative [-]."""
+    """Relative tolerance of each mass [-]."""
     com: float = 0.001
-    """Of each centre of mass [m]."""
+    """Tolerance of each centre of mass [m]."""
     inertia: float = 0.05
-    """Of each inertia, relative [-]."""
+    """Relative tolerance of each inertia [-]."""
     length: float = 0.0002
-    """Of thigh and foot; the shank is as long as both together, as its bars are [m]."""
+    """Tolerance of the lengths of thigh and foot [m]; the shank is as long as both together, as its
+    bars are."""
     stiffness: float = 0.03
-    """Of each spring, relative [-]."""
+    """Relative tolerance of each spring's stiffness [-]."""
     damping: float = 0.12
-    """Of each joint, relative [-]."""
+    """Relative tolerance of each joint's damping [-]."""
 
     def __post_init__(self) -> None:
         for name in TOLERANCES:
@@ -48,7 +49,7 @@ class Tolerances:
                 )
 
     def only(self, name: str) -> "Tolerances":
-        """The same tolerance of `name`, nothing else scatters."""
+        """Tolerances in which `name` alone scatters, as much as here."""
         return replace(self, **{other: 0.0 for other in TOLERANCES if other != name})
 
 

@@ -2,9 +2,9 @@
 
 from typing import final
 
-from legbench.drives.codec.emcy import Emergency, emcy_frame
-from legbench.drives.codec.frame import Frame
-from legbench.drives.objects import Key
+from legbench.drives.protocol.emcy import Emergency, emcy_frame
+from legbench.drives.protocol.frame import Frame
+from legbench.drives.protocol.objects import Key
 
 REGISTER_BITS = {0x2: 1, 0x3: 2, 0x4: 3, 0x8: 4}
 """First digit of an error code -> bit of 1001h; bit 0 is set with any."""

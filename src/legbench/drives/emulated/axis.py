@@ -3,18 +3,18 @@
 from collections import deque
 from typing import final
 
-from legbench.drives.cia402 import DriveState, Mode, StatusBit
-from legbench.drives.codec.frame import Frame
-from legbench.drives.codec.sdo import Abort
-from legbench.drives.config import NodeConfig
 from legbench.drives.emulated.alarms import Alarms
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.homing import Homing, HomingState
 from legbench.drives.emulated.motion import Motion
 from legbench.drives.emulated.power import HALT, PowerStage
 from legbench.drives.emulated.sensors import Sensors
-from legbench.drives.objects import LINK_SHORT, Key
-from legbench.drives.units import wrap
+from legbench.drives.protocol.cia402 import DriveState, Mode, StatusBit
+from legbench.drives.protocol.frame import Frame
+from legbench.drives.protocol.objects import LINK_SHORT, Key
+from legbench.drives.protocol.sdo import Abort
+from legbench.drives.setup.config import NodeConfig
+from legbench.drives.setup.units import wrap
 
 MODES = (Mode.NONE, Mode.HOMING, Mode.CYCLIC_SYNCHRONOUS_POSITION)
 FOLLOWING_ERROR, SETPOINTS_MISSING, SYNC_MISSING = 0x8611, 0xFF10, 0xFF11
@@ -52,7 +52,7 @@ class Axis:
         self.publish()
 
     def restart(self) -> None:
-        """After a reset the electronics forget everything, the motor stays where it is."""
+        """Reset the electronics to their power-on state; the motor stays where it is."""
         self.power.state = DriveState.NOT_READY_TO_SWITCH_ON
         self.power.stopping = None
         self.alarms = Alarms(self._node.node_id, self._values)
@@ -61,12 +61,12 @@ class Axis:
         self.motion.hold(0)
 
     def take(self) -> list[Frame]:
-        """Emergency messages since the last call."""
+        """Return the emergency messages since the last call."""
         out, self._out = self._out, []
         return out
 
     def check(self, key: Key, value: int) -> Abort | None:
-        """Why an object of the profile may not become a value now."""
+        """Abort code that refuses a value for an object of the profile; none if it is accepted."""
         if key == (0x6060, 0):
             if value not in MODES:
                 return Abort.INVALID_VALUE
@@ -77,7 +77,7 @@ class Axis:
         return None
 
     def written(self, key: Key, now_ns: int) -> None:
-        """An object of the profile has a new value."""
+        """Act on a new value of an object of the profile."""
         if key == (0x6040, 0):
             if self._behaviour.slow_loop:
                 self._waiting_word = self._values[key]
@@ -98,12 +98,12 @@ class Axis:
         self._status()
 
     def fault(self, code: int) -> None:
-        """An error has come; react to it."""
+        """Raise an error and start the fault reaction."""
         self._say(self.alarms.raise_(code))
         self.power.fault()
 
     def sync(self, fresh: bool, now_ns: int) -> None:
-        """SYNC: the target becomes the new set point, if one has come."""
+        """Latch the target as the new set point at SYNC, if one has come."""
         values = self._values
         if self.power.state is not _ENABLED or values[0x6061, 0] != 8:
             return
@@ -119,7 +119,7 @@ class Axis:
             self.fault(SETPOINTS_MISSING)
 
     def tick(self, now_ns: int, step_ns: int) -> float:
-        """Move for `step_ns` until now; true motor position [rad]."""
+        """Move for `step_ns` until now; returns the true motor position [rad]."""
         self._now_ns = now_ns
         if self._waiting_word is not None:
             word, self._waiting_word = self._waiting_word, None
@@ -154,19 +154,19 @@ class Axis:
             self.fault(FOLLOWING_ERROR)
 
     def _deceleration(self, option: int) -> float:
-        """Of a stop option [counts/s2]; 0 stops at once, as the current limit would allow."""
+        """Deceleration of a stop option [counts/s2]; 0 stops at once, at the current limit."""
         if option == 1:
             return float(self._values[0x6084, 0])
         return float(self._values[0x6085, 0]) if option == 2 else 0.0
 
     def sense(self, link_pos: float, spring_torque: float) -> None:
-        """What the body did: link angle [rad] and torque of the spring [N m]."""
+        """Take over the state of the body: link angle [rad] and spring torque [N m]."""
         self._link_counts = self._node.link.to_counts(link_pos)
         rated = self._behaviour.rated_torque
         self._torque = round(self._node.motor.sign * 1000.0 * spring_torque / rated)
 
     def publish(self) -> None:
-        """Bring the actual values of the object dictionary up to date."""
+        """Update the actual values in the object dictionary."""
         values, motion = self._values, self.motion
         actual = self.sensors.motor.show(round(motion.actual))
         link = self.sensors.link.show(self._link_counts)
@@ -200,7 +200,7 @@ class Axis:
         self._show(int(word))
 
     def _show(self, word: int) -> None:
-        """Publish a statusword, once its time has come."""
+        """Publish the statusword in the object dictionary, late by the status lag."""
         lag_ns = 1000 * self._behaviour.status_lag_us
         if lag_ns:
             late = self._late_words

@@ -2,12 +2,12 @@
 
 from collections.abc import Sequence
 
-from legbench.drives.config import BusConfig
-from legbench.drives.configuration import configuration
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.drive import EmulatedDrive
 from legbench.drives.emulated.faults import Fault
 from legbench.drives.emulated.network import Body, Network, Stuffing, stiff_body
+from legbench.drives.setup.config import BusConfig
+from legbench.drives.setup.configuration import configuration
 from legbench.errors import ConfigError
 
 

@@ -4,8 +4,13 @@ import random
 from collections.abc import Iterator, Sequence
 from typing import final
 
-from legbench.drives.cia402 import DriveState
-from legbench.drives.codec.frame import (
+from legbench.drives.emulated.axis import SYNC_MISSING, Axis
+from legbench.drives.emulated.behaviour import Behaviour
+from legbench.drives.emulated.process_data import LAST_SYNCHRONOUS, ProcessData
+from legbench.drives.emulated.store import ObjectStore
+from legbench.drives.errors import SdoAbortError
+from legbench.drives.protocol.cia402 import DriveState
+from legbench.drives.protocol.frame import (
     HEARTBEAT_BASE,
     LAST_NODE,
     NMT_ID,
@@ -14,7 +19,7 @@ from legbench.drives.codec.frame import (
     SYNC_ID,
     Frame,
 )
-from legbench.drives.codec.nmt import (
+from legbench.drives.protocol.nmt import (
     HeartbeatWatch,
     NmtCommand,
     NmtState,
@@ -22,15 +27,10 @@ from legbench.drives.codec.nmt import (
     decode_nmt,
     heartbeat_frame,
 )
-from legbench.drives.codec.sdo import Abort
-from legbench.drives.codec.sdo_server import SdoServer
-from legbench.drives.config import NodeConfig, Parameter
-from legbench.drives.emulated.axis import SYNC_MISSING, Axis
-from legbench.drives.emulated.behaviour import Behaviour
-from legbench.drives.emulated.process_data import LAST_SYNCHRONOUS, ProcessData
-from legbench.drives.emulated.store import ObjectStore
-from legbench.drives.errors import SdoAbortError
-from legbench.drives.objects import OBJECTS, TEMPERATURE, Key
+from legbench.drives.protocol.objects import OBJECTS, TEMPERATURE, Key
+from legbench.drives.protocol.sdo import Abort
+from legbench.drives.protocol.sdo_server import SdoServer
+from legbench.drives.setup.config import NodeConfig, Parameter
 
 UNDER_VOLTAGE, OVER_TEMPERATURE = 0x3220, 0x4310
 HEARTBEAT_LOST, PDO_SHORT, PDO_LONG, SYNC_LENGTH, RPDO_LATE = 0x8130, 0x8210, 0x8220, 0x8240, 0x8250

@@ -4,7 +4,7 @@ from enum import Enum, auto
 from typing import final
 
 from legbench.drives.emulated.motion import Motion
-from legbench.drives.objects import Key
+from legbench.drives.protocol.objects import Key
 
 IN_PLACE = (35, 37)
 TO_STOP = {-1: -1, -2: 1, -3: -1, -4: 1}

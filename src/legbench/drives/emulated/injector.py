@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Sequence
 from typing import final
 
-from legbench.drives.codec.frame import Frame
 from legbench.drives.emulated.drive import OVER_TEMPERATURE, UNDER_VOLTAGE, EmulatedDrive
 from legbench.drives.emulated.faults import (
     Babble,
@@ -14,6 +13,7 @@ from legbench.drives.emulated.faults import (
     NodeFaultKind,
 )
 from legbench.drives.emulated.sensors import Ailment
+from legbench.drives.protocol.frame import Frame
 
 _TRIPS = {
     NodeFaultKind.UNDER_VOLTAGE: UNDER_VOLTAGE,
@@ -32,7 +32,7 @@ Fate = tuple[tuple[int, Frame], ...]
 
 
 def _strike_parts(drive: EmulatedDrive, fault: NodeFault, *, begins: bool) -> None:
-    """Break or mend what a drive moves, senses and tells."""
+    """Begin or end a fault of a drive's motor, encoders or process data."""
     axis = drive.axis
     if fault.kind is NodeFaultKind.WARNING:
         axis.warning = begins
@@ -59,7 +59,7 @@ class Injector:
             self.add(fault)
 
     def add(self, fault: Fault) -> None:
-        """From now on this may strike."""
+        """Add a fault, which acts in its window of time."""
         if isinstance(fault, FrameFault):
             self._frames.append(fault)
         elif isinstance(fault, NodeFault):
@@ -68,14 +68,14 @@ class Injector:
             self._babbles.append(fault)
 
     def receive(self, frame: Frame, now_ns: int) -> None:
-        """Nothing is done with what others send."""
+        """Ignore the frames of other nodes."""
 
     def take(self) -> list[tuple[int, Frame]]:
-        """Nothing is sent by itself."""
+        """Return no frames: the injector sends nothing of its own."""
         return []
 
     def tick(self, now_ns: int) -> float:
-        """Nothing to do."""
+        """Do nothing; returns 0, as an injector has no motor."""
         return 0.0
 
     def breaks(self, frame: Frame, now_ns: int) -> bool:
@@ -86,7 +86,7 @@ class Injector:
         )
 
     def fate(self, frame: Frame, now_ns: int) -> Fate:
-        """What arrives of a frame that was not destroyed."""
+        """Delay [ns] and content of each copy that arrives of a frame that was not destroyed."""
         if not self._frames:
             return ((0, frame),)
         arrivals: Fate = ((0, frame),)
@@ -105,14 +105,14 @@ class Injector:
         return arrivals
 
     def babble(self, now_ns: int, span_ns: int) -> Iterator[Frame]:
-        """Frames that somebody shouts in the coming span."""
+        """Yield the frames that babbling nodes send in the coming span."""
         for babble in self._babbles:
             if babble.start_ns <= now_ns < babble.end_ns:
                 for _ in range(max(1, span_ns // babble.every_ns)):
                     yield Frame(babble.cob_id, babble.data)
 
     def node_events(self, now_ns: int) -> Iterator[tuple[NodeFault, bool]]:
-        """Faults of nodes that begin (true) or end (false) by now."""
+        """Yield the faults of nodes that begin (true) or end (false) by now."""
         for fault in tuple(self._nodes):
             if now_ns >= fault.start_ns:
                 self._nodes.remove(fault)
@@ -124,7 +124,7 @@ class Injector:
                 yield fault, False
 
     def silent(self, node_id: int, now_ns: int) -> bool:
-        """Whether a node's plug is pulled."""
+        """Whether a node's bus connector is unplugged."""
         return any(
             fault.kind is NodeFaultKind.SILENT and fault.node_id == node_id for fault in self._begun
         )
@@ -136,7 +136,7 @@ class Injector:
 
     @staticmethod
     def strike(drive: EmulatedDrive, fault: NodeFault, now_ns: int, *, begins: bool) -> None:
-        """Do to a drive what a fault says."""
+        """Apply the beginning or the end of a fault to a drive."""
         code = _TRIPS.get(fault.kind)
         if code is not None:
             if begins:

@@ -4,8 +4,8 @@ import math
 from typing import final
 
 from legbench.drives.emulated.behaviour import Behaviour, MissingSetpoint
-from legbench.drives.objects import Key
-from legbench.drives.units import AxisUnits
+from legbench.drives.protocol.objects import Key
+from legbench.drives.setup.units import AxisUnits
 
 SECOND_NS = 1_000_000_000
 

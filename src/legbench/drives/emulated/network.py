@@ -9,12 +9,12 @@ from collections.abc import Callable, Sequence
 from enum import Enum
 from typing import Protocol, final
 
-from legbench.drives.codec.frame import Frame
 from legbench.drives.emulated.drive import EmulatedDrive
 from legbench.drives.emulated.faults import Fault, NodeFault
 from legbench.drives.emulated.injector import Injector
 from legbench.drives.errors import BusError
-from legbench.drives.wire import ERROR_BITS, exact_bits, plain_bits, worst_bits
+from legbench.drives.protocol.frame import Frame
+from legbench.drives.setup.wire import ERROR_BITS, exact_bits, plain_bits, worst_bits
 
 Body = Callable[[tuple[float, ...]], tuple[Sequence[float], Sequence[float]]]
 """Moves one body period with the motors at these positions [rad]; link positions [rad] and
@@ -60,7 +60,7 @@ class Station:
         self.received: deque[tuple[int, Frame]] = deque()
         self.tx_queue, self.bitrate, self.listen_only = tx_queue, bitrate, listen_only
         self.waiting = 0
-        """Frames that have not been on the wire yet."""
+        """Number of frames that have not been on the wire yet."""
         self.unread = 0
         """Receive error counter: frames of others that made no sense here."""
 
@@ -186,7 +186,7 @@ class Network:
         self.now_ns = max(self.now_ns, until_ns)
 
     def _next(self) -> tuple[int, Callable[[], None]]:
-        """What happens next, and when; the body's grid goes first."""
+        """Time and handler of the next event; at equal times the grid of the body goes first."""
         if self._flying is not None:
             at_ns, event = self._end_ns, self._land
         elif self._pending:
@@ -227,7 +227,7 @@ class Network:
             self._collect(node)
 
     def _arbitrate(self) -> None:
-        """Of all frames that are ready the lowest identifier wins."""
+        """Start the ready frame with the lowest identifier, as arbitration does (ISO 11898-1)."""
         now_ns = self.now_ns
         ready = [entry for entry in self._pending if entry[0] <= now_ns]
         winner = min(ready, key=lambda entry: entry[1:3])
@@ -301,7 +301,7 @@ class Network:
         return isinstance(node, EmulatedDrive) and self._injector.silent(node.node_id, self.now_ns)
 
     def _fail(self, sender: Node, frame: Frame) -> None:
-        """An error frame: everybody hears it, the sender tries again until it is bus-off."""
+        """Send an error frame to all nodes; the sender repeats its frame until it is bus-off."""
         for node in self._nodes:
             if isinstance(node, Station):
                 node.received.append((self.now_ns, ERROR_FRAME))

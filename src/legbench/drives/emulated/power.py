@@ -2,8 +2,8 @@
 
 from typing import final
 
-from legbench.drives.cia402 import DriveState
-from legbench.drives.objects import Key
+from legbench.drives.protocol.cia402 import DriveState
+from legbench.drives.protocol.objects import Key
 
 _S = DriveState
 _WORDS = {

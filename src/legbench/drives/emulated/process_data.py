@@ -2,12 +2,12 @@
 
 from typing import final
 
-from legbench.drives.codec.frame import COB_INVALID, COB_MASK
-from legbench.drives.codec.pdo import Mapped, PdoMap, split_word
-from legbench.drives.codec.sdo import Abort
 from legbench.drives.emulated.store import ObjectStore
 from legbench.drives.errors import CodecError
-from legbench.drives.objects import MAX_MAPPED, PDO_COUNT, Access, Key
+from legbench.drives.protocol.frame import COB_INVALID, COB_MASK
+from legbench.drives.protocol.objects import MAX_MAPPED, PDO_COUNT, Access, Key
+from legbench.drives.protocol.pdo import Mapped, PdoMap, split_word
+from legbench.drives.protocol.sdo import Abort
 
 RPDO, TPDO = 0x1400, 0x1800
 LAST_SYNCHRONOUS = 240
@@ -23,9 +23,9 @@ class Pdo:
         self.timer_ns = 1_000_000 * timer_ms
         self.keys = tuple(entry.key for entry in layout.entries)
         self.waiting: tuple[int, ...] | None = None
-        """RPDO: received, not yet latched."""
+        """Values of an RPDO that are received and not yet latched."""
         self.seen_ns: int | None = None
-        """Last received or sent."""
+        """Time at which the PDO was last received or sent [ns]."""
         self.last: bytes | None = None
         self.syncs = 0
 
@@ -52,7 +52,7 @@ class ProcessData:
         return RPDO <= key[0] < TPDO + 0x200 + PDO_COUNT
 
     def check(self, key: Key, value: int) -> Abort | None:
-        """Why an object of a PDO may not become a value (CiA 301, 7.5.2.36)."""
+        """Abort code that refuses a value for a PDO's object, if any (CiA 301, 7.5.2.36)."""
         index, sub = key
         mapping = bool(index & 0x200)
         comm = index & ~0x200
@@ -129,7 +129,7 @@ class ProcessData:
         return pdo
 
     def sample(self, pdo: Pdo) -> bytes:
-        """The bytes of a TPDO right now."""
+        """Sample the bytes of a TPDO."""
         if self.repeats and pdo.last is not None:
             return pdo.last
         values = self._store.values
@@ -137,7 +137,7 @@ class ProcessData:
         return pdo.last
 
     def forget(self) -> None:
-        """Nothing received counts any more (on leaving operational)."""
+        """Discard what was received and not yet latched, as on leaving operational."""
         for pdo in self.rpdos.values():
             pdo.waiting = pdo.seen_ns = None
         for pdo in self.tpdos:

@@ -3,7 +3,7 @@
 from enum import Enum
 from typing import final
 
-from legbench.drives.config import NodeConfig
+from legbench.drives.setup.config import NodeConfig
 
 SECOND_NS = 1_000_000_000
 
@@ -12,11 +12,11 @@ class Ailment(Enum):
     """How an encoder may fail."""
 
     FROZEN = "frozen"
-    """It shows for ever what it showed last."""
+    """The encoder keeps its last value."""
     STEP = "step"
-    """It is off by an angle from one sample to the next [rad]."""
+    """The encoder's reading jumps by an angle from one sample to the next [rad]."""
     DRIFT = "drift"
-    """It runs away at a speed [rad/s]."""
+    """The encoder's reading drifts away at a constant speed [rad/s]."""
 
 
 @final

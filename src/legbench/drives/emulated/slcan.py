@@ -2,7 +2,9 @@
 
 from typing import final
 
-from legbench.drives.codec.slcan import (
+from legbench.drives.emulated.network import Network, Station
+from legbench.drives.errors import BusError
+from legbench.drives.protocol.slcan import (
     BITRATES,
     OK,
     REFUSED,
@@ -10,15 +12,13 @@ from legbench.drives.codec.slcan import (
     format_frame,
     parse_frame,
 )
-from legbench.drives.emulated.network import Network, Station
-from legbench.drives.errors import BusError
 
 LONGEST = 32
-"""Of a line: an extended frame has 27 characters. Whatever is longer is garbage."""
+"""Longest line that is kept [characters]; an extended frame has 27, longer lines are garbage."""
 WARNING, PASSIVE_FLAG, BUS_ERROR = 1 << 2, 1 << 5, 1 << 7
-"""Flags of the answer to `F`."""
+"""Status flags in the answer to the command `F`."""
 ERRORS = ((96, WARNING), (128, PASSIVE_FLAG), (256, BUS_ERROR))
-"""Error counts from which a flag is shown."""
+"""Pairs of an error count and the flag that is shown from this count on."""
 
 
 @final

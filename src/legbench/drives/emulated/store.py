@@ -3,13 +3,13 @@
 from collections.abc import Callable, Iterable
 from typing import final
 
-from legbench.drives.codec.datatypes import Value, pack, range_of, size_of, unpack
-from legbench.drives.codec.sdo import Abort, abort_error
 from legbench.drives.errors import CodecError
-from legbench.drives.objects import Access, Key, ObjectEntry
+from legbench.drives.protocol.datatypes import Value, pack, range_of, size_of, unpack
+from legbench.drives.protocol.objects import Access, Key, ObjectEntry
+from legbench.drives.protocol.sdo import Abort, abort_error
 
 Check = Callable[[Key, int], Abort | None]
-"""Why an object may not become a value now; none if it may."""
+"""Abort code that refuses a value for an object; none if it is accepted."""
 Written = Callable[[Key], None]
 
 
@@ -30,7 +30,7 @@ class ObjectStore:
         self.load_defaults()
 
     def load_defaults(self) -> None:
-        """As after power-on."""
+        """Set every object to its power-on default."""
         for key, entry in self._entries.items():
             if isinstance(entry.default, int):
                 self.values[key] = entry.default

@@ -1,1 +1,1 @@
-"""The master's parts of a bus; `legbench.drives.link` joins them."""
+"""The master of a bus: link, bring-up, cycle, watches and stop; it knows no emulated drive."""

@@ -2,17 +2,17 @@
 
 from typing import final
 
-from legbench.drives.cia402 import PowerMachine, decode_state
-from legbench.drives.codec.pdo import PdoMap
-from legbench.drives.config import (
+from legbench.drives.errors import CodecError
+from legbench.drives.protocol.cia402 import PowerMachine, decode_state
+from legbench.drives.protocol.pdo import PdoMap
+from legbench.drives.setup.config import (
     CONTROLWORD,
     POSITION_ACTUAL,
     STATUSWORD,
     TARGET_POSITION,
     NodeConfig,
 )
-from legbench.drives.errors import CodecError
-from legbench.drives.units import Unwrapper, wrap
+from legbench.drives.setup.units import Unwrapper, wrap
 
 
 def _wanted(layout: PdoMap, node: NodeConfig) -> tuple[tuple[int, int], ...]:
@@ -29,7 +29,7 @@ class AxisLink:
     Attributes:
         node: its configuration.
         machine: leads it through its states.
-        statusword: as last received.
+        statusword: statusword last received.
         target_counts: what its next RPDO says, not wrapped.
         sent_counts: what its last RPDO said, none before the first.
         fresh: whether all its TPDOs have come in this cycle.

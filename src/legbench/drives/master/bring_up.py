@@ -1,4 +1,4 @@
-"""From power-on to pre-operational with everything checked; nothing here enables a drive."""
+"""Bring-up of drives by SDO: identity, configuration, checks; nothing here enables a drive."""
 
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
@@ -6,13 +6,6 @@ from typing import final
 
 import can
 
-from legbench.drives.cia402 import POWERED, Mode, decode_state
-from legbench.drives.codec.datatypes import DataType
-from legbench.drives.codec.emcy import MEANINGS
-from legbench.drives.codec.nmt import NmtCommand, nmt_frame
-from legbench.drives.codec.sdo import Abort
-from legbench.drives.config import BusConfig, Identity, NodeConfig, Parameter
-from legbench.drives.configuration import configuration
 from legbench.drives.errors import BusError, DriveError, SdoAbortError
 from legbench.drives.master.first_contact import first_contact
 from legbench.drives.master.lookout import Lookout
@@ -20,15 +13,22 @@ from legbench.drives.master.parking import is_parked
 from legbench.drives.master.port import Port
 from legbench.drives.master.sdo_port import SdoPort
 from legbench.drives.master.sdo_stop import SdoStop
-from legbench.drives.objects import name_of
+from legbench.drives.protocol.cia402 import POWERED, Mode, decode_state
+from legbench.drives.protocol.datatypes import DataType
+from legbench.drives.protocol.emcy import MEANINGS
+from legbench.drives.protocol.nmt import NmtCommand, nmt_frame
+from legbench.drives.protocol.objects import name_of
+from legbench.drives.protocol.sdo import Abort
+from legbench.drives.setup.config import BusConfig, Identity, NodeConfig, Parameter
+from legbench.drives.setup.configuration import configuration
 from legbench.interrupts import shielded
 
 PROFILE_402 = 0x0192
-"""Low word of 1000h."""
+"""Device profile number of CiA 402 drives, in the low word of 1000h."""
 CSP_BIT = 1 << 7
-"""Of 6502h: cyclic synchronous position mode."""
+"""Bit of 6502h, supported drive modes, for cyclic synchronous position mode."""
 MODE_PATIENCE = 50
-"""Reads of 6061h until the mode must be there, 10 ms apart."""
+"""Number of reads of 6061h, 10 ms apart, until the mode must be there."""
 _MISSING = (Abort.NO_OBJECT, Abort.NO_SUB_INDEX)
 U32, I32, I8, U16 = (
     DataType.UNSIGNED32,
@@ -89,7 +89,7 @@ class BringUp:
         return self._sdo[node.node_id]
 
     def contact(self) -> AbstractContextManager[None]:
-        """Around the first question: says what is wrong with the bus if nobody answers."""
+        """Context of the first request, whose errors say what is wrong with the bus."""
         return first_contact(self._port, self._bus)
 
     def identify(self, nodes: Sequence[NodeConfig] | None = None) -> None:
@@ -181,7 +181,7 @@ class BringUp:
         return different
 
     def refuse_differences(self) -> None:
-        """For a master that may not configure; raises DriveError for the first drive that differs.
+        """Raise DriveError for the first drive that differs, for a master that may not configure.
 
         Process data that is mapped otherwise would be read as what it is not. Command frames
         that are switched off, as after every run, change nothing for those who only look.
@@ -202,7 +202,7 @@ class BringUp:
                 )
 
     def configure(self, node: NodeConfig) -> int:
-        """Write the configuration, reading every object back; how many.
+        """Write the configuration and read every object back; returns the number of objects.
 
         Raises:
             DriveError: the drive refuses, or holds another value afterwards.
@@ -245,7 +245,7 @@ class BringUp:
         return True
 
     def _await_mode(self, node: NodeConfig) -> None:
-        """6061h lags behind 6060h."""
+        """Read 6061h until it shows the mode written to 6060h, behind which it lags."""
         timebase, mode = self._port.timebase, 0
         for _ in range(MODE_PATIENCE):
             mode = self.sdo(node).get_int(0x6061, 0, I8)
@@ -258,7 +258,7 @@ class BringUp:
         )
 
     def preload(self, node: NodeConfig) -> int:
-        """Set the target to where the motor is (607Ah from 6064h); the counts."""
+        """Set the target to the motor position (607Ah from 6064h); returns it [counts]."""
         sdo = self.sdo(node)
         actual = sdo.get_int(0x6064, 0, I32)
         sdo.put(0x607A, 0, I32, actual)

@@ -9,7 +9,7 @@ from legbench.closing import Closing
 from legbench.drives.errors import BusError
 
 FLUSH_FRAMES = 500
-"""About 100 ms of a busy bus."""
+"""Number of frames between two flushes of the log: about 100 ms of a busy bus."""
 
 
 @final
@@ -35,7 +35,7 @@ class BusLog(Closing):
             raise BusError(f"{path}: cannot write a bus log: {error.strerror}") from None
 
     def __call__(self, message: can.Message) -> None:
-        """Remember one frame."""
+        """Add one frame to the log."""
         if message.is_error_frame:
             name = f"{0x20000000 | message.arbitration_id:08X}"
         else:

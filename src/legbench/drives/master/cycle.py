@@ -10,7 +10,13 @@ from typing import NamedTuple, final
 
 import can
 
-from legbench.drives.codec.frame import (
+from legbench.drives.errors import BusError
+from legbench.drives.master.axis_link import AxisLink
+from legbench.drives.master.notices import Notices
+from legbench.drives.master.port import Port
+from legbench.drives.master.temperature import TemperaturePoll
+from legbench.drives.master.watch import NodeWatch
+from legbench.drives.protocol.frame import (
     EMCY_BASE,
     HEARTBEAT_BASE,
     LAST_NODE,
@@ -19,32 +25,26 @@ from legbench.drives.codec.frame import (
     SDO_REQUEST_BASE,
     SYNC_ID,
 )
-from legbench.drives.codec.nmt import NmtState, heartbeat_frame
-from legbench.drives.config import BusConfig
-from legbench.drives.errors import BusError
-from legbench.drives.master.axis_link import AxisLink
-from legbench.drives.master.notices import Notices
-from legbench.drives.master.port import Port
-from legbench.drives.master.temperature import TemperaturePoll
-from legbench.drives.master.watch import NodeWatch
+from legbench.drives.protocol.nmt import NmtState, heartbeat_frame
+from legbench.drives.setup.config import BusConfig
 
 ERROR_FRAME_BUS_OFF = 0x40
-"""Class of a SocketCAN error frame: this controller has left the bus."""
+"""Class bit of a SocketCAN error frame that says that this controller is bus-off."""
 
 
 class Tick(NamedTuple):
-    """When a cycle began."""
+    """Start of a cycle: its time, its delay and the ticks without SYNC before it."""
 
     time_ns: int
-    """SYNC was sent."""
+    """Time of SYNC on the bus's time base [ns]."""
     late_ns: int
-    """After its place on the grid."""
+    """Delay of SYNC after its place on the grid [ns]."""
     skipped: int
-    """Ticks without SYNC before it, for whatever reason."""
+    """Number of ticks without SYNC before this one, for whatever reason."""
     silent: int
-    """Of these, not missed by this master: left out on purpose, or another master's."""
+    """Number of skipped ticks that this master left out on purpose, or that were another's."""
     complete: bool
-    """All process data came before the deadline."""
+    """Whether all process data came before the deadline."""
 
 
 @final
@@ -61,7 +61,7 @@ class Cycle:
         late_frames: process data that came after its deadline.
         silent_total: ticks that were left out to find late answers.
         notices: what a run has to tell though it ends nothing.
-        stopping: from now on SYNC goes out at every tick, because a stop waits for it.
+        stopping: whether a stop is under way, for which SYNC goes out at every tick.
     """
 
     def __init__(self, port: Port, config: BusConfig) -> None:
@@ -97,7 +97,7 @@ class Cycle:
         self._due_ns = self._beat_due_ns = 0
         self._count = 0
         self._owed: set[int] = set()
-        """Process data that has not come, and may still."""
+        """COB-IDs of process data that has not come, and still may."""
         self._sync = port.message(SYNC_ID)
         self._commands = {
             cob_id: port.message(cob_id) for axis in self.axes for cob_id in axis.rpdo_ids
@@ -180,7 +180,7 @@ class Cycle:
         return Tick(sync_ns or timebase.now_ns(), 0, skipped, skipped, missing == 0)
 
     def _await_sync(self, until_ns: int) -> int | None:
-        """When the SYNC of another master came; none by then [ns]."""
+        """Time at which the SYNC of another master came [ns]; none if it has not by `until_ns`."""
         now_ns = self._port.timebase.now_ns
         while now_ns() < until_ns:
             message = self._port.receive(until_ns)
@@ -303,7 +303,7 @@ class Cycle:
         return missing
 
     def _drain(self) -> None:
-        """Before SYNC: what has come by now is late or a copy, and must not pass for new.
+        """Discard, before SYNC, what has come by now: late or copied data must not pass for new.
 
         Frames that come as fast as they are read hold up no stop: after a period the tick goes on
         with a bus that has failed.

@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from legbench.drives.config import BusConfig
 from legbench.drives.errors import BusError, NoAnswerError
 from legbench.drives.master.port import Port
+from legbench.drives.setup.config import BusConfig
 
 
 @contextmanager

@@ -5,16 +5,16 @@ from typing import final
 
 import can
 
-from legbench.drives.codec.frame import (
+from legbench.drives.master.port import Port
+from legbench.drives.protocol.frame import (
     HEARTBEAT_BASE,
     LAST_NODE,
     NMT_ID,
     SDO_REQUEST_BASE,
     SYNC_ID,
 )
-from legbench.drives.config import BusConfig, NodeConfig
-from legbench.drives.master.port import Port
-from legbench.drives.open_bus import listening_ns
+from legbench.drives.setup.config import BusConfig, NodeConfig
+from legbench.drives.transport.open_bus import listening_ns
 from legbench.errors import PlantFault
 
 

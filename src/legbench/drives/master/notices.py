@@ -5,8 +5,8 @@ from typing import Any, final
 
 import can
 
-from legbench.drives.cia402 import StatusBit
 from legbench.drives.master.axis_link import AxisLink
+from legbench.drives.protocol.cia402 import StatusBit
 
 WARNING, INTERNAL_LIMIT = int(StatusBit.WARNING), int(StatusBit.INTERNAL_LIMIT)
 TOLD = WARNING | INTERNAL_LIMIT
@@ -47,11 +47,11 @@ class Notices:
                 self.note(f"internal limit of drive {drive}", now_ns, statusword=axis.statusword)
 
     def answered_twice(self, message: can.Message, now_ns: int) -> None:
-        """A drive has sent the same process data twice for one SYNC."""
+        """Count a drive that has sent the same process data twice for one SYNC."""
         self.note("node answered twice", now_ns, cob_id=message.arbitration_id)
 
     def sdo_request(self, message: can.Message, node_id: int, now_ns: int) -> None:
-        """Somebody else has asked a drive for something; only writing is told."""
+        """Count an SDO request of another master; only those that write are noted."""
         data = bytes(message.data)
         if len(data) == 8 and data[0] >> 5 in WRITES:
             written = f"{data[2]:02X}{data[1]:02X}h:{data[3]:02X}"

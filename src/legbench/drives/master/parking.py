@@ -9,12 +9,12 @@ from collections.abc import Callable, Collection
 
 import can
 
-from legbench.drives.codec.datatypes import DataType
-from legbench.drives.codec.frame import COB_INVALID
-from legbench.drives.config import BusConfig, NodeConfig, Parameter
 from legbench.drives.errors import BusError, DriveError
 from legbench.drives.master.port import Port
 from legbench.drives.master.sdo_port import SdoPort
+from legbench.drives.protocol.datatypes import DataType
+from legbench.drives.protocol.frame import COB_INVALID
+from legbench.drives.setup.config import BusConfig, NodeConfig, Parameter
 
 RPDO_COMMUNICATION = 0x1400
 """First of the objects whose sub-index 1 is the COB-ID of a command frame."""
@@ -59,9 +59,9 @@ def park(
     power is left out: the deadline of its command frames may be what stops it.
 
     Args:
-        port: of the bus.
-        bus: whose drives.
-        on_other: gets the frames that are no answers.
+        port: port of the bus.
+        bus: configuration of the drives.
+        on_other: called with frames that are no answers.
         powered: names of drives that have kept their power.
     """
     failed: list[str] = []

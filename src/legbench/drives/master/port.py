@@ -7,16 +7,16 @@ from typing import final
 
 import can
 
-from legbench.drives.codec.frame import Frame
 from legbench.drives.errors import BusError, DriveError
 from legbench.drives.master.read_only import MaySend
-from legbench.drives.timebase import Timebase
+from legbench.drives.protocol.frame import Frame
+from legbench.drives.transport.timebase import Timebase
 from legbench.errors import LegbenchError
 
 Listener = Callable[[can.Message], None]
 """Sees every frame that is sent or received, in order; one that is sent is used again."""
 OLDEST_S = 10.0
-"""A frame that was waiting for longer was stamped by another clock."""
+"""Largest plausible age of a frame; an older stamp is of another clock [s]."""
 HINT = "look at `ip -details link show`, at the txqueuelen and at the wiring"
 
 
@@ -25,8 +25,8 @@ class Port:
     """A bus with its time.
 
     Attributes:
-        timebase: of the bus.
-        bus: for those who need the driver itself.
+        timebase: time base of the bus.
+        bus: the interface, for callers that need the driver itself.
         listener: sees every frame, if there is one.
         listener_error: what the listener raised, in one line; it is not called any more.
         error_frames: heard so far.

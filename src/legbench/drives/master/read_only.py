@@ -2,14 +2,14 @@
 
 from collections.abc import Callable
 
-from legbench.drives.codec.frame import (
+from legbench.drives.protocol.frame import (
     HEARTBEAT_BASE,
     LAST_NODE,
     NMT_ID,
     SDO_REQUEST_BASE,
     SYNC_ID,
 )
-from legbench.drives.codec.nmt import NmtCommand
+from legbench.drives.protocol.nmt import NmtCommand
 
 MaySend = Callable[[int, bytes | bytearray], bool]
 """Whether a frame, by identifier and data, may go out."""
@@ -18,7 +18,7 @@ READING = (2, 3, 4)
 
 
 def may_read(cob_id: int, data: bytes | bytearray) -> bool:
-    """Questions only: an SDO upload changes nothing in a drive."""
+    """Whether a frame is a mere question: an SDO upload changes nothing in a drive."""
     asked = SDO_REQUEST_BASE < cob_id <= SDO_REQUEST_BASE + LAST_NODE
     return asked and bool(data) and data[0] >> 5 in READING
 

@@ -1,4 +1,4 @@
-"""What one cycle showed."""
+"""The measurements of one cycle."""
 
 from collections.abc import Sequence
 from operator import attrgetter
@@ -16,24 +16,24 @@ class Sample(NamedTuple):
     """
 
     time_ns: int
-    """SYNC was sent, on the link's time base."""
+    """Time of SYNC on the link's time base [ns]."""
     late_ns: int
-    """After its place on the grid."""
+    """Delay of SYNC after its place on the grid [ns]."""
     skipped: int
-    """Ticks without SYNC just before."""
+    """Number of ticks without SYNC just before this one."""
     motor_pos: tuple[float, ...]
-    """[rad]"""
+    """Positions of the motors [rad]."""
     link_pos: tuple[float, ...]
-    """[rad]"""
+    """Positions of the links [rad]."""
     spring_torque: tuple[float, ...]
-    """Of the series springs on the links, from the encoders' difference [N m]."""
+    """Torques of the series springs on the links, from the encoders' difference [N m]."""
     applied_pos: tuple[float, ...]
     """Command as it was last let through; empty before the drives are enabled [rad]."""
     statusword: tuple[int, ...]
     fresh: tuple[bool, ...]
-    """False: no process data in this cycle, the last is repeated."""
+    """Whether each drive has sent process data in this cycle; if not, its last is repeated."""
     temperature: tuple[float | None, ...]
-    """[deg C]"""
+    """Temperatures of the drives, none where not known [deg C]."""
 
 
 def sample_of(

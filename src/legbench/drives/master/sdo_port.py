@@ -5,21 +5,21 @@ from typing import final
 
 import can
 
-from legbench.drives.codec.datatypes import DataType, Value, pack, unpack
-from legbench.drives.codec.frame import SDO_REPLY_BASE, SDO_REQUEST_BASE
-from legbench.drives.codec.sdo import Abort, abort_data
-from legbench.drives.codec.sdo_client import Download, Progress, Upload
 from legbench.drives.errors import CodecError, DriveError, NoAnswerError, SdoAbortError
 from legbench.drives.master.port import Port
-from legbench.drives.objects import name_of
+from legbench.drives.protocol.datatypes import DataType, Value, pack, unpack
+from legbench.drives.protocol.frame import SDO_REPLY_BASE, SDO_REQUEST_BASE
+from legbench.drives.protocol.objects import name_of
+from legbench.drives.protocol.sdo import Abort, abort_data
+from legbench.drives.protocol.sdo_client import Download, Progress, Upload
 
 
 def _ignore(_message: can.Message) -> None:
-    """Frames that are nobody's."""
+    """Discard a frame that is not an answer."""
 
 
 def _nothing() -> None:
-    """Nothing to look at before a write."""
+    """Do nothing before a write."""
 
 
 @final

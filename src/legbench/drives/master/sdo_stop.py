@@ -4,15 +4,15 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import final
 
-from legbench.drives.cia402 import POWERED, Controlword, decode_state, describe_statusword
-from legbench.drives.codec.datatypes import DataType, pack
-from legbench.drives.codec.frame import SDO_REQUEST_BASE, Frame
-from legbench.drives.codec.sdo_client import Download
-from legbench.drives.config import NodeConfig
 from legbench.drives.errors import BusError
 from legbench.drives.master.port import Port
 from legbench.drives.master.sdo_port import SdoPort
 from legbench.drives.master.stop_report import StopReport
+from legbench.drives.protocol.cia402 import POWERED, Controlword, decode_state, describe_statusword
+from legbench.drives.protocol.datatypes import DataType, pack
+from legbench.drives.protocol.frame import SDO_REQUEST_BASE, Frame
+from legbench.drives.protocol.sdo_client import Download
+from legbench.drives.setup.config import NodeConfig
 
 RAMP_NS = 35_000_000
 """Longest that a quick-stop ramp is waited for, so that with the time of the questions every
@@ -20,11 +20,11 @@ drive is without power after 50 ms [ns]."""
 LAST_NS = 250_000_000
 """Longest that a drive is asked whether its power is gone [ns]."""
 REST_NS = 5_000_000
-"""Between two looks [ns]."""
+"""Pause between two rounds of reading all statuswords [ns]."""
 ANSWER_MS = 20
-"""A look waits no longer for its answer: the other drives are to be looked at, too [ms]."""
+"""Longest wait for a statusword, so that the other drives are read in time, too [ms]."""
 FAILED_LOOKS = 3
-"""A bus that has taken no frame in so many looks is given up: nobody can be told anything."""
+"""Number of rounds in a row without a frame sent after which the stop gives up."""
 STATUSWORD, CONTROLWORD = 0x6041, 0x6040
 
 
@@ -106,7 +106,7 @@ class SdoStop:
         self._refused = 0 if told else self._refused + 1
 
     def _look(self, node: NodeConfig) -> int:
-        """The statusword; -1 if the drive does not answer."""
+        """Read the statusword of a drive; -1 if it does not answer."""
         try:
             return self._sdo[node.node_id].get_int(STATUSWORD, 0, DataType.UNSIGNED16)
         except BaseException as error:  # The stop goes on, whatever a driver raises.

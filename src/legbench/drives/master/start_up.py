@@ -1,31 +1,31 @@
-"""From configured to enabled, cycle by cycle, without a jump."""
+"""Start-up of configured drives: enabling cycle by cycle, without a jump of the target."""
 
 from collections.abc import Callable, Sequence
 from typing import final
 
-from legbench.drives.cia402 import (
+from legbench.drives.errors import DriveError
+from legbench.drives.master.axis_link import AxisLink
+from legbench.drives.master.cycle import Cycle, Tick
+from legbench.drives.master.port import Port
+from legbench.drives.protocol.cia402 import (
     DriveState,
     Goal,
     StatusBit,
     decode_state,
     describe_statusword,
 )
-from legbench.drives.codec.nmt import NmtCommand, nmt_frame
-from legbench.drives.config import BusConfig
-from legbench.drives.errors import DriveError
-from legbench.drives.master.axis_link import AxisLink
-from legbench.drives.master.cycle import Cycle, Tick
-from legbench.drives.master.port import Port
+from legbench.drives.protocol.nmt import NmtCommand, nmt_frame
+from legbench.drives.setup.config import BusConfig
 from legbench.errors import PlantFault
 
 SETTLE_PATIENCE = 2000
-"""Cycles in which process data has to become regular."""
+"""Number of cycles within which process data has to become regular."""
 ENABLE_PATIENCE = 2000
-"""Cycles in which all drives have to be enabled."""
+"""Number of cycles within which all drives have to be enabled."""
 STILL_RANGE = 0.02
-"""A motor that moves further while it is enabled is stopped [rad]."""
+"""Largest motion of a motor while it is enabled; beyond it the start-up ends [rad]."""
 IGNORE_PATIENCE = 5
-"""Cycles in which an enabled drive has to follow its target."""
+"""Number of cycles within which an enabled drive has to follow its target."""
 
 
 @final
@@ -36,7 +36,7 @@ class StartUp:
         self._port, self._cycle, self._config = port, cycle, config
         self._read_only = read_only
         self.listening = False
-        """Another master sends SYNC: nothing is sent at all."""
+        """Whether another master sends SYNC, so that this one sends nothing."""
 
     def settle(self, tick: Callable[[], Tick]) -> Tick:
         """Start the nodes, wait for regular process data; raises DriveError or BusError."""
@@ -59,7 +59,7 @@ class StartUp:
         )
 
     def idle(self) -> None:
-        """The rest of a cycle in which nothing is commanded."""
+        """End a cycle in which nothing is commanded."""
         if self.listening:
             return
         if self._read_only:
@@ -121,13 +121,13 @@ class StartUp:
 
 
 def _ignores(axis: AxisLink) -> bool:
-    """Enabled, but not led by its target."""
+    """Whether a drive is enabled but does not follow its target."""
     enabled = decode_state(axis.statusword) is DriveState.OPERATION_ENABLED
     return enabled and not axis.statusword & StatusBit.FOLLOWS_COMMAND
 
 
 def _check_still(axes: Sequence[AxisLink], stood: Sequence[float], ignored: int) -> None:
-    """Nothing moves while drives are enabled; raises PlantFault."""
+    """Check that no motor moves while drives are enabled; raises PlantFault."""
     for axis, before in zip(axes, stood, strict=True):
         who = f"drive '{axis.node.name}' (node {axis.node.node_id})"
         moved = axis.motor_pos - before

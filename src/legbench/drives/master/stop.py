@@ -1,24 +1,24 @@
-"""The stop ladder: quick stop of all drives, no voltage for slow ones, a look at what is left."""
+"""The stop of all drives: quick stop, no voltage for slow drives, check of the statuswords."""
 
 from collections.abc import Callable
 from typing import final
 
-from legbench.drives.cia402 import POWERED, Goal, decode_state, describe_statusword
 from legbench.drives.master.axis_link import AxisLink
 from legbench.drives.master.cycle import Cycle
 from legbench.drives.master.stop_report import StopReport
+from legbench.drives.protocol.cia402 import POWERED, Goal, decode_state, describe_statusword
 
 RAMP_CYCLES = 40
-"""Longest that a quick-stop ramp is waited for. A drive that still has power then loses its
+"""Longest wait for a quick-stop ramp [cycles]. A drive that still has power then loses its
 voltage, and obeys two cycles later: at 1 kHz every drive is without power after 50 ms."""
 OFF_CYCLES = 100
-"""Longest that drives without voltage are looked at until they show it."""
+"""Longest wait until drives whose voltage is disabled show no power [cycles]."""
 SURE_CYCLES = 3
-"""A drive that has shown no power in so many cycles in a row has seen the last word."""
+"""Number of cycles in a row that all drives must show no power to count as stopped."""
 SILENT_CYCLES = 20
-"""A drive that has sent no process data for so many cycles in a row no longer answers."""
+"""Number of cycles in a row without process data beyond which a drive counts as silent."""
 FAILED_CYCLES = 3
-"""So many cycles in a row that raise something end the wait for a ramp: no time passes in them."""
+"""Number of failed cycles in a row that end a wait, as no time passes in them."""
 
 
 @final
@@ -72,7 +72,7 @@ class StopLadder:
                 break
 
     def _send(self) -> None:
-        """One word to every drive; once more if something else than the bus gets in between."""
+        """Send one controlword to every drive, once more if an exception interrupts it."""
         for _ in range(2):
             try:
                 self._cycle.send(
@@ -83,7 +83,7 @@ class StopLadder:
                 self._note(error)
 
     def _tick(self) -> None:
-        """One cycle; what it raises, such as the body of an emulated leg, is counted."""
+        """Run one cycle; what it raises, such as the body of an emulated leg, is counted."""
         try:
             self._cycle.tick()
             self._failed = 0

@@ -3,12 +3,12 @@
 import math
 from typing import final
 
-from legbench.drives.cia402 import StatusBit, Way, describe_statusword
-from legbench.drives.config import BusConfig
-from legbench.drives.limits import SafetyLimits
 from legbench.drives.master.cycle import Cycle, Tick
-from legbench.drives.timebase import Timebase
+from legbench.drives.protocol.cia402 import StatusBit, Way, describe_statusword
+from legbench.drives.setup.config import BusConfig
+from legbench.drives.transport.timebase import Timebase
 from legbench.errors import PlantFault
+from legbench.limits.safety import SafetyLimits
 
 FOLLOWS = int(StatusBit.FOLLOWS_COMMAND)
 MISSING_TEMPERATURES = 3
@@ -17,7 +17,7 @@ MISSING_TEMPERATURES = 3
 
 @final
 class Supervisor:
-    """Looks at every cycle; raises what it finds, stops nothing itself."""
+    """Checks of every cycle; raises what it finds, stops nothing itself."""
 
     def __init__(
         self, cycle: Cycle, config: BusConfig, limits: SafetyLimits, timebase: Timebase
@@ -30,7 +30,7 @@ class Supervisor:
         self._watches_temperature = math.isfinite(limits.temperature)
 
     def bus(self, tick: Tick) -> None:
-        """The controller is on the bus, and the grid is kept; raises PlantFault."""
+        """Check that the controller is on the bus and the grid is kept; raises PlantFault."""
         if self._cycle.stranger is not None:
             self.alone()
         missed = tick.skipped - tick.silent
@@ -47,7 +47,7 @@ class Supervisor:
             )
 
     def alone(self) -> None:
-        """Nobody else leads these drives; raises PlantFault."""
+        """Check that no other master leads these drives; raises PlantFault."""
         stranger = self._cycle.stranger
         if stranger is not None:
             raise PlantFault(
@@ -57,7 +57,7 @@ class Supervisor:
             )
 
     def sent(self, *, complete: bool) -> None:
-        """Whether the commands of a cycle have gone out; raises PlantFault."""
+        """Check that the commands of a cycle have gone out; raises PlantFault."""
         self._unsent = 0 if complete else self._unsent + 1
         if self._unsent >= self._limits.lost_frames:
             raise PlantFault(
@@ -67,7 +67,7 @@ class Supervisor:
             )
 
     def drives(self) -> None:
-        """Every drive answers, lives, and reports no emergency; raises PlantFault."""
+        """Check that every drive answers, lives and reports no emergency; raises PlantFault."""
         now_ns = self._timebase.now_ns()
         if self._watches_temperature:
             self._temperatures()
@@ -79,7 +79,7 @@ class Supervisor:
                 raise PlantFault(cause, text if error is None else f"{text}; {error}")
 
     def _temperatures(self) -> None:
-        """Every drive that is to report its temperature does."""
+        """Check that every drive that is to report its temperature does."""
         for axis, poll in zip(self._cycle.axes, self._cycle.polls, strict=True):
             if poll.unanswered >= MISSING_TEMPERATURES:
                 raise PlantFault(
@@ -89,7 +89,7 @@ class Supervisor:
                 )
 
     def states(self) -> None:
-        """Every drive is enabled and follows its target; raises PlantFault."""
+        """Check that every drive is enabled and follows its target; raises PlantFault."""
         ignored = False
         for axis in self._cycle.axes:
             if not axis.fresh:

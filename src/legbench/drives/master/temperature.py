@@ -2,11 +2,11 @@
 
 from typing import final
 
-from legbench.drives.codec.datatypes import unpack
-from legbench.drives.codec.frame import SDO_REQUEST_BASE, Frame
-from legbench.drives.codec.sdo_client import Progress, Upload
-from legbench.drives.config import NodeConfig
 from legbench.drives.errors import CodecError, SdoAbortError
+from legbench.drives.protocol.datatypes import unpack
+from legbench.drives.protocol.frame import SDO_REQUEST_BASE, Frame
+from legbench.drives.protocol.sdo_client import Progress, Upload
+from legbench.drives.setup.config import NodeConfig
 
 EVERY_CYCLES = 200
 
@@ -16,7 +16,7 @@ class TemperaturePoll:
     """Asks every so many cycles; a drive that does not answer is asked again.
 
     Attributes:
-        celsius: as last reported, none before or where the bus file names no object [deg C].
+        celsius: last temperature, none before or where the bus file names no object [deg C].
         unanswered: requests in a row that brought no temperature.
     """
 
@@ -29,7 +29,7 @@ class TemperaturePoll:
         self.unanswered = 0
 
     def due(self, cycle: int) -> Frame | None:
-        """The request of this cycle, if it has one."""
+        """SDO request of this cycle, none if none is due."""
         if self._object is None or cycle % EVERY_CYCLES:
             return None
         if self._waiting:
@@ -39,7 +39,7 @@ class TemperaturePoll:
         return Frame(self._request_id, self._upload.request)
 
     def feed(self, data: bytes) -> None:
-        """An SDO reply of the drive."""
+        """Take an SDO reply of the drive."""
         if self._upload is None or self._object is None:
             return
         try:
@@ -54,6 +54,6 @@ class TemperaturePoll:
             self.take(value)
 
     def take(self, value: int) -> None:
-        """A reading of the object [counts]."""
+        """Take a reading of the temperature object [counts]."""
         self.celsius = self._scale * value
         self._waiting, self.unanswered = False, 0

@@ -2,12 +2,12 @@
 
 from typing import final
 
-from legbench.drives.codec.emcy import Emergency, decode_emcy
-from legbench.drives.codec.nmt import HeartbeatWatch, NmtState, decode_heartbeat
-from legbench.drives.config import BusConfig, NodeConfig
+from legbench.drives.protocol.emcy import Emergency, decode_emcy
+from legbench.drives.protocol.nmt import HeartbeatWatch, NmtState, decode_heartbeat
+from legbench.drives.setup.config import BusConfig, NodeConfig
 
 HEARTBEATS = 3
-"""Overdue by so many, a drive is lost."""
+"""Number of heartbeat periods without a heartbeat after which a drive is lost."""
 
 
 @final
@@ -37,14 +37,14 @@ class NodeWatch:
         self._well = True
 
     def arm(self, now_ns: int) -> None:
-        """From now on count: forget what was before."""
+        """Start watching from now: the counts, emergency and state of before are cleared."""
         self._beat.feed(now_ns)
         self.emergency, self.missed, self._rebooted = None, 0, False
         self.lost_total = self.bad_total = 0
         self.state = None
 
     def hear_heartbeat(self, data: bytes, now_ns: int) -> None:
-        """Heartbeat or boot-up."""
+        """Take a heartbeat or boot-up message."""
         state = decode_heartbeat(data)
         if state is None:
             return
@@ -54,7 +54,7 @@ class NodeWatch:
             self._rebooted = True
 
     def hear_emergency(self, data: bytes) -> None:
-        """Emergency."""
+        """Take an emergency message."""
         emergency = decode_emcy(self._node.node_id, data)
         if emergency is None:
             return
@@ -63,7 +63,7 @@ class NodeWatch:
             self.emergency = emergency
 
     def cycle(self, *, complete: bool) -> None:
-        """A cycle has passed, with its process data or without."""
+        """Count a cycle that has ended with or without its process data."""
         if complete:
             if self._well:
                 self.missed = 0

@@ -1,1 +1,0 @@
-"""CiA 301 on the wire, pure: bytes in, words out, and back; no clock, no I/O."""

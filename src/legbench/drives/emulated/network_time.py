@@ -1,0 +1,21 @@
+"""Time base of an emulated bus."""
+
+from typing import final
+
+from legbench.drives.emulated.network import Network
+
+
+@final
+class NetworkTime:
+    """Virtual time of an emulated bus; waiting makes it pass."""
+
+    def __init__(self, network: Network) -> None:
+        self._network = network
+
+    def now_ns(self) -> int:
+        """Now [ns]."""
+        return self._network.now_ns
+
+    def wait_until(self, at_ns: int) -> None:
+        """Advance the bus to `at_ns`."""
+        self._network.advance(at_ns)

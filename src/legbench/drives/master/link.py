@@ -1,0 +1,520 @@
+"""The cyclic link to the drives of one leg, over any python-can bus.
+
+    with Link(bus, config, limits, stiffness=(k1, k2)) as link:
+        sample = link.start()
+        while ...:
+            applied = link.command(controller(sample))
+            sample = link.exchange()
+
+A cycle: tick of the grid, SYNC, process data of all drives until a deadline, watchdogs and limits
+(`exchange`), then the command, slewed and clamped, in RPDOs that act at the next SYNC (`command`).
+Whatever goes wrong, all drives are told to stop in the same cycle and the first cause is kept.
+"""
+
+import math
+from collections.abc import Sequence
+from enum import Enum, auto
+from typing import final
+
+import can
+
+from legbench.drives.errors import DriveError
+from legbench.drives.master.bring_up import BringUp
+from legbench.drives.master.cycle import Cycle, Tick
+from legbench.drives.master.parking import park
+from legbench.drives.master.port import Listener, Port
+from legbench.drives.master.read_only import may_pace, may_read
+from legbench.drives.master.sample import Sample, sample_of
+from legbench.drives.master.sdo_stop import leave_operational
+from legbench.drives.master.start_up import StartUp
+from legbench.drives.master.stop import StopLadder
+from legbench.drives.master.stop_report import Lead, StopReport
+from legbench.drives.master.supervisor import Supervisor
+from legbench.drives.protocol.cia402 import Goal
+from legbench.drives.protocol.nmt import NmtState
+from legbench.drives.setup.config import BusConfig, check_start_speed
+from legbench.drives.setup.master_watch import check_master_watch
+from legbench.drives.setup.wire import check_load
+from legbench.drives.transport.lock import ChannelLock
+from legbench.drives.transport.open_bus import timebase_of
+from legbench.drives.transport.timebase import Timebase
+from legbench.errors import PlantFault
+from legbench.interrupts import Shield, shielded
+from legbench.limits.guard import Guard
+from legbench.limits.safety import SafetyLimits
+from legbench.limits.shortfall import Shortfall
+
+LISTEN_NS = 100_000_000
+"""Time that a read-only link listens for another master's SYNC and for heartbeats [ns]."""
+ARRIVED = 1e-9
+"""Largest distance from a target that counts as reached [rad]."""
+
+
+class LinkState(Enum):
+    """States of a link, from new to stopped."""
+
+    NEW = auto()
+    CONFIGURED = auto()
+    """Identity checked, configuration written and read back; nothing moves."""
+    CYCLIC = auto()
+    """Process data flows, targets follow the motors."""
+    RUNNING = auto()
+    """All drives in operation enabled, commands are taken."""
+    STOPPING = auto()
+    """Told to stop, and not every drive has been seen without power yet."""
+    STOPPED = auto()
+    """Every drive has been seen without power; or this link never led one."""
+
+
+@final
+class Link(Lead):
+    """One master, its bus and its drives.
+
+    Attributes:
+        state: how far it has come.
+        fault: the first fault; what ended the link.
+        stopped: how the stop of the drives has ended, none before it.
+        skipped_total: ticks without SYNC since the start.
+        not_parked: what `close` failed to switch off, see `master.parking`.
+        listening: read-only, and another master sends SYNC: this one sends nothing.
+    """
+
+    def __init__(
+        self,
+        bus: can.BusABC,
+        config: BusConfig,
+        limits: SafetyLimits | None = None,
+        *,
+        stiffness: Sequence[float],
+        timebase: Timebase | None = None,
+        listener: Listener | None = None,
+        read_only: bool = False,
+        lock: ChannelLock | None = None,
+    ) -> None:
+        """Wire the parts; nothing is sent.
+
+        Args:
+            bus: stays the caller's, who shuts it down after `close`.
+            config: what hangs on it.
+            limits: enforced here.
+            stiffness: stiffness of the series springs, one a drive [N m/rad].
+            timebase: time base of the link; by default the bus's.
+            listener: sees every frame, such as a `BusLog`.
+            read_only: observe; change nothing in a drive, see `master.read_only`.
+            lock: taken by `open`; by default one for the bus's channel.
+
+        Raises:
+            ConfigError: the bus cannot carry the schedule.
+        """
+        check_load(config)
+        self._config, self._limits = config, limits or SafetyLimits()
+        self._port = Port(bus, timebase or timebase_of(bus), listener)
+        self._read_only = read_only
+        self._lock = lock or ChannelLock(str(bus.channel_info))
+        self._stiffness = tuple(float(value) for value in stiffness)
+        self.cycle = Cycle(self._port, config)
+        self.bring_up = BringUp(self._port, config, self.cycle.other)
+        self._guard = Guard(self._limits, config.period)
+        self.state = LinkState.NEW
+        self.fault: PlantFault | None = None
+        self.skipped_total = 0
+        self.stopped: StopReport | None = None
+        self.not_parked: list[str] = []
+        self._supervisor = Supervisor(self.cycle, config, self._limits, self._port.timebase)
+        self._start_up = StartUp(self._port, self.cycle, config, read_only=read_only)
+        self._last = Tick(0, 0, 0, 0, False)
+        self._expected: list[tuple[float, ...]] = []
+        self._holds = self._closed = self._leads = False
+        self._told: Listener | None = None
+        self.listening = False
+
+    def tell(self, listener: Listener) -> None:
+        """Show every frame to a listener from now on, or from when the drives are configured.
+
+        A log that holds their configuration would, played back, bring parked drives back to life.
+        """
+        self._told = listener
+        if self.state is not LinkState.NEW:
+            self._port.listener = listener
+
+    @property
+    def listener_error(self) -> str | None:
+        """What a listener raised, in one line; it hears nothing more then."""
+        return self._port.listener_error
+
+    # --- before anything moves ---------------------------------------------------------------
+
+    def open(self) -> None:
+        """Take the channel, check who is there, write and read back the configuration.
+
+        In read-only nothing is written, and the channel is taken only if SYNC has to come from
+        here.
+
+        Raises:
+            ConfigError: a drive would go on for too long without its master.
+            BusError: the channel has a master, or the interface does not work.
+            DriveError: a drive is missing, is another one, or refuses its configuration; or, in
+                read-only, is not configured.
+            PlantFault: in read-only, somebody else is about to lead the drives.
+        """
+        if self.state is not LinkState.NEW:
+            return
+        try:
+            if self._read_only:
+                self._prepare_to_look()
+            else:
+                check_master_watch(self._config, speed=self._limits.command_speed)
+                self._hold()
+                self._prepare_to_move()
+            for node, poll in zip(self._config.nodes, self.cycle.polls, strict=True):
+                reading = self.bring_up.temperature(node)
+                if reading is not None:
+                    poll.take(reading)
+        except BaseException:
+            self._let_go()
+            raise
+        self.state = LinkState.CONFIGURED
+        if self._told is not None:
+            self._port.listener = self._told
+
+    def _hold(self) -> None:
+        self._lock.acquire()
+        self._holds = True
+
+    def _let_go(self) -> None:
+        if self._holds:
+            self._holds = False
+            self._lock.release()
+
+    def _prepare_to_move(self) -> None:
+        self.bring_up.listen()
+        self.bring_up.identify()
+        self.bring_up.unpower()
+        self.bring_up.glance()
+        self.bring_up.pre_operational()
+        for node in self._config.nodes:
+            self.bring_up.configure(node)
+            self.bring_up.check_soft_limits(node)
+            self.bring_up.preload(node)
+
+    def _prepare_to_look(self) -> None:
+        """Prepare a read-only link: listen to another master's SYNC, or send SYNC if there is none.
+
+        Raises:
+            BusError: a master of this computer holds the channel, and sends no SYNC yet.
+            DriveError: a drive is not configured, or somebody leads it without SYNC.
+            PlantFault: somebody else is about to lead them.
+        """
+        self._port.may_send = may_read
+        now_ns = self._port.timebase.now_ns()
+        self.listening = self.cycle.hears_sync(now_ns + LISTEN_NS)
+        self._start_up.listening = self.listening
+        if self.listening:
+            self.bring_up.lookout.rest()
+        else:
+            self._hold()
+            self.bring_up.listen()
+        self.bring_up.identify()
+        self.bring_up.refuse_differences()
+        if self.listening:
+            return
+        for node, watch in zip(self._config.nodes, self.cycle.watches, strict=True):
+            powered = self.bring_up.powered(node)
+            if powered or watch.state is NmtState.OPERATIONAL:
+                raise DriveError(
+                    f"drive '{node.name}' (node {node.node_id}) "
+                    f"{'has power' if powered else 'is operational'}, though nobody sends SYNC: "
+                    "somebody else leads it, and read-only does not interfere; end that program"
+                )
+        self._supervisor.alone()
+        self._port.may_send = may_pace(self._config.master_id)
+
+    def start(self, *, clear_faults: bool = False) -> Sample:
+        """Open if need be, let process data settle, enable all drives where they stand.
+
+        In read-only it settles only. With `clear_faults` a drive in fault is reset, once. A leg
+        that is found beyond its joint range or spring torque is not enabled.
+
+        Raises:
+            BusError, DriveError: as `open`; or a drive is in fault, or does not become enabled.
+            PlantFault: something went wrong after process data had begun.
+        """
+        self.open()
+        if self.state is not LinkState.CONFIGURED:
+            raise DriveError(
+                f"a link that is {self.state.name.lower()} cannot start; make a new one"
+            )
+        if not self._read_only and self.cycle.led_by_another():
+            self._supervisor.alone()  # It has come since `open`, and keeps the drives.
+        self.state = LinkState.CYCLIC
+        try:
+            self._start_up.settle(self._settling_tick)
+            if not self._read_only:
+                self._enable(clear_faults=clear_faults)
+        except PlantFault as error:
+            self._end(error)
+            raise
+        except BaseException:
+            self.stop()
+            raise
+        return self._sample()
+
+    def _enable(self, *, clear_faults: bool) -> None:
+        up = self._start_up
+        self._leads = True
+        if clear_faults:
+            words = "leave its fault, whose cause still stands"
+            up.seek(Goal.FAULT_RESET, up.faulted(), self._watched_tick, words)
+        for axis in up.faulted():
+            text = self.bring_up.error_text(axis.node)
+            raise DriveError(
+                f"drive '{axis.node.name}' (node {axis.node.node_id}) is in fault: {text}; remove "
+                "the cause, then start with a fault reset"
+            )
+        sample = self._sample()
+        self._check(sample)
+        self._guard.check_start(sample.motor_pos)
+        up.seek(Goal.ENABLED, self.cycle.axes, self._watched_tick, "become enabled")
+        # What the drives hold, not what their encoders show: the next target is the last one.
+        held = tuple(axis.target_pos for axis in self.cycle.axes)
+        self._guard.start_at(held)
+        self._expected = [held] * 2
+        self.state = LinkState.RUNNING
+
+    # --- the cycle ---------------------------------------------------------------------------
+
+    def exchange(self) -> Sample:
+        """Wait for the next tick and look at the drives.
+
+        Raises:
+            PlantFault: a watchdog or a limit; all drives have been stopped by then.
+        """
+        self._refuse_ended()
+        try:
+            if self.state is LinkState.CYCLIC:
+                self._watched_tick()
+                self._start_up.idle()
+                return self._sample()
+            self._watched_tick()
+            self._supervisor.states()
+            self.cycle.notices.statuswords(self.cycle.axes, self._last.time_ns)
+            sample = self._sample()
+            self._check(sample)
+        except PlantFault as error:
+            self._end(error)
+            raise
+        except BaseException:
+            self.stop()
+            raise
+        return sample
+
+    def look(self) -> Sample:
+        """Wait for the next tick and show what came, however late and incomplete it is.
+
+        In read-only, for those who measure: nothing has power, and no limit ends it.
+
+        Raises:
+            PlantFault: another master leads the drives.
+            DriveError: the link is not read-only, or not started.
+        """
+        self._refuse_ended()
+        if not self._read_only:
+            raise DriveError("this link may lead drives; limits have to watch it: use exchange")
+        try:
+            self._settling_tick()
+            self._start_up.idle()
+        except PlantFault as error:
+            self._end(error)
+            raise
+        except BaseException:
+            self.stop()
+            raise
+        return self._sample()
+
+    def command(self, motor_pos: Sequence[float]) -> tuple[float, ...]:
+        """Send a command for the coming period; what of it was applied [rad].
+
+        Raises:
+            PlantFault: it is not finite or jumps too far; all drives have been stopped by then.
+            DriveError: the drives are not enabled.
+        """
+        self._refuse_ended()
+        if self.state is not LinkState.RUNNING:
+            raise DriveError(
+                "this link is read-only" if self._read_only else "the drives are not enabled"
+            )
+        try:
+            applied = self._guard.command(motor_pos)
+            words = []
+            for axis, target in zip(self.cycle.axes, applied, strict=True):
+                axis.aim(target)
+                words.append(axis.machine.controlword)
+            self._expected = [self._expected[-1], applied]
+            self._supervisor.sent(complete=self.cycle.send(words))
+        except PlantFault as error:
+            self._end(error)
+            raise
+        except BaseException:
+            self.stop()
+            raise
+        return applied
+
+    def forget_wish(self) -> tuple[float, ...]:
+        """Measure the next step of the command from what was applied last; returns that [rad]."""
+        self._guard.forget_wish()
+        return self._guard.applied
+
+    @property
+    def shortfall(self) -> Shortfall:
+        """Counts of the commands that the limits changed before they were applied."""
+        return self._guard.shortfall
+
+    def move_to(self, motor_pos: Sequence[float], speed: float | None = None) -> Sample:
+        """Go to a posture at a speed [rad/s], `start_speed` of the bus file by default.
+
+        Raises:
+            ConfigError: the speed is not above 0 or too fast; nothing has moved.
+            PlantFault: as `exchange` and `command`; or it ends short of the posture.
+        """
+        pace = self._config.start_speed if speed is None else speed
+        check_start_speed(pace)
+        step = pace * self._config.period
+        wanted = tuple(float(value) for value in motor_pos)
+        if not all(map(math.isfinite, wanted)):
+            self.command(wanted)  # refused there, and the drives stopped
+        sample = self._sample()
+        while self._guard.applied != wanted:
+            before = self._guard.applied
+            applied = self.command(
+                [
+                    target
+                    if abs(target - last) <= step
+                    else last + (step if target > last else -step)
+                    for target, last in zip(wanted, before, strict=True)
+                ]
+            )
+            sample = self.exchange()
+            if applied == before:
+                break
+        for _ in range(2):
+            self.command(self._guard.applied)
+            sample = self.exchange()
+        self._check_arrived(wanted)
+        return sample
+
+    def _check_arrived(self, wanted: Sequence[float]) -> None:
+        applied, end = self._guard.applied, self._guard.reachable(wanted)
+        if not all(abs(a - b) < ARRIVED for a, b in zip(applied, end, strict=True)):
+            error = PlantFault(
+                "start posture",
+                f"the motors were led to {applied} rad, not to {end} rad; the move has failed",
+            )
+            self._end(error)
+            raise error
+
+    def _tick(self) -> Tick:
+        self._last = tick = self.cycle.follow() if self.listening else self.cycle.tick()
+        self.skipped_total += tick.skipped
+        return tick
+
+    def _settling_tick(self) -> Tick:
+        tick = self._tick()
+        self._supervisor.alone()
+        return tick
+
+    def _watched_tick(self) -> Tick:
+        tick = self._tick()
+        self._supervisor.bus(tick)
+        self._supervisor.drives()
+        return tick
+
+    def _sample(self) -> Sample:
+        return sample_of(self.cycle, self._last, self._stiffness, self._guard.applied)
+
+    def _check(self, sample: Sample) -> None:
+        self._guard.check(
+            motor_pos=sample.motor_pos,
+            joint_pos=sample.link_pos,
+            spring_torque=sample.spring_torque,
+            expected_pos=self._expected[0] if self._expected else None,
+            temperature=sample.temperature,
+            fresh=sample.fresh,
+            elapsed=1 + sample.skipped,
+        )
+
+    def _end(self, error: PlantFault) -> None:
+        """Keep the first cause, stop all drives at once."""
+        if self.fault is None:
+            self.fault = error
+        self.stop()
+
+    def _refuse_ended(self) -> None:
+        if self.fault is not None:
+            raise self.fault
+        if self.state not in (LinkState.CYCLIC, LinkState.RUNNING):
+            raise DriveError(f"the link is {self.state.name.lower()}; start it first")
+
+    # --- the end -----------------------------------------------------------------------------
+
+    def stop(self) -> None:
+        """Quick stop of all drives in this cycle, then no power, then a look whether it is gone.
+
+        Raises no error; `stopped` tells how it has ended. No signal gets in between: a ^C that
+        comes meanwhile is raised at the end. While the stop is not verified, calling it again
+        repeats it. Drives that another master took before this one led them are left to it.
+        """
+        if self.state not in (LinkState.CYCLIC, LinkState.RUNNING, LinkState.STOPPING):
+            return
+        with shielded() as shield:
+            self.state = LinkState.STOPPING
+            if self._read_only or (not self._leads and self._led_by_another(shield)):
+                self.state = LinkState.STOPPED
+            else:
+                self._note(StopLadder(self.cycle, shield.hold).run())
+
+    def close(self) -> None:
+        """Stop, leave the drives parked in pre-operational, release the channel; raises no error.
+
+        Twice is once. A stop that is not verified is repeated, in the end over SDO. A link that
+        only looks leaves the drives of another master alone.
+        """
+        if self.state is LinkState.NEW or self._closed:
+            return
+        with shielded() as shield:
+            looked = self.listening or self.state is LinkState.CONFIGURED
+            self.stop()
+            led = self._led_by_another(shield)
+            if not ((led and not self._leads) or (self._read_only and looked)):
+                order, nodes = self.bring_up.pre_operational, self._config.nodes
+                report = leave_operational(order, self._port, nodes, self.stopped, shield.hold)
+                if report is not None:
+                    self._note(report)
+            if not (self._read_only or led):
+                self._park(shield)
+            self._let_go()
+            self._closed = True
+            if self.state is not LinkState.STOPPING:
+                self.state = LinkState.STOPPED
+
+    def _note(self, report: StopReport) -> None:
+        """Remember how a stop has ended; one that repeats another keeps what that had to tell."""
+        self.stopped = report.after(self.stopped)
+        if report.verified:
+            self.state = LinkState.STOPPED
+
+    def _park(self, shield: Shield) -> None:
+        """Switch the drives' command frames off, so that no recorded log moves them."""
+        try:
+            powered = () if self.stopped is None else self.stopped.powered
+            self.not_parked = park(self._port, self._config, self.cycle.other, powered)
+        except BaseException as error:  # Whatever a driver raises, the channel is still released.
+            self.not_parked = [f"the drives are not parked: {error!r}"]
+            shield.hold(error)
+
+    def _led_by_another(self, shield: Shield) -> bool:
+        """Whether another master has been heard; where that cannot be told, by what is known."""
+        try:
+            return self.cycle.led_by_another()
+        except BaseException as error:  # Whatever a driver raises, the stop goes on.
+            shield.hold(error)
+            return self._read_only or self.cycle.stranger is not None

@@ -1,0 +1,116 @@
+"""How each drive notices that its master has died, and how soon it stands then; pure.
+
+A process that is killed, a computer that hangs and a cable that is pulled send no quick stop. What
+counts is therefore not the value of a key but a property: by at least one of its own means every
+drive stands within 100 ms of its master's last frame.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from legbench.drives.setup.config import CONTROLWORD, TARGET_POSITION, BusConfig, NodeConfig
+from legbench.drives.setup.configuration import HEARTBEATS_MISSED
+from legbench.drives.setup.stopping import QUICK_STOP_DECELERATION
+from legbench.errors import ConfigError
+from legbench.limits.upper_ends import MASTER_WATCH
+
+LONGEST_STOP_MS = 100.0
+"""Longest time from the last frame of the master to standstill of every drive [ms].
+
+A motor has gone 0.2 rad by then at the 2 rad/s of a move, which the series springs take up, and
+half of a joint's range at the 5 rad/s of a jump.
+"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Means:
+    """One way in which a drive notices that its master is gone."""
+
+    name: str
+    """Name of the object that makes the drive notice."""
+    time_ms: float
+    """Longest time from the last frame of the master to the reaction of the drive [ms]."""
+    ramp_ms: float
+    """Time from the reaction to standstill, on the quick-stop ramp 6085h [ms]."""
+
+    @property
+    def stop_ms(self) -> float:
+        """Longest time from the last frame of the master to standstill [ms]."""
+        return self.time_ms + self.ramp_ms
+
+
+def means_of(
+    config: BusConfig, node: NodeConfig, *, speed: float = math.inf, commands: bool = True
+) -> tuple[Means, ...]:
+    """Return every means that a drive has, the fastest first.
+
+    The heartbeat consumer (1016h) and the deadline of an RPDO (140xh:05) lead to the quick stop of
+    6007h, all written and read back before a drive is enabled. A watch over SYNC (1006h)
+    is not counted: CiA 301 leaves what follows to the maker of the drive.
+
+    Args:
+        config: the bus.
+        node: one of its drives.
+        speed: highest speed of the motor; without one, or a ramp in the bus file, the ramp counts
+            as no time [rad/s].
+        commands: RPDOs are sent, as in a run; the deadline of one that never comes never ends.
+    """
+    ramp_ms = _ramp_ms(node, speed)
+    # A drive looks at its timers once in a cycle of its own.
+    late_ms = 1e-3 * config.period_us
+    found: list[tuple[str, float]] = []
+    if node.heartbeat_consumer:
+        time_ms = HEARTBEATS_MISSED * config.master_heartbeat_ms
+        found.append(("heartbeat consumer 1016h", time_ms))
+    for pdo in node.rpdos if commands else ():
+        leads = CONTROLWORD in pdo.objects or TARGET_POSITION in pdo.objects
+        if leads and pdo.deadline_ms:
+            name = f"deadline of RPDO{pdo.number} {0x1400 + pdo.number - 1:04X}h:05"
+            found.append((name, pdo.deadline_ms))
+    means = [
+        Means(name=name, time_ms=time_ms + late_ms, ramp_ms=ramp_ms) for name, time_ms in found
+    ]
+    return tuple(sorted(means, key=lambda one: one.time_ms))
+
+
+def _ramp_ms(node: NodeConfig, speed: float) -> float:
+    """Time of a quick stop from a speed; 0 where one of the two is not known [ms]."""
+    ramp = [one.value for one in node.parameters if one.key == QUICK_STOP_DECELERATION]
+    if not ramp or ramp[-1] <= 0 or not math.isfinite(speed):
+        return 0.0
+    return 1e3 * speed * abs(node.motor.counts_per_rad) / ramp[-1]
+
+
+def check_master_watch(
+    config: BusConfig, *, speed: float = math.inf, commands: bool = True
+) -> None:
+    """Refuse a bus whose drives would go on without their master; arguments as for `means_of`.
+
+    Raises:
+        ConfigError: a drive has no means, or stands later than 100 ms after its master's death, and
+            the bus file does not waive "master watch".
+    """
+    if MASTER_WATCH in config.waive:
+        return
+    for node in config.nodes:
+        means = means_of(config, node, speed=speed, commands=commands)
+        if means and means[0].stop_ms <= LONGEST_STOP_MS:
+            continue
+        raise ConfigError(
+            f"drive '{node.name}' would not stand within {LONGEST_STOP_MS:g} ms of its master's "
+            f"death: {_describe(means)}; give its RPDO a deadline_ms, lower master_heartbeat_ms or "
+            f'raise 6085h, or waive = ["{MASTER_WATCH}"] in the bus file'
+        )
+
+
+def _describe(means: Sequence[Means]) -> str:
+    if not means:
+        return "it has no means to notice it"
+    return ", ".join(f"{one.stop_ms:.1f} ms by its {one.name}" for one in means)
+
+
+def stop_ms(config: BusConfig, *, speed: float = math.inf) -> float:
+    """Latest standstill of any drive after its master's death, infinite where one has no means."""
+    means = [means_of(config, node, speed=speed) for node in config.nodes]
+    return max(entry[0].stop_ms if entry else math.inf for entry in means)

@@ -1,0 +1,1 @@
+"""Interfaces, channel locks, real time and the time bases of a bus."""

@@ -1,0 +1,1 @@
+"""Safety limits of a leg, enforced in the lowest layer of every plant; pure."""

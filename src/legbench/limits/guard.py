@@ -1,0 +1,225 @@
+"""The limits of one leg, enforced cycle by cycle in the lowest layer of every plant; pure."""
+
+import math
+from collections.abc import Sequence
+from typing import final
+
+from legbench.errors import PlantFault
+from legbench.limits.knee import along, knee_of, project
+from legbench.limits.plausibility import LinkWatch, MotorWatch
+from legbench.limits.safety import START_TOLERANCE, UNLIMITED, SafetyLimits
+from legbench.limits.shortfall import Shortfall
+
+
+@final
+class Guard:
+    """Applies the limits to one leg, cycle by cycle; keeps the first cause.
+
+    Attributes:
+        applied: the command as it was let through (one value an axis) [rad].
+        shortfall: which wishes were let through otherwise than wished.
+    """
+
+    def __init__(self, limits: SafetyLimits, period: float) -> None:
+        self._limits = limits
+        self._step_max = limits.command_speed * period
+        self._knee = None if limits.motor_knee_range == UNLIMITED else limits.motor_knee_range
+        self._wish: tuple[float, ...] | None = None
+        bounds = limits.bounds(period)
+        self._motors = tuple(MotorWatch(bounds) for _ in limits.motor_range)
+        self._links = LinkWatch(bounds)
+        self.applied: tuple[float, ...] = ()
+        self.shortfall = Shortfall(period)
+
+    def start_at(self, motor_pos: Sequence[float]) -> None:
+        """Begin from where the motors are, whatever was commanded before [rad]."""
+        self.applied = tuple(float(value) for value in motor_pos)
+        self._wish = None
+        for watch, value in zip(self._motors, self.applied, strict=False):
+            watch.start_at(value)
+        self._links.start()
+        self.shortfall.restart()
+
+    def forget_wish(self) -> None:
+        """Measure the next step of the command from what was applied last."""
+        self._wish = None
+
+    def command(self, wish: Sequence[float]) -> tuple[float, ...]:
+        """What of a wish may go to the motors: clamped to the ranges, slewed [rad].
+
+        Raises:
+            PlantFault: the wish is not finite or jumps too far; `applied` stands.
+        """
+        self._check_wish(wish)
+        step, last, asked = self._step_max, self.applied, tuple(wish)
+        self._wish = asked
+        self.shortfall.cycles += 1
+        if self._allows(asked):
+            self.applied = asked
+            return asked
+        # From outside a range the way leads back no faster than wished.
+        boxes = [
+            (min(low, value), max(high, value))
+            for value, (low, high) in zip(last, self._limits.motor_range, strict=True)
+        ]
+        wanted = tuple(
+            [min(max(value, low), high) for value, (low, high) in zip(asked, boxes, strict=True)]
+        )
+        knee = self._knee
+        if knee is not None:
+            knee = (min(knee[0], knee_of(last)), max(knee[1], knee_of(last)))
+            wanted = project(wanted, knee, boxes)
+        applied = tuple(
+            [
+                min(max(value, before - step), before + step)
+                for value, before in zip(wanted, last, strict=True)
+            ]
+        )
+        if knee is not None and not knee[0] <= knee_of(applied) <= knee[1]:
+            applied = along(last, wanted, step)
+        if applied != asked:
+            self.shortfall.count(asked, wanted, applied)
+        self.applied = applied
+        return applied
+
+    def _allows(self, wish: tuple[float, ...]) -> bool:
+        """Whether a wish lies within all ranges, and within reach of one cycle."""
+        step = self._step_max
+        for value, last, (low, high) in zip(
+            wish, self.applied, self._limits.motor_range, strict=True
+        ):
+            if not (low <= value <= high and -step <= value - last <= step):
+                return False
+        return self._knee is None or self._knee[0] <= knee_of(wish) <= self._knee[1]
+
+    def _check_wish(self, wish: Sequence[float]) -> None:
+        before = self.applied if self._wish is None else self._wish
+        limit = self._limits.command_step
+        for motor, (value, wished) in enumerate(zip(wish, before, strict=True), start=1):
+            if not math.isfinite(value):
+                raise PlantFault(
+                    "command not finite",
+                    f"the command of motor {motor} is {value} rad; the controller has failed",
+                )
+            if abs(value - wished) > limit:
+                raise PlantFault(
+                    "command step",
+                    f"the command of motor {motor} jumps by {abs(value - wished):.3f} rad in one "
+                    f"cycle, the limit is {limit:g} rad; smooth it",
+                )
+
+    def reachable(self, wish: Sequence[float]) -> tuple[float, ...]:
+        """What of a wish the ranges let through, in the end [rad]."""
+        boxes = self._limits.motor_range
+        clamped = tuple(
+            min(max(value, low), high) for value, (low, high) in zip(wish, boxes, strict=True)
+        )
+        return clamped if self._knee is None else project(clamped, self._knee, boxes)
+
+    def check_start(self, motor_pos: Sequence[float]) -> None:
+        """Refuse motors that stand outside their range before they are enabled [rad].
+
+        Raises:
+            PlantFault: one is outside its range.
+        """
+        for axis, (value, (low, high)) in enumerate(
+            zip(motor_pos, self._limits.motor_range, strict=True), start=1
+        ):
+            if not low - START_TOLERANCE <= value <= high + START_TOLERANCE:
+                raise PlantFault(
+                    "motor range",
+                    f"motor {axis} stands at {value:.3f} rad, the limits are [{low:g}, {high:g}] "
+                    "rad; move it back by hand before it is enabled",
+                )
+        self._check_start_knee(motor_pos)
+
+    def _check_start_knee(self, motor_pos: Sequence[float]) -> None:
+        if self._knee is None:
+            return
+        low, high = self._knee
+        if not low - START_TOLERANCE <= knee_of(motor_pos) <= high + START_TOLERANCE:
+            raise PlantFault(
+                "motor range",
+                f"the motors stand with q2 - q1 at {knee_of(motor_pos):.3f} rad, the limits are "
+                f"[{low:g}, {high:g}] rad; move them back by hand before they are enabled",
+            )
+
+    def check(
+        self,
+        *,
+        motor_pos: Sequence[float],
+        joint_pos: Sequence[float],
+        spring_torque: Sequence[float],
+        expected_pos: Sequence[float] | None = None,
+        temperature: Sequence[float | None] = (),
+        fresh: Sequence[bool] = (True, True),
+        elapsed: int = 1,
+    ) -> None:
+        """Look at what a cycle showed.
+
+        Args:
+            motor_pos: motors [rad].
+            joint_pos: links [rad].
+            spring_torque: of the series springs [N m].
+            expected_pos: command that should act by now; None while nothing is commanded [rad].
+            temperature: of each drive, None if it is not known [deg C].
+            fresh: which drives have told something new in this cycle.
+            elapsed: periods since the cycle before.
+
+        Raises:
+            PlantFault: a limit is exceeded.
+        """
+        limits = self._limits
+        for axis, (value, (low, high)) in enumerate(
+            zip(joint_pos, limits.joint_range, strict=True), start=1
+        ):
+            if not low <= value <= high:
+                raise PlantFault(
+                    "joint range",
+                    f"joint {axis} is at {value:.3f} rad, the limits are [{low:g}, {high:g}] rad",
+                )
+        self._check_knee(joint_pos)
+        for axis, value in enumerate(spring_torque, start=1):
+            if not abs(value) <= limits.spring_torque:
+                raise PlantFault(
+                    "spring torque",
+                    f"spring {axis} carries {value:.3f} N m, the limit is "
+                    f"{limits.spring_torque:g} N m",
+                )
+        for axis, value in enumerate(temperature, start=1):
+            if value is not None and value > limits.temperature:
+                raise PlantFault(
+                    "temperature",
+                    f"drive {axis} is at {value:.1f} deg C, the limit is "
+                    f"{limits.temperature:g} deg C; let it cool down",
+                )
+        if expected_pos is not None:
+            self._check_encoders(motor_pos, joint_pos, expected_pos, fresh, elapsed)
+
+    def _check_knee(self, joint_pos: Sequence[float]) -> None:
+        low, high = self._limits.joint_knee_range
+        if (low, high) != UNLIMITED and not low <= knee_of(joint_pos) <= high:
+            raise PlantFault(
+                "joint range",
+                f"q2 - q1 is at {knee_of(joint_pos):.3f} rad, the limits are [{low:g}, {high:g}] "
+                "rad: the knee has gone through its stop",
+            )
+
+    def _check_encoders(
+        self,
+        motor_pos: Sequence[float],
+        joint_pos: Sequence[float],
+        expected_pos: Sequence[float],
+        fresh: Sequence[bool],
+        elapsed: int,
+    ) -> None:
+        found = None
+        for axis, watch in enumerate(self._motors):
+            found = watch.see(axis + 1, motor_pos[axis], expected_pos[axis]) or found
+        doubt = self._links.see(motor_pos, joint_pos, expected_pos, fresh, elapsed)
+        if found is None and doubt is not None:
+            # A motor that is not where it should be makes the springs sway, too: it is the cause.
+            suspects = [watch.suspicion for watch in self._motors if watch.suspicion is not None]
+            found = suspects[0] if suspects else doubt
+        if found is not None:
+            raise PlantFault(found.cause, found.message)

@@ -1,0 +1,239 @@
+"""Whether motors and encoders still work: what a healthy leg can show, and what it cannot.
+
+Nothing here knows a bus or a plant; angles go in a cycle at a time, a `Doubt` comes out. Time is
+counted in cycles, the same data give the same answer.
+"""
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, final
+
+STANDING_CYCLES = 20
+"""A link that stands for so long while the other one swings is dead."""
+STANDING_BAND = 0.002
+"""A link within this band stands: more than one count of an encoder of 4 096 a turn [rad]."""
+SWAY_CYCLES = 4
+"""Cycles that a sway lasts before it counts; late process data repeat for up to three."""
+MEMORY = 1.0
+"""Time constant in which the sway's reference follows what lasts, such as an offset [s]."""
+SWAY_DELAY = 0.25
+"""A sway this old is what the leg does; a younger one may be a fault's [s]."""
+SWAY_MEMORY = 5.0
+"""Time constant in which a sway is forgotten: a dozen hops, each of which may swing it on [s]."""
+SWAY_GROWTH = 1.5
+"""A leg that sways may sway so much more, relative to what it did [-]."""
+POLAR_GAIN = 10.0
+"""What a command along the polar mode may cause there, relative to it, in resonance [-]."""
+
+
+class Doubt(NamedTuple):
+    """A reading that no healthy leg shows."""
+
+    cause: str
+    message: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bounds:
+    """What a healthy leg stays within; a bound that is infinite does not act."""
+
+    period: float
+    """[s]"""
+    following_error: float
+    """Distance of a motor from everything that a healthy position loop could show [rad]."""
+    following_cycles: int
+    """Cycles that it may last."""
+    servo_bandwidth: float
+    """Corner frequency of the slowest position loop that is healthy [Hz]."""
+    joint_speed: float
+    """[rad/s]"""
+    standing: float
+    """Motion of the other link during which no link stands still [rad]."""
+    sway: float
+    """Motion of q1 + q2 that nobody has commanded [rad]."""
+
+
+@final
+class MotorWatch:
+    """Compares one motor with all position loops that are healthy.
+
+    A first-order loop of any bandwidth between `servo_bandwidth` and infinity, led by the same
+    commands, is always found between two bounds: from the far one the slowest loop comes, at the
+    near one an ideal loop is already. The bounds close upon a command that rests.
+
+    Attributes:
+        suspicion: what is wrong in this cycle, though it may not have lasted yet.
+    """
+
+    def __init__(self, bounds: Bounds) -> None:
+        self._bounds = bounds
+        self._gain = 1.0 - math.exp(-2.0 * math.pi * bounds.servo_bandwidth * bounds.period)
+        self._low = self._high = 0.0
+        self._age = 0
+        self.suspicion: Doubt | None = None
+
+    def start_at(self, position: float) -> None:
+        """Begin with a motor that stands at `position` [rad]."""
+        self._low = self._high = position
+        self._age = 0
+
+    def see(self, motor: int, position: float, expected: float) -> Doubt | None:
+        """Compare a motor's position with the command that should act by now [rad]."""
+        low, high, gain = self._low, self._high, self._gain
+        self._low = low = expected if expected < low else low + gain * (expected - low)
+        self._high = high = expected if expected > high else high + gain * (expected - high)
+        excess = max(low - position, position - high)
+        limit = self._bounds.following_error
+        if excess <= limit:
+            self._age, self.suspicion = 0, None
+            return None
+        self._age += 1
+        self.suspicion = Doubt(
+            "following error",
+            f"motor {motor} shows {position:.3f} rad and is {excess:.3f} rad away from where its "
+            f"commands lead any drive, for {self._age} cycles; the limit is {limit:g} rad: it is "
+            "jammed, its encoder is dead, or its position loop is slower than servo_bandwidth",
+        )
+        return self.suspicion if self._age > self._bounds.following_cycles else None
+
+
+@final
+class LinkWatch:
+    """Compares both link encoders with each other and with the motors.
+
+    A link faster than `joint_speed` is none. On the radial mode, q1 = -q2, along which all
+    controllers lead the leg, two more things do not happen: one link stands while the other one
+    swings; and the links sway along the polar mode, q1 + q2. Both bounds widen with the sway of
+    the seconds before, since a hop in place sways more from hop to hop, and with what is commanded
+    along the polar mode, such as a jog of one motor: a leg that is led along it is not watched in
+    this way. The references follow what lasts, such as an offset or the weight.
+    """
+
+    def __init__(self, bounds: Bounds) -> None:
+        self._bounds = bounds
+        self._step_max = bounds.joint_speed * bounds.period
+        self._forget = bounds.period / MEMORY
+        self._fade = 1.0 - bounds.period / SWAY_MEMORY
+        self._delay = round(SWAY_DELAY / bounds.period)
+        self._watches_standing = math.isfinite(bounds.standing)
+        self._restart()
+
+    def _restart(self) -> None:
+        self._last: list[float] = []
+        self._silent = [0, 0]
+        self._sway_age = 0
+        self._sway_rest = self._led_rest = self._led = self._swayed = 0.0
+        self._young = deque[float]()
+        self._links = (_window(), _window())
+        self._springs = (_window(), _window())
+
+    def start(self) -> None:
+        """Begin anew with whatever is shown next."""
+        self._restart()
+
+    def see(
+        self,
+        motor_pos: Sequence[float],
+        joint_pos: Sequence[float],
+        commands: Sequence[float],
+        fresh: Sequence[bool],
+        elapsed: int,
+    ) -> Doubt | None:
+        """Compare the readings of a cycle.
+
+        Args:
+            motor_pos: motors [rad].
+            commands: what they should follow [rad].
+            joint_pos: links [rad].
+            fresh: which drives have told something new.
+            elapsed: periods since the readings before.
+        """
+        if not self._last:
+            self._last = list(joint_pos)
+            self._sway_rest = sum(joint_pos)
+            self._led_rest = sum(commands)
+        polar, forget = sum(commands), self._forget
+        self._led_rest += forget * (polar - self._led_rest)
+        self._led = max(self._led * (1.0 - forget), abs(polar - self._led_rest))
+        doubt = self._speed(joint_pos, fresh, elapsed)
+        doubt = self._sway(joint_pos) or doubt
+        return self._standing(motor_pos, joint_pos, fresh) or doubt
+
+    def _speed(
+        self, joint_pos: Sequence[float], fresh: Sequence[bool], elapsed: int
+    ) -> Doubt | None:
+        doubt = None
+        for place, value in enumerate(joint_pos):
+            self._silent[place] += elapsed
+            if not fresh[place]:
+                continue
+            step, cycles = abs(value - self._last[place]), self._silent[place]
+            self._last[place], self._silent[place] = value, 0
+            if step > self._step_max * cycles:
+                doubt = Doubt(
+                    "joint speed",
+                    f"joint {place + 1} moved by {step:.3f} rad in {cycles} cycles, "
+                    f"{step / (cycles * self._bounds.period):.0f} rad/s; the limit is "
+                    f"{self._bounds.joint_speed:g} rad/s: look at its encoder",
+                )
+        return doubt
+
+    def _sway(self, joint_pos: Sequence[float]) -> Doubt | None:
+        polar = sum(joint_pos)
+        self._sway_rest += self._forget * (polar - self._sway_rest)
+        sway = abs(polar - self._sway_rest)
+        self._young.append(sway)
+        if len(self._young) > self._delay:
+            self._swayed = max(self._swayed * self._fade, self._young.popleft())
+        limit = self._bounds.sway + self._widening
+        self._sway_age = self._sway_age + 1 if sway > limit else 0
+        if self._sway_age < SWAY_CYCLES:
+            return None
+        return Doubt(
+            "sway",
+            f"the links sway by {sway:.3f} rad along q1 + q2, where the motors have not led "
+            f"them; the limit is {limit:.3f} rad: look at the link encoders, or raise sway for a "
+            "leg that is pushed from outside",
+        )
+
+    @property
+    def _widening(self) -> float:
+        """What the leg may do along the polar mode, from what it did and was led to do [rad]."""
+        return SWAY_GROWTH * self._swayed + POLAR_GAIN * self._led
+
+    def _standing(
+        self, motor_pos: Sequence[float], joint_pos: Sequence[float], fresh: Sequence[bool]
+    ) -> Doubt | None:
+        if not (self._watches_standing and all(fresh)):
+            return None
+        for place in (0, 1):
+            self._links[place].append(joint_pos[place])
+            self._springs[place].append(joint_pos[place] - motor_pos[place])
+        if len(self._links[0]) < STANDING_CYCLES:
+            return None
+        limit = self._bounds.standing + self._widening
+        for place in (0, 1):
+            shown = self._links[place]
+            if abs(shown[-1] - shown[0]) > STANDING_BAND or _range(shown) > STANDING_BAND:
+                continue
+            # A link that its motor merely carries along pulls at nothing: the spring must work.
+            moved = min(_range(self._links[1 - place]), _range(self._springs[1 - place]))
+            if moved > limit:
+                return Doubt(
+                    "joint encoder",
+                    f"joint {place + 1} stands at {joint_pos[place]:.3f} rad for "
+                    f"{STANDING_CYCLES} cycles, in which the other one moved by {moved:.3f} rad; "
+                    f"the limit is {limit:.3f} rad: its encoder is dead, or the "
+                    "link is blocked",
+                )
+        return None
+
+
+def _window() -> deque[float]:
+    return deque(maxlen=STANDING_CYCLES)
+
+
+def _range(values: deque[float]) -> float:
+    return max(values) - min(values)

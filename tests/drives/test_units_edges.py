@@ -1,0 +1,77 @@
+"""Counts and angles by their numbers: the formula, the ends of what an axis has, the seams."""
+
+import math
+from typing import Any
+
+import pytest
+
+from legbench.drives.setup.units import AxisUnits, Unwrapper, unwrap, wrap
+from legbench.errors import ConfigError
+
+
+def axis(**changes: Any) -> AxisUnits:
+    return AxisUnits(**{"counts_per_rev": 4096, **changes})
+
+
+@pytest.mark.parametrize(
+    ("name", "takes", "refuses"),
+    [
+        ("counts_per_rev", (1, 1 << 31), (0, -1, (1 << 31) + 1)),
+        ("gear", (1e-4, 1e4), (0.99e-4, 1.01e4, 0.0, -1.0, math.nan)),
+        ("offset_counts", (1 - (1 << 31), (1 << 31) - 1), (-(1 << 31), 1 << 31)),
+        ("sign", (-1, 1), (0, 2, -2)),
+        ("bits", (16, 32), (8, 15, 17, 31, 33, 64)),
+    ],
+)
+def test_an_axis_takes_its_numbers_up_to_their_ends(
+    name: str, takes: tuple[Any, ...], refuses: tuple[Any, ...]
+) -> None:
+    for value in takes:
+        assert getattr(axis(**{name: value}), name) == value
+    for value in refuses:
+        with pytest.raises(ConfigError, match=f"^{name} is "):
+            axis(**{name: value})
+
+
+def test_a_plain_axis_turns_with_its_encoder() -> None:
+    plain = AxisUnits(counts_per_rev=4096)
+    assert (plain.gear, plain.sign, plain.offset_counts, plain.bits) == (1.0, 1, 0, 32)
+    assert plain.to_counts(math.pi) == 2048
+    assert plain.to_rad(1024) == pytest.approx(0.5 * math.pi)
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_counts_are_offset_and_turns_of_the_encoder(sign: int) -> None:
+    units = AxisUnits(counts_per_rev=4096, gear=50.0, sign=sign, offset_counts=100)
+    assert units.resolution == pytest.approx(2.0 * math.pi / (50 * 4096))
+    for turns in (-0.5, 0.0, 0.25, 3.0):
+        counts = 100 + sign * round(turns * 50 * 4096)
+        assert units.to_counts(2.0 * math.pi * turns) == counts
+        assert units.to_rad(counts) == pytest.approx(2.0 * math.pi * turns)
+    # To the nearest count.
+    count = units.resolution
+    assert units.to_counts(0.49 * count) == 100
+    assert units.to_counts(0.51 * count) == 100 + sign
+
+
+def test_a_position_object_wraps_at_half_its_range() -> None:
+    shown = {32_767: 32_767, 32_768: -32_768, -32_768: -32_768, -32_769: 32_767, 65_536: 0}
+    for counts, value in shown.items():
+        assert wrap(counts, 16) == value
+    half = 1 << 31
+    for counts, value in {half - 1: half - 1, half: -half, -half - 1: half - 1, 0: 0}.items():
+        assert wrap(counts) == wrap(counts, 32) == value
+
+
+@pytest.mark.parametrize("bits", [16, 32])
+def test_a_position_is_the_nearest_that_shows_the_same(bits: int) -> None:
+    whole, half = 1 << bits, 1 << (bits - 1)
+    for near in (0, 5 * whole + 17, -3 * whole - 4):
+        for move in (0, 1, -1, half - 1, -half, 12_345):
+            shown = wrap(near + move, bits)
+            assert unwrap(shown, near, bits) == near + move
+            follower = Unwrapper(bits, near)
+            assert follower.feed(shown) == near + move == follower.counts
+        # Half the range and beyond is nearer from the other side.
+        assert unwrap(wrap(near + half, bits), near, bits) == near - half
+    assert unwrap(-half if bits == 32 else 7, 0) == (-half if bits == 32 else 7)

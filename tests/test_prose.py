@@ -1,0 +1,41 @@
+"""Laws over the prose and the size of the sources."""
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+SOURCES = sorted((Path(__file__).parents[1] / "src").rglob("*.py"))
+FIRST_WORDS = re.compile(
+    r"(of|and|that|with|in|on|at|by|for|from|to|into|onto|under|over|between|beside|beyond|but|or"
+    r"|so|like|as|than|then|after|before|until|while|where|when|within|without|through|against"
+    r"|across|along|among|around|behind|below|above|if|because|though|although|since|nor|yet"
+    r"|the same)\b",
+    re.IGNORECASE,
+)
+"""Prepositions and conjunctions: a docstring that begins with one leans on its neighbour."""
+
+
+def docstrings(tree: ast.AST) -> Iterator[tuple[int, str]]:
+    """Line and text of every docstring, those of attributes and constants included."""
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        if not isinstance(body, list):
+            continue
+        for before, here in zip([None, *body], body, strict=False):
+            first = before is None and not isinstance(node, ast.If | ast.For | ast.While | ast.With)
+            value = here.value if isinstance(here, ast.Expr) else None
+            if not isinstance(value, ast.Constant) or not isinstance(value.value, str):
+                continue
+            if first or isinstance(before, ast.Assign | ast.AnnAssign):
+                yield here.lineno, value.value.strip()
+
+
+def test_docstrings_can_be_read_alone() -> None:
+    found = [
+        f"{path.name}:{line}: {text.splitlines()[0]}"
+        for path in SOURCES
+        for line, text in docstrings(ast.parse(path.read_text(encoding="utf-8")))
+        if FIRST_WORDS.match(text)
+    ]
+    assert found == []
