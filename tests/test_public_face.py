@@ -6,6 +6,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -111,6 +112,25 @@ def test_drives_in_real_time_need_a_folder(
     with pytest.raises(ConfigError, match="recorded in a folder only; give out"):
         legbench.run(hop)
     assert closed == [True]
+
+
+def test_a_controller_of_a_notebook_runs_in_memory_and_needs_a_file_for_a_folder(
+    hop: legbench.Experiment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delattr(sys.modules["__main__"], "__file__", raising=False)
+    cell = (MODELS.parent / "scripts" / "examples" / "own_controller.py").read_text("utf-8")
+    names: dict[str, Any] = {"__name__": "__main__"}
+    exec(compile(cell, "<cell>", "exec"), names)
+    chosen = replace(
+        hop, controller=names["Pump"](), setup=legbench.Setup(kind=legbench.SetupKind.FFS)
+    )
+    run = legbench.run(chosen)
+    assert run.complete
+    assert np.array_equal(run["fold_rate"], run["joint_vel"] @ [-0.5, 0.5])
+    assert run.manifest["experiment"]["controller"]["kind"] == "pump"
+    with pytest.raises(ConfigError, match="'pump' has no file that another process could find"):
+        legbench.run(chosen, tmp_path)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_an_interruption_goes_on_to_the_caller_once_the_run_is_whole(
