@@ -10,11 +10,12 @@ import pytest
 
 from legbench.clock import AbstractClock, VirtualClock, WallClock
 from legbench.control import AbstractController
+from legbench.control.jump_rules import JumpPhase
 from legbench.errors import PlantFault, RecordingError
 from legbench.interrupts import StopFlag, stop_on_interrupt
 from legbench.loop import PROGRESS_EVERY, run
 from legbench.plant.abstract import AbstractPlant
-from legbench.signals import Command, Floats, Observation, Phase
+from legbench.signals import Command, Floats, Observation
 
 PERIOD = 0.001
 
@@ -296,8 +297,8 @@ def test_a_plant_is_closed_at_the_end_of_its_block() -> None:
 
 
 def test_holding_is_resting() -> None:
-    assert Command.holding(np.zeros(2)).phase == Phase.REST
-    assert Command.holding(np.zeros((4, 2))).phase.tolist() == [Phase.REST] * 4
+    assert Command.holding(np.zeros(2)).phase == JumpPhase.REST
+    assert Command.holding(np.zeros((4, 2))).phase.tolist() == [JumpPhase.REST] * 4
 
 
 class Unsafe(AbstractPlant):
@@ -526,7 +527,9 @@ def test_what_is_no_command_ends_the_run_and_names_the_step(answer: object, word
     assert re.search(r"\n  .*test_loop\.py:\d+ in step: def step\(", outcome.message)
 
 
-@pytest.mark.parametrize("phase", [3, Phase.PUSH, np.int64(3), np.array(3), np.array(3, np.int8)])
+@pytest.mark.parametrize(
+    "phase", [3, JumpPhase.PUSH, np.int64(3), np.array(3), np.array(3, np.int8)]
+)
 def test_a_phase_may_be_an_integer_of_any_kind(phase: object) -> None:
     outcome = run(ToldPlant(Told()), Wrong(command(np.zeros(2), phase)), 10)
     assert outcome.status == "complete"

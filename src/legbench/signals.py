@@ -6,7 +6,6 @@ forward: `q1` is the thigh (and the foot, parallel to it), `q2` the shank.
 """
 
 from dataclasses import dataclass
-from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,29 +13,8 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Ints = NDArray[np.int64]
-
-
-class Phase(IntEnum):
-    """What a controller is doing; recorded in every row."""
-
-    REST = 0
-    """Holding the rest posture, nothing commanded yet."""
-    STEPPED = 1
-    """Position jump: the equilibrium has been moved."""
-    MIDDLE = 2
-    """Three-level bang-bang: the equilibrium at the rest posture."""
-    FOLDED = 3
-    """Bang-bang: the equilibrium at z2 + dz2 (shorter leg)."""
-    STRETCHED = 4
-    """Bang-bang: the equilibrium at z2 - dz2 (longer leg)."""
-    FLIGHT = 5
-    """Jump: unloaded, waiting for the load of touchdown."""
-    COMPRESS = 6
-    """Jump: loaded, the leg shortens towards the lower apex."""
-    PUSH = 7
-    """Jump: the equilibrium at the longer leg, past the lower apex."""
-    RELEASE = 8
-    """Jump: unloaded after the push, the equilibrium goes back to the shorter leg."""
+REST = 0
+"""Code of the phase at rest, which every controller that is built in declares."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,7 +75,7 @@ class Command:
     @classmethod
     def holding(cls, motor_pos: Floats) -> "Command":
         """Stay at `motor_pos` (..., 2) [rad], at rest."""
-        phase = np.full(motor_pos.shape[:-1], Phase.REST, dtype=np.int64)
+        phase = np.full(motor_pos.shape[:-1], REST, dtype=np.int64)
         return cls(motor_pos=motor_pos, phase=phase)
 
 

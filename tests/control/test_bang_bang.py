@@ -5,6 +5,8 @@ import pytest
 from torque_traces import Pulled
 
 from legbench.control import BangBang, BangBangConfig, LegTargets
+from legbench.control.bang_bang import BangBangPhase
+from legbench.control.jump_rules import JumpPhase
 from legbench.design import LegDesign
 from legbench.design.setup import Setup, SetupKind
 from legbench.design.statics import Support
@@ -14,7 +16,7 @@ from legbench.mjcf import BuildOptions, Linkage, LinkageKind
 from legbench.plant.sim import SimPlant
 from legbench.plant.start import Start
 from legbench.servo import ServoConfig
-from legbench.signals import Floats, Phase
+from legbench.signals import Floats
 
 SLOW = ServoConfig(slew_rate=4.0, bandwidth=30.0, delay_cycles=3)
 EARLY = BangBangConfig(delay=0.005)
@@ -71,11 +73,11 @@ def test_it_rests_first_and_kicks_to_the_longer_leg(optimal: LegDesign, three_le
     leg = pulled(optimal, replace(EARLY, three_levels=three_levels))
     for _ in range(5):
         command = leg.pull(0.0)
-        assert command.phase == Phase.REST
+        assert command.phase == JumpPhase.REST
         assert np.allclose(joint_to_modal(command.motor_pos), [0.0, EARLY.z2])
     for _ in range(30):
         command = leg.pull(0.0)
-        assert command.phase == Phase.STRETCHED
+        assert command.phase == BangBangPhase.STRETCHED
         assert np.allclose(joint_to_modal(command.motor_pos), [0.0, EARLY.z2 - EARLY.dz2])
 
 
@@ -83,13 +85,13 @@ def test_two_levels_switch_at_the_threshold_and_hold_between(optimal: LegDesign)
     leg, eps = pulled(optimal, EARLY), EARLY.threshold
     leg.pull(0.0, 6)
     for torque, phase in (
-        (-1.1 * eps, Phase.STRETCHED),
-        (0.0, Phase.STRETCHED),
-        (0.99 * eps, Phase.STRETCHED),
-        (1.01 * eps, Phase.FOLDED),
-        (0.0, Phase.FOLDED),
-        (-0.99 * eps, Phase.FOLDED),
-        (-1.01 * eps, Phase.STRETCHED),
+        (-1.1 * eps, BangBangPhase.STRETCHED),
+        (0.0, BangBangPhase.STRETCHED),
+        (0.99 * eps, BangBangPhase.STRETCHED),
+        (1.01 * eps, BangBangPhase.FOLDED),
+        (0.0, BangBangPhase.FOLDED),
+        (-0.99 * eps, BangBangPhase.FOLDED),
+        (-1.01 * eps, BangBangPhase.STRETCHED),
     ):
         assert leg.phase(torque, 3) == phase
     command = leg.pull(2.0 * eps)
@@ -100,11 +102,11 @@ def test_three_levels_return_to_the_middle(optimal: LegDesign) -> None:
     leg, eps = pulled(optimal, replace(EARLY, three_levels=True)), EARLY.threshold
     leg.pull(0.0, 6)
     for torque, phase in (
-        (-1.1 * eps, Phase.STRETCHED),
-        (-0.99 * eps, Phase.MIDDLE),
-        (0.99 * eps, Phase.MIDDLE),
-        (1.01 * eps, Phase.FOLDED),
-        (0.0, Phase.MIDDLE),
+        (-1.1 * eps, BangBangPhase.STRETCHED),
+        (-0.99 * eps, BangBangPhase.MIDDLE),
+        (0.99 * eps, BangBangPhase.MIDDLE),
+        (1.01 * eps, BangBangPhase.FOLDED),
+        (0.0, BangBangPhase.MIDDLE),
     ):
         command = leg.pull(torque, 3)
         assert command.phase == phase
@@ -116,9 +118,9 @@ def test_the_torque_counts_from_rest(optimal: LegDesign) -> None:
     for rest in (-0.8, 0.6):
         leg = pulled(optimal, EARLY, rest)
         leg.pull(rest, 6)
-        assert leg.phase(rest + 1.01 * eps) == Phase.FOLDED
-        assert leg.phase(rest - 0.99 * eps) == Phase.FOLDED
-        assert leg.phase(rest - 1.01 * eps) == Phase.STRETCHED
+        assert leg.phase(rest + 1.01 * eps) == BangBangPhase.FOLDED
+        assert leg.phase(rest - 0.99 * eps) == BangBangPhase.FOLDED
+        assert leg.phase(rest - 1.01 * eps) == BangBangPhase.STRETCHED
 
 
 def test_rows_of_a_batch_are_single_legs(optimal: LegDesign, prototype: LegDesign) -> None:

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from legbench.control import JumpConfig
+from legbench.control.jump_rules import JumpPhase
 from legbench.design import LegDesign
 from legbench.experiment import Experiment, record
 from legbench.metrics import Summary, summarise
 from legbench.metrics.analysis import Analysis
 from legbench.mjcf import Linkage, LinkageKind
 from legbench.recording.reader import load
-from legbench.signals import SIGNALS, Phase
+from legbench.signals import SIGNALS
 
 
 @pytest.fixture(scope="session")
@@ -54,7 +55,7 @@ def test_every_push_is_on_the_ground_and_every_stance_has_one(
 ) -> None:
     run = load(Path(hops[name].run))
     phase, contact = run["phase"], np.asarray(run["contact"], dtype=bool)
-    pushes = np.flatnonzero((phase[1:] == Phase.PUSH) & (phase[:-1] != Phase.PUSH)) + 1
+    pushes = np.flatnonzero((phase[1:] == JumpPhase.PUSH) & (phase[:-1] != JumpPhase.PUSH)) + 1
     assert np.all(contact[pushes])
     gait = Analysis(run).gait
     begun = [

@@ -7,14 +7,14 @@ import pytest
 from torque_traces import Pulled, load_of_standing
 
 from legbench.control import Jump, JumpConfig, LegTargets
+from legbench.control.jump_rules import JumpPhase
 from legbench.design import LegDesign
 from legbench.design.statics import Support
 from legbench.errors import ConfigError
 from legbench.kinematics import joint_to_modal
-from legbench.signals import Phase
 
 EARLY = JumpConfig(delay=0.01, release_time=0.02, touchdown_time=0.005)
-RING = [Phase.PUSH, Phase.RELEASE, Phase.FLIGHT, Phase.COMPRESS]
+RING = [JumpPhase.PUSH, JumpPhase.RELEASE, JumpPhase.FLIGHT, JumpPhase.COMPRESS]
 
 
 def legs(design: LegDesign | list[LegDesign], config: JumpConfig = EARLY) -> tuple[Pulled, float]:
@@ -29,42 +29,42 @@ def test_one_hop_goes_once_round_the_ring(optimal: LegDesign) -> None:
     leg, standing = legs(optimal)
     assert standing < 0.0
     for _ in range(10):
-        assert leg.phase(standing) == Phase.REST
-    assert leg.phase(standing) == Phase.PUSH
-    assert leg.phase(1.6 * standing, 5) == Phase.PUSH
-    assert leg.phase(0.21 * standing, 5) == Phase.PUSH
-    assert leg.phase(0.19 * standing) == Phase.RELEASE
+        assert leg.phase(standing) == JumpPhase.REST
+    assert leg.phase(standing) == JumpPhase.PUSH
+    assert leg.phase(1.6 * standing, 5) == JumpPhase.PUSH
+    assert leg.phase(0.21 * standing, 5) == JumpPhase.PUSH
+    assert leg.phase(0.19 * standing) == JumpPhase.RELEASE
     for _ in range(20):
-        assert leg.phase(2.0 * standing) == Phase.RELEASE or leg.phase(0.0) == Phase.FLIGHT
-    assert leg.phase(0.0, 20) == Phase.FLIGHT
-    assert leg.phase(0.74 * standing, 10) == Phase.FLIGHT
-    assert leg.phase(0.76 * standing, 4) == Phase.FLIGHT
-    assert leg.phase(0.74 * standing) == Phase.FLIGHT
-    assert leg.phase(0.76 * standing, 4) == Phase.FLIGHT
-    assert leg.phase(0.76 * standing) == Phase.COMPRESS
-    assert leg.phase(1.0 * standing) == Phase.COMPRESS
-    assert leg.phase(2.5 * standing, 3) == Phase.COMPRESS
+        assert leg.phase(2.0 * standing) == JumpPhase.RELEASE or leg.phase(0.0) == JumpPhase.FLIGHT
+    assert leg.phase(0.0, 20) == JumpPhase.FLIGHT
+    assert leg.phase(0.74 * standing, 10) == JumpPhase.FLIGHT
+    assert leg.phase(0.76 * standing, 4) == JumpPhase.FLIGHT
+    assert leg.phase(0.74 * standing) == JumpPhase.FLIGHT
+    assert leg.phase(0.76 * standing, 4) == JumpPhase.FLIGHT
+    assert leg.phase(0.76 * standing) == JumpPhase.COMPRESS
+    assert leg.phase(1.0 * standing) == JumpPhase.COMPRESS
+    assert leg.phase(2.5 * standing, 3) == JumpPhase.COMPRESS
     turn = EARLY.apex_turn * optimal.stiffness[0]
-    assert leg.phase(2.5 * standing + 0.9 * turn, 3) == Phase.COMPRESS
-    assert leg.phase(2.5 * standing + 1.1 * turn) == Phase.PUSH
+    assert leg.phase(2.5 * standing + 0.9 * turn, 3) == JumpPhase.COMPRESS
+    assert leg.phase(2.5 * standing + 1.1 * turn) == JumpPhase.PUSH
 
 
 def test_a_push_that_does_not_lift_the_leg_ends_at_the_upper_apex(optimal: LegDesign) -> None:
     leg, standing = legs(optimal)
     leg.pull(standing, 11)
     turn = EARLY.apex_turn * optimal.stiffness[0]
-    assert leg.phase(0.6 * standing, 3) == Phase.PUSH
-    assert leg.phase(0.6 * standing - 0.9 * turn, 3) == Phase.PUSH
-    assert leg.phase(0.6 * standing - 1.1 * turn) == Phase.RELEASE
+    assert leg.phase(0.6 * standing, 3) == JumpPhase.PUSH
+    assert leg.phase(0.6 * standing - 0.9 * turn, 3) == JumpPhase.PUSH
+    assert leg.phase(0.6 * standing - 1.1 * turn) == JumpPhase.RELEASE
 
 
 def test_a_release_is_not_touched_down_at_once(optimal: LegDesign) -> None:
     """Lift-off leaves the load falling through the threshold of touchdown: that is no ground."""
     leg, standing = legs(optimal)
     leg.pull(standing, 11)
-    assert leg.phase(0.1 * standing) == Phase.RELEASE
+    assert leg.phase(0.1 * standing) == JumpPhase.RELEASE
     phases = [leg.phase(1.5 * standing) for _ in range(26)]
-    assert phases == [Phase.RELEASE] * 19 + [Phase.FLIGHT] * 5 + [Phase.COMPRESS] * 2
+    assert phases == [JumpPhase.RELEASE] * 19 + [JumpPhase.FLIGHT] * 5 + [JumpPhase.COMPRESS] * 2
 
 
 @pytest.mark.parametrize("period_ms", [20, 60, 90])
@@ -74,13 +74,13 @@ def test_vibration_in_the_air_is_no_ground_however_large(
     """It loads the springs for half a period at a time, the ground for longer."""
     leg, standing = legs(optimal, JumpConfig(delay=0.01))
     leg.pull(standing, 11)
-    assert leg.phase(0.1 * standing) == Phase.RELEASE
+    assert leg.phase(0.1 * standing) == JumpPhase.RELEASE
     turns = 2.0 * np.pi / period_ms * np.arange(1000)
     swings = [leg.phase(5.0 * standing * float(np.sin(turn))) for turn in turns]
-    assert set(swings[30:]) == {Phase.FLIGHT}
+    assert set(swings[30:]) == {JumpPhase.FLIGHT}
     leg.pull(0.0)
-    assert leg.phase(0.76 * standing, 49) == Phase.FLIGHT
-    assert leg.phase(0.76 * standing) == Phase.COMPRESS
+    assert leg.phase(0.76 * standing, 49) == JumpPhase.FLIGHT
+    assert leg.phase(0.76 * standing) == JumpPhase.COMPRESS
 
 
 def test_only_the_push_stretches_the_leg(optimal: LegDesign) -> None:
@@ -91,11 +91,11 @@ def test_only_the_push_stretches_the_leg(optimal: LegDesign) -> None:
     for torque in standing * (1.0 + np.sin(0.05 * np.arange(1000)) + 0.1 * rng.normal(size=1000)):
         command = leg.pull(float(torque))
         levels.setdefault(int(command.phase), set()).add(tuple(command.motor_pos.tolist()))
-    assert set(levels) == {Phase.REST, *RING}
+    assert set(levels) == {JumpPhase.REST, *RING}
     for phase, commanded in levels.items():
         (motor_pos,) = commanded
         z2 = joint_to_modal(support.link_at_rest(np.array(motor_pos)))[1]
-        expected = EARLY.z2 - EARLY.dz2 if phase == Phase.PUSH else EARLY.z2 + EARLY.dz2
+        expected = EARLY.z2 - EARLY.dz2 if phase == JumpPhase.PUSH else EARLY.z2 + EARLY.dz2
         assert z2 == pytest.approx(expected, abs=1e-9)
 
 
@@ -113,7 +113,7 @@ def test_phases_follow_each_other_round_the_ring_whatever_comes(
     walk = np.cumsum(rng.normal(scale=0.06, size=(3000, 4)), axis=0)
     loads = rest * (1.0 + np.sin(0.03 * np.arange(3000))[:, np.newaxis] + walk)
     turned = np.zeros(4)
-    before = np.full(4, Phase.REST)
+    before = np.full(4, JumpPhase.REST)
     for load in loads:
         together = batch.pull(load)
         for row, leg in enumerate(alone):
@@ -121,10 +121,10 @@ def test_phases_follow_each_other_round_the_ring_whatever_comes(
             assert command.phase == together.phase[row]
             assert np.array_equal(command.motor_pos, together.motor_pos[row])
         for row in np.flatnonzero(together.phase != before):
-            if before[row] == Phase.REST:
-                assert together.phase[row] == Phase.PUSH
+            if before[row] == JumpPhase.REST:
+                assert together.phase[row] == JumpPhase.PUSH
             else:
-                place = RING.index(Phase(int(before[row])))
+                place = RING.index(JumpPhase(int(before[row])))
                 assert together.phase[row] == RING[(place + 1) % 4]
             turned[row] += 1
         before = together.phase
@@ -143,7 +143,7 @@ def test_a_reset_forgets_everything(optimal: LegDesign) -> None:
         leg = Pulled(controller, rest)
         runs.append([leg.phase(float(torque)) for torque in trace])
     assert runs[0] == runs[1]
-    assert set(runs[0]) == {Phase.REST, *RING}
+    assert set(runs[0]) == {JumpPhase.REST, *RING}
 
 
 @pytest.mark.parametrize("support", [Support.NONE, Support.TRUNK])

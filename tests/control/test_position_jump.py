@@ -3,11 +3,12 @@ import pytest
 from torque_traces import Pulled
 
 from legbench.control import LegTargets, PositionJump, PositionJumpConfig
+from legbench.control.jump_rules import JumpPhase
+from legbench.control.position_jump import PositionJumpPhase
 from legbench.design import LegDesign
 from legbench.design.statics import Support
 from legbench.errors import ConfigError
 from legbench.kinematics import joint_to_modal
-from legbench.signals import Phase
 
 
 @pytest.mark.parametrize("many", [False, True])
@@ -20,11 +21,11 @@ def test_one_step_at_the_delay_for_good(
     leg = Pulled(controller, np.zeros(2) if many else 0.0)
     for _ in range(10):
         command = leg.pull(np.zeros(2) if many else 0.0)
-        assert np.all(command.phase == Phase.REST)
+        assert np.all(command.phase == JumpPhase.REST)
         assert np.allclose(joint_to_modal(command.motor_pos)[..., 1], 1.3)
     for _ in range(50):
         command = leg.pull(np.ones(2) if many else 1.0)
-        assert np.all(command.phase == Phase.STEPPED)
+        assert np.all(command.phase == PositionJumpPhase.STEPPED)
         assert np.allclose(joint_to_modal(command.motor_pos)[..., 1], 1.0)
 
 

@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from legbench.control.jump_rules import JumpPhase
 from legbench.design.leg import LegDesign
 from legbench.design.toml import design_to_mapping, load_design
 from legbench.phases import ControllerDescription, Counting, PhaseInfo
 from legbench.recording.controller_table import controller_table
 from legbench.recording.reader import Recording, described
-from legbench.signals import SIGNALS, Floats, Ints, Phase
+from legbench.signals import SIGNALS, Floats, Ints
 
 MODELS = Path(__file__).parents[2] / "models"
 PROTOTYPE = load_design(MODELS / "prototype.toml")
@@ -168,10 +169,12 @@ class Hop:
         ahead = self.travel * time
         flat = np.zeros_like(time)
         compress = contact & (into < 0.5 * self.stance)
-        phase = np.where(contact, Phase.PUSH, np.where(flown < 0.02, Phase.RELEASE, Phase.FLIGHT))
+        phase = np.where(
+            contact, JumpPhase.PUSH, np.where(flown < 0.02, JumpPhase.RELEASE, JumpPhase.FLIGHT)
+        )
         return {
             "time": time,
-            "phase": np.where(compress, Phase.COMPRESS, phase),
+            "phase": np.where(compress, JumpPhase.COMPRESS, phase),
             "joint_pos": np.stack([-half, half], axis=-1),
             "motor_pos": np.stack([0.1 - half, half - 0.1], axis=-1),
             "trunk_pos": np.stack([ahead, hip], axis=-1),

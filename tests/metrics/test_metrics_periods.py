@@ -4,11 +4,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from metrics_runs import PERIOD, clock, manifest, recording
 
+from legbench.control.jump_rules import JumpPhase
+from legbench.control.position_jump import PositionJumpPhase
 from legbench.kinematics import modal_to_joint
 from legbench.metrics.analysis import Analysis
 from legbench.metrics.periods import turning_points
 from legbench.recording.reader import Recording
-from legbench.signals import Phase
 
 REST_ROWS = 137
 
@@ -25,7 +26,7 @@ def released(
     z2 = envelope * (np.cos(damped * since) + decay / damped * np.sin(damped * since))
     rate = -envelope * omega**2 / damped * np.sin(damped * since)
     still = np.zeros_like(z2)
-    phase = np.where(rows < REST_ROWS, Phase.REST, Phase.STEPPED)
+    phase = np.where(rows < REST_ROWS, JumpPhase.REST, PositionJumpPhase.STEPPED)
     entries = manifest(
         setup={"kind": "ffs"}, controller={"kind": kind, "z2": 1.0, "dz2": abs(deflection)}
     )

@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from metrics_runs import PERIOD, Hop, clock, truncated
 
+from legbench.control.jump_rules import JumpPhase
 from legbench.metrics.analysis import Analysis
 from legbench.metrics.stance import loaded_by_contact
-from legbench.signals import Phase
 
 HOPS = st.builds(
     Hop,
@@ -101,7 +101,7 @@ def test_a_phase_next_to_rest_may_be_cut_and_does_not_count() -> None:
     hop = Hop()
     signals = hop.signals()
     resting = signals["time"] < hop.touchdown(0) - 0.05
-    phase = np.where(resting, Phase.REST, signals["phase"])
+    phase = np.where(resting, JumpPhase.REST, signals["phase"])
     real = hop.real()
     seen = Analysis(replace(real, columns={**real.columns, "phase": phase})).gait
     assert (len(seen.stance), len(seen.flight)) == (4, 4)

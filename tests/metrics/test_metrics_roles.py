@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from metrics_runs import Hop, clock, guest, manifest, recording
 
+from legbench.control.jump_rules import JumpPhase
 from legbench.kinematics import modal_to_joint
 from legbench.metrics import summarise
 from legbench.metrics.analysis import Analysis
@@ -13,7 +14,7 @@ from legbench.metrics.roles import FLIGHT, STANCE, UNKNOWN, foot_states
 from legbench.phases import Counting, PhaseInfo, Role
 from legbench.recording.format_1 import built_in
 from legbench.recording.reader import Recording
-from legbench.signals import Floats, Ints, Phase
+from legbench.signals import Floats, Ints
 
 LATE = 0.05
 JUMP = built_in("jump", {"touchdown_time": LATE}).phases
@@ -21,13 +22,13 @@ JUMP = built_in("jump", {"touchdown_time": LATE}).phases
 
 def of_the_jump(phase: Ints, time: Floats) -> Ints:
     """States as they are defined for the jump by name: the independent path."""
-    names = {Phase.COMPRESS: STANCE, Phase.PUSH: STANCE, Phase.FLIGHT: FLIGHT}
-    names[Phase.RELEASE] = FLIGHT
-    states = [names.get(Phase(value), UNKNOWN) for value in phase]
+    names = {JumpPhase.COMPRESS: STANCE, JumpPhase.PUSH: STANCE, JumpPhase.FLIGHT: FLIGHT}
+    names[JumpPhase.RELEASE] = FLIGHT
+    states = [names.get(JumpPhase(value), UNKNOWN) for value in phase]
     for row in range(1, len(phase)):
-        if (phase[row - 1], phase[row]) == (Phase.FLIGHT, Phase.COMPRESS):
+        if (phase[row - 1], phase[row]) == (JumpPhase.FLIGHT, JumpPhase.COMPRESS):
             for earlier in range(row):
-                if time[earlier] >= time[row] - LATE and phase[earlier] == Phase.FLIGHT:
+                if time[earlier] >= time[row] - LATE and phase[earlier] == JumpPhase.FLIGHT:
                     states[earlier] = STANCE
     return np.array(states)
 
@@ -37,10 +38,10 @@ def of_the_jump(phase: Ints, time: Floats) -> Ints:
     first=st.integers(0, 4),
 )
 def test_roles_and_lateness_give_the_states_of_the_jump(lengths: list[int], first: int) -> None:
-    order = [Phase.PUSH, Phase.RELEASE, Phase.FLIGHT, Phase.COMPRESS]
+    order = [JumpPhase.PUSH, JumpPhase.RELEASE, JumpPhase.FLIGHT, JumpPhase.COMPRESS]
     names = [order[(first + place) % 4] for place in range(len(lengths))]
     if first == 4:
-        names[0] = Phase.REST
+        names[0] = JumpPhase.REST
     phase, time = np.repeat(names, lengths).astype(np.int64), clock(sum(lengths))
     np.testing.assert_array_equal(foot_states(phase, time, JUMP), of_the_jump(phase, time))
 

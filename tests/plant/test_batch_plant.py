@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 from plants import JUMP, PROTOTYPE, built, copied, family, hopping, standing
 
+from legbench.control.jump_rules import JumpPhase
 from legbench.errors import ConfigError
 from legbench.mjcf import LinkageKind
 from legbench.plant.batch import BatchPlant
 from legbench.plant.sim import SimPlant
 from legbench.plant.start import Start
 from legbench.servo import ServoConfig
-from legbench.signals import Command, Phase
+from legbench.signals import Command
 
 LIMITED = ServoConfig(slew_rate=8.0, bandwidth=60.0, delay_cycles=1, encoder_counts=8192)
 
@@ -130,4 +131,4 @@ def test_the_controllers_phases_are_a_row_each() -> None:
     plant = BatchPlant(family(3), built(), start)
     seen = plant.reset()
     controller.reset(seen)
-    assert controller.step(seen).phase.tolist() == [Phase.REST] * 3
+    assert controller.step(seen).phase.tolist() == [JumpPhase.REST] * 3

@@ -8,12 +8,12 @@ import rerun as rr
 import viz_rrd
 from viz_runs import PROTOTYPE, part, record
 
+from legbench.control.jump_rules import JumpPhase
 from legbench.design.setup import SetupKind
 from legbench.errors import FormatError, RecordingError
 from legbench.kinematics import joint_to_modal, joint_to_polar, leg_points
 from legbench.metrics.analysis import Analysis
 from legbench.recording.reader import Recording, described
-from legbench.signals import Phase
 from legbench.viz.facts import facts_of
 from legbench.viz.live.axes import HEIGHT, WIDTH
 from legbench.viz.live.publish import APPLICATION, Publisher
@@ -128,7 +128,7 @@ def test_states_change_when_they_change(hop: Recording, shown: Entities) -> None
     controller = shown["/states/controller"]
     changes = np.flatnonzero(np.diff(phase, prepend=-1))
     assert [state[0] for state in controller["state"]] == [
-        Phase(phase[row]).name.lower() for row in changes
+        JumpPhase(phase[row]).name.lower() for row in changes
     ]
 
 

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from legbench.control.bang_bang import BangBangPhase
+from legbench.control.jump_rules import JumpPhase
 from legbench.design.leg import LegDesign, Segment
 from legbench.design.setup import Setup, SetupKind
 from legbench.design.toml import design_to_mapping
@@ -18,7 +20,7 @@ from legbench.recording.layout import TIME
 from legbench.recording.manifest import new_manifest, write_manifest
 from legbench.recording.reader import Recording, described
 from legbench.recording.stream import BatchEncoder, encode_schema, schema_for
-from legbench.signals import SIGNALS, Floats, Phase
+from legbench.signals import SIGNALS, Floats
 
 PROTOTYPE = LegDesign(
     name="prototype",
@@ -70,7 +72,7 @@ def hopping(rows: int) -> dict[str, Floats]:
     hip = np.stack([0.01 * np.sin(0.5 * time) - foot[:, 0], height], axis=-1)
     push = np.where(stance, 45.0 * np.sin(np.pi * share), 0.0)
     rising = stance & (share > 0.5)
-    phase = np.where(rising, Phase.PUSH, np.where(stance, Phase.COMPRESS, Phase.FLIGHT))
+    phase = np.where(rising, JumpPhase.PUSH, np.where(stance, JumpPhase.COMPRESS, JumpPhase.FLIGHT))
     target = modal_to_joint(np.stack([0 * time, np.where(rising, 0.85, 1.15)], axis=-1))
     force = np.stack([0.05 * push, push], axis=-1)
     return _signals(time, joint, target, hip, hip + foot, force, stance, phase)
@@ -86,7 +88,7 @@ def oscillating(rows: int, height: float) -> dict[str, Floats]:
     )
     joint = modal_to_joint(modal)
     rising = np.sin(angle) > 0
-    phase = np.where(rising, Phase.FOLDED, Phase.STRETCHED)
+    phase = np.where(rising, BangBangPhase.FOLDED, BangBangPhase.STRETCHED)
     target = modal_to_joint(np.stack([0 * time, np.where(rising, 1.15, 0.85)], axis=-1))
     foot = leg_points(joint, PROTOTYPE.lengths)[:, 3]
     hip = np.tile([0.0, height], (rows, 1))
