@@ -23,6 +23,7 @@ from legbench.drives.master.bring_up import BringUp
 from legbench.drives.master.cycle import Cycle, Tick
 from legbench.drives.master.parking import park
 from legbench.drives.master.port import Listener, Port
+from legbench.drives.master.preparation import prepare_to_move, read_temperatures, refuse_led
 from legbench.drives.master.read_only import may_pace, may_read
 from legbench.drives.master.sample import Sample, sample_of
 from legbench.drives.master.sdo_stop import leave_operational
@@ -31,7 +32,6 @@ from legbench.drives.master.stop import StopLadder
 from legbench.drives.master.stop_report import Lead, StopReport
 from legbench.drives.master.supervisor import Supervisor
 from legbench.drives.protocol.cia402 import Goal
-from legbench.drives.protocol.nmt import NmtState
 from legbench.drives.setup.config import BusConfig, check_start_speed
 from legbench.drives.setup.master_watch import check_master_watch
 from legbench.drives.setup.wire import check_load
@@ -165,11 +165,8 @@ class Link(Lead):
             else:
                 check_master_watch(self._config, speed=self._limits.command_speed)
                 self._hold()
-                self._prepare_to_move()
-            for node, poll in zip(self._config.nodes, self.cycle.polls, strict=True):
-                reading = self.bring_up.temperature(node)
-                if reading is not None:
-                    poll.take(reading)
+                prepare_to_move(self.bring_up, self._config)
+            read_temperatures(self.bring_up, self.cycle, self._config)
         except BaseException:
             self._let_go()
             raise
@@ -185,17 +182,6 @@ class Link(Lead):
         if self._holds:
             self._holds = False
             self._lock.release()
-
-    def _prepare_to_move(self) -> None:
-        self.bring_up.listen()
-        self.bring_up.identify()
-        self.bring_up.unpower()
-        self.bring_up.glance()
-        self.bring_up.pre_operational()
-        for node in self._config.nodes:
-            self.bring_up.configure(node)
-            self.bring_up.check_soft_limits(node)
-            self.bring_up.preload(node)
 
     def _prepare_to_look(self) -> None:
         """Prepare a read-only link: listen to another master's SYNC, or send SYNC if there is none.
@@ -218,14 +204,7 @@ class Link(Lead):
         self.bring_up.refuse_differences()
         if self.listening:
             return
-        for node, watch in zip(self._config.nodes, self.cycle.watches, strict=True):
-            powered = self.bring_up.powered(node)
-            if powered or watch.state is NmtState.OPERATIONAL:
-                raise DriveError(
-                    f"drive '{node.name}' (node {node.node_id}) "
-                    f"{'has power' if powered else 'is operational'}, though nobody sends SYNC: "
-                    "somebody else leads it, and read-only does not interfere; end that program"
-                )
+        refuse_led(self.bring_up, self.cycle, self._config)
         self._supervisor.alone()
         self._port.may_send = may_pace(self._config.master_id)
 
