@@ -21,6 +21,7 @@ from legbench.drives.errors import DriveError
 from legbench.drives.master.cycle import Tick
 from legbench.drives.master.ending import Ending
 from legbench.drives.master.link_state import LinkState
+from legbench.drives.master.move import missed, move
 from legbench.drives.master.port import Listener, Port
 from legbench.drives.master.preparation import prepare_to_move, read_temperatures, refuse_led
 from legbench.drives.master.read_only import may_pace, may_read
@@ -41,8 +42,6 @@ from legbench.limits.shortfall import Shortfall
 
 LISTEN_NS = 100_000_000
 """Time that a read-only link listens for another master's SYNC and for heartbeats [ns]."""
-ARRIVED = 1e-9
-"""Largest distance from a target that counts as reached [rad]."""
 
 
 @final
@@ -320,39 +319,15 @@ class Link(Ending):
         """
         pace = self._config.start_speed if speed is None else speed
         check_start_speed(pace)
-        step = pace * self._config.period
         wanted = tuple(float(value) for value in motor_pos)
         if not all(map(math.isfinite, wanted)):
             self.command(wanted)  # refused there, and the drives stopped
-        sample = self._sample()
-        while self._guard.applied != wanted:
-            before = self._guard.applied
-            applied = self.command(
-                [
-                    target
-                    if abs(target - last) <= step
-                    else last + (step if target > last else -step)
-                    for target, last in zip(wanted, before, strict=True)
-                ]
-            )
-            sample = self.exchange()
-            if applied == before:
-                break
-        for _ in range(2):
-            self.command(self._guard.applied)
-            sample = self.exchange()
-        self._check_arrived(wanted)
-        return sample
-
-    def _check_arrived(self, wanted: Sequence[float]) -> None:
-        applied, end = self._guard.applied, self._guard.reachable(wanted)
-        if not all(abs(a - b) < ARRIVED for a, b in zip(applied, end, strict=True)):
-            error = PlantFault(
-                "start posture",
-                f"the motors were led to {applied} rad, not to {end} rad; the move has failed",
-            )
+        sample = move(self, self._guard, wanted, pace * self._config.period)
+        error = missed(self._guard, wanted)
+        if error is not None:
             self._end(error)
             raise error
+        return sample
 
     def _tick(self) -> Tick:
         self._last = tick = self.cycle.follow() if self.listening else self.cycle.tick()
