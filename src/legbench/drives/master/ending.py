@@ -10,6 +10,7 @@ from legbench.drives.master.stop import StopLadder
 from legbench.drives.master.stop_report import Lead, StopReport
 from legbench.drives.setup.config import BusConfig
 from legbench.drives.transport.lock import ChannelLock
+from legbench.errors import PlantFault
 from legbench.interrupts import Shield, shielded
 
 
@@ -18,6 +19,7 @@ class Ending(Lead):
 
     Attributes:
         state: state of the link.
+        fault: first fault, which ended the link.
         stopped: report of the stop of the drives, none before it.
         not_parked: command frames that `close` failed to switch off, see `master.parking`.
         listening: read-only, and another master sends SYNC: this one sends nothing.
@@ -39,10 +41,17 @@ class Ending(Lead):
         self.cycle = Cycle(self._port, config)
         self.bring_up = BringUp(self._port, config, self.cycle.other)
         self.state = LinkState.NEW
+        self.fault: PlantFault | None = None
         self.stopped: StopReport | None = None
         self.not_parked: list[str] = []
         self.listening = False
         self._holds = self._closed = self._leads = False
+
+    def _end(self, error: PlantFault) -> None:
+        """Keep the first cause, stop all drives at once."""
+        if self.fault is None:
+            self.fault = error
+        self.stop()
 
     def stop(self) -> None:
         """Quick stop of all drives in this cycle, then no power, then a look whether it is gone.

@@ -19,18 +19,13 @@ import can
 
 from legbench.drives.errors import DriveError
 from legbench.drives.master.cycle import Tick
-from legbench.drives.master.ending import Ending
 from legbench.drives.master.link_state import LinkState
 from legbench.drives.master.move import missed, move
+from legbench.drives.master.opening import Opening
 from legbench.drives.master.port import Listener, Port
-from legbench.drives.master.preparation import prepare_to_move, read_temperatures, refuse_led
-from legbench.drives.master.read_only import may_pace, may_read
 from legbench.drives.master.sample import Sample, sample_of
-from legbench.drives.master.start_up import StartUp
-from legbench.drives.master.supervisor import Supervisor
 from legbench.drives.protocol.cia402 import Goal
 from legbench.drives.setup.config import BusConfig, check_start_speed
-from legbench.drives.setup.master_watch import check_master_watch
 from legbench.drives.setup.wire import check_load
 from legbench.drives.transport.lock import ChannelLock
 from legbench.drives.transport.open_bus import timebase_of
@@ -40,12 +35,9 @@ from legbench.limits.guard import Guard
 from legbench.limits.safety import SafetyLimits
 from legbench.limits.shortfall import Shortfall
 
-LISTEN_NS = 100_000_000
-"""Time that a read-only link listens for another master's SYNC and for heartbeats [ns]."""
-
 
 @final
-class Link(Ending):
+class Link(Opening):
     """Cyclic link of one master to its drives over a bus.
 
     Attributes:
@@ -87,88 +79,12 @@ class Link(Ending):
         check_load(config)
         port = Port(bus, timebase or timebase_of(bus), listener)
         lock = lock or ChannelLock(str(bus.channel_info))
-        super().__init__(port, config, lock, read_only=read_only)
-        self._limits = limits or SafetyLimits()
+        super().__init__(port, config, limits or SafetyLimits(), lock, read_only=read_only)
         self._stiffness = tuple(float(value) for value in stiffness)
         self._guard = Guard(self._limits, config.period)
-        self.fault: PlantFault | None = None
         self.skipped_total = 0
-        self._supervisor = Supervisor(self.cycle, config, self._limits, self._port.timebase)
-        self._start_up = StartUp(self._port, self.cycle, config, read_only=read_only)
         self._last = Tick(0, 0, 0, 0, False)
         self._expected: list[tuple[float, ...]] = []
-        self._told: Listener | None = None
-
-    def tell(self, listener: Listener) -> None:
-        """Show every frame to a listener from now on, or from when the drives are configured.
-
-        A log that holds their configuration would, played back, bring parked drives back to life.
-        """
-        self._told = listener
-        if self.state is not LinkState.NEW:
-            self._port.listener = listener
-
-    @property
-    def listener_error(self) -> str | None:
-        """Error that a listener raised, in one line; the listener is not called again."""
-        return self._port.listener_error
-
-    # --- before anything moves ---------------------------------------------------------------
-
-    def open(self) -> None:
-        """Take the channel, check who is there, write and read back the configuration.
-
-        In read-only nothing is written, and the channel is taken only if SYNC has to come from
-        here.
-
-        Raises:
-            ConfigError: a drive would go on for too long without its master.
-            BusError: the channel has a master, or the interface does not work.
-            DriveError: a drive is missing, is another one, or refuses its configuration; or, in
-                read-only, is not configured.
-            PlantFault: in read-only, somebody else is about to lead the drives.
-        """
-        if self.state is not LinkState.NEW:
-            return
-        try:
-            if self._read_only:
-                self._prepare_to_look()
-            else:
-                check_master_watch(self._config, speed=self._limits.command_speed)
-                self._hold()
-                prepare_to_move(self.bring_up, self._config)
-            read_temperatures(self.bring_up, self.cycle, self._config)
-        except BaseException:
-            self._let_go()
-            raise
-        self.state = LinkState.CONFIGURED
-        if self._told is not None:
-            self._port.listener = self._told
-
-    def _prepare_to_look(self) -> None:
-        """Prepare a read-only link: listen to another master's SYNC, or send SYNC if there is none.
-
-        Raises:
-            BusError: a master of this computer holds the channel, and sends no SYNC yet.
-            DriveError: a drive is not configured, or somebody leads it without SYNC.
-            PlantFault: somebody else is about to lead them.
-        """
-        self._port.may_send = may_read
-        now_ns = self._port.timebase.now_ns()
-        self.listening = self.cycle.hears_sync(now_ns + LISTEN_NS)
-        self._start_up.listening = self.listening
-        if self.listening:
-            self.bring_up.lookout.rest()
-        else:
-            self._hold()
-            self.bring_up.listen()
-        self.bring_up.identify()
-        self.bring_up.refuse_differences()
-        if self.listening:
-            return
-        refuse_led(self.bring_up, self.cycle, self._config)
-        self._supervisor.alone()
-        self._port.may_send = may_pace(self._config.master_id)
 
     def start(self, *, clear_faults: bool = False) -> Sample:
         """Open if need be, let process data settle, enable all drives where they stand.
@@ -358,12 +274,6 @@ class Link(Ending):
             fresh=sample.fresh,
             elapsed=1 + sample.skipped,
         )
-
-    def _end(self, error: PlantFault) -> None:
-        """Keep the first cause, stop all drives at once."""
-        if self.fault is None:
-            self.fault = error
-        self.stop()
 
     def _refuse_ended(self) -> None:
         if self.fault is not None:
