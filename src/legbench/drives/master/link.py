@@ -18,12 +18,12 @@ from typing import final
 import can
 
 from legbench.drives.errors import DriveError
-from legbench.drives.master.cycle import Tick
 from legbench.drives.master.link_state import LinkState
 from legbench.drives.master.move import missed, move
 from legbench.drives.master.opening import Opening
 from legbench.drives.master.port import Listener, Port
 from legbench.drives.master.sample import Sample, sample_of
+from legbench.drives.master.tick import Tick
 from legbench.drives.protocol.cia402 import Goal
 from legbench.drives.setup.config import BusConfig, check_start_speed
 from legbench.drives.setup.wire import check_load
