@@ -42,6 +42,7 @@ STRICT = (
     *("limits/guard.py", "limits/safety.py", "drives/protocol/cia402.py"),
     *("drives/master/stop.py", "drives/master/stop_report.py", "drives/master/sdo_stop.py"),
     *("drives/master/cycle.py", "drives/master/start_up.py", "drives/master/supervisor.py"),
+    "drives/master/outgoing.py",
 )
 """Files of the package that a stop depends on: 97 % must be noticed there, 93 % elsewhere."""
 STRICT_BOUND, BOUND = 0.97, 0.93

@@ -8,6 +8,7 @@ import can
 
 from legbench.drives.errors import BusError, DriveError, SdoAbortError
 from legbench.drives.master.first_contact import first_contact
+from legbench.drives.master.identification import identify, read_identity
 from legbench.drives.master.lookout import Lookout
 from legbench.drives.master.parking import is_parked
 from legbench.drives.master.port import Port
@@ -23,10 +24,6 @@ from legbench.drives.setup.config import BusConfig, Identity, NodeConfig, Parame
 from legbench.drives.setup.configuration import configuration
 from legbench.interrupts import shielded
 
-PROFILE_402 = 0x0192
-"""Device profile number of CiA 402 drives, in the low word of 1000h."""
-CSP_BIT = 1 << 7
-"""Bit of 6502h, supported drive modes, for cyclic synchronous position mode."""
 MODE_PATIENCE = 50
 """Number of reads of 6061h, 10 ms apart, until the mode must be there."""
 _MISSING = (Abort.NO_OBJECT, Abort.NO_SUB_INDEX)
@@ -100,52 +97,11 @@ class BringUp:
             DriveError: a node is missing, is another one, or two are swapped.
         """
         with self.contact():
-            self._identify(self._bus.nodes if nodes is None else nodes)
-
-    def _identify(self, nodes: Sequence[NodeConfig]) -> None:
-        found: dict[int, Identity] = {}
-        for node in nodes:
-            sdo = self.sdo(node)
-            device = sdo.get_int(0x1000, 0, U32)
-            if device & 0xFFFF != PROFILE_402:
-                raise DriveError(
-                    f"node {node.node_id} ('{node.name}') is no CiA 402 drive: its device type is "
-                    f"{device:08X}h"
-                )
-            found[node.node_id] = self.identity(node)
-        for node in nodes:
-            self._compare(node, found)
-        for node in nodes:
-            if not self.sdo(node).get_int(0x6502, 0, U32) & CSP_BIT:
-                raise DriveError(
-                    f"node {node.node_id} ('{node.name}') knows no cyclic synchronous position mode"
-                )
+            identify(self._bus.nodes if nodes is None else nodes, self._bus, self.sdo)
 
     def identity(self, node: NodeConfig) -> Identity:
         """Read the identity object of a node (1018h); raises as `SdoPort.read` does."""
-        vendor, product, revision, serial = (
-            self.sdo(node).get_int(0x1018, sub, U32) for sub in range(1, 5)
-        )
-        return Identity(vendor=vendor, product=product, revision=revision, serial=serial)
-
-    def _compare(self, node: NodeConfig, found: dict[int, Identity]) -> None:
-        wanted, there = node.identity, found[node.node_id]
-        for name in ("vendor", "product", "revision", "serial"):
-            value, real = getattr(wanted, name), getattr(there, name)
-            if value is None or value == real:
-                continue
-            hint = "correct the bus file if this is the right drive"
-            for other in self._bus.nodes:
-                at = found.get(other.node_id)
-                if name == "serial" and other is not node and at is not None and at.serial == value:
-                    hint = (
-                        f"that one is node {other.node_id}: '{node.name}' and '{other.name}' are "
-                        "swapped"
-                    )
-            raise DriveError(
-                f"node {node.node_id} ('{node.name}') has {name} {real:#x}, expected is "
-                f"{value:#x}; {hint}"
-            )
+        return read_identity(self.sdo(node))
 
     def pre_operational(self) -> None:
         """Order all nodes into pre-operational; a drive that still moves stops (6007h).

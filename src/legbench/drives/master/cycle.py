@@ -6,15 +6,17 @@ tick, that tick is silent: without a SYNC, whatever comes answers an earlier one
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple, final
+from typing import final
 
 import can
 
 from legbench.drives.errors import BusError
 from legbench.drives.master.axis_link import AxisLink
 from legbench.drives.master.notices import Notices
+from legbench.drives.master.outgoing import Outgoing
 from legbench.drives.master.port import Port
 from legbench.drives.master.temperature import TemperaturePoll
+from legbench.drives.master.tick import Tick
 from legbench.drives.master.watch import NodeWatch
 from legbench.drives.protocol.frame import (
     EMCY_BASE,
@@ -25,26 +27,10 @@ from legbench.drives.protocol.frame import (
     SDO_REQUEST_BASE,
     SYNC_ID,
 )
-from legbench.drives.protocol.nmt import NmtState, heartbeat_frame
 from legbench.drives.setup.config import BusConfig
 
 ERROR_FRAME_BUS_OFF = 0x40
 """Class bit of a SocketCAN error frame that says that this controller is bus-off."""
-
-
-class Tick(NamedTuple):
-    """Start of a cycle: its time, its delay and the ticks without SYNC before it."""
-
-    time_ns: int
-    """Time of SYNC on the bus's time base [ns]."""
-    late_ns: int
-    """Delay of SYNC after its place on the grid [ns]."""
-    skipped: int
-    """Number of ticks without SYNC before this one, for whatever reason."""
-    silent: int
-    """Number of skipped ticks that this master left out on purpose, or that were another's."""
-    complete: bool
-    """Whether all process data came before the deadline."""
 
 
 @final
@@ -92,22 +78,18 @@ class Cycle:
         }
         self._period_ns = config.period_ns
         self._deadline_ns = 1000 * config.tpdo_deadline_us
-        self._beat = heartbeat_frame(config.master_id, NmtState.OPERATIONAL)
-        self._beat_ns = 1_000_000 * config.master_heartbeat_ms
-        self._due_ns = self._beat_due_ns = 0
+        self._due_ns = 0
         self._count = 0
         self._owed: set[int] = set()
         """COB-IDs of process data that has not come, and still may."""
         self._sync = port.message(SYNC_ID)
-        self._commands = {
-            cob_id: port.message(cob_id) for axis in self.axes for cob_id in axis.rpdo_ids
-        }
+        self._outgoing = Outgoing(port, config, self.axes, self.polls, self._failed)
 
     def begin(self) -> None:
         """Lay the grid: the next tick is one period from now, on a whole period."""
         now_ns = self._port.timebase.now_ns()
         self._due_ns = (now_ns // self._period_ns + 1) * self._period_ns
-        self._beat_due_ns = self._due_ns + self._beat_ns
+        self._outgoing.begin(self._due_ns)
         self.arm()
 
     def arm(self) -> None:
@@ -216,36 +198,12 @@ class Cycle:
         A frame that is refused keeps no other drive from its own. A drive without a controlword
         gets no frame.
         """
-        sent = True
-        for axis, controlword in zip(self.axes, controlwords, strict=True):
-            if controlword is None:
-                continue
-            for cob_id, data in axis.frames(controlword):
-                message = self._commands[cob_id]
-                message.data = bytearray(data)
-                message.dlc = len(data)
-                try:
-                    self._port.put(message)
-                except BusError as error:
-                    self._failed(error)
-                    sent = False
+        sent = self._outgoing.commands(controlwords)
         return self.send_rest() and sent
 
     def send_rest(self) -> bool:
         """Send heartbeat and polls, where due; false if the bus failed."""
-        try:
-            # The heartbeat follows the grid, not the cycles: silent ticks must not delay it.
-            if self._due_ns >= self._beat_due_ns:
-                self._port.send_frame(self._beat)
-                self._beat_due_ns = self._due_ns + self._beat_ns
-            for place, poll in enumerate(self.polls):
-                frame = poll.due(self._count + place)
-                if frame is not None:
-                    self._port.send_frame(frame)
-        except BusError as error:
-            self._failed(error)
-            return False
-        return True
+        return self._outgoing.rest(self._due_ns, self._count)
 
     def other(self, message: can.Message) -> None:
         """Take a frame that is no process data of this cycle."""

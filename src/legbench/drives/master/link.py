@@ -13,61 +13,31 @@ Whatever goes wrong, all drives are told to stop in the same cycle and the first
 
 import math
 from collections.abc import Sequence
-from enum import Enum, auto
 from typing import final
 
 import can
 
 from legbench.drives.errors import DriveError
-from legbench.drives.master.bring_up import BringUp
-from legbench.drives.master.cycle import Cycle, Tick
-from legbench.drives.master.parking import park
+from legbench.drives.master.link_state import LinkState
+from legbench.drives.master.move import missed, move
+from legbench.drives.master.opening import Opening
 from legbench.drives.master.port import Listener, Port
-from legbench.drives.master.read_only import may_pace, may_read
 from legbench.drives.master.sample import Sample, sample_of
-from legbench.drives.master.sdo_stop import leave_operational
-from legbench.drives.master.start_up import StartUp
-from legbench.drives.master.stop import StopLadder
-from legbench.drives.master.stop_report import Lead, StopReport
-from legbench.drives.master.supervisor import Supervisor
+from legbench.drives.master.tick import Tick
 from legbench.drives.protocol.cia402 import Goal
-from legbench.drives.protocol.nmt import NmtState
 from legbench.drives.setup.config import BusConfig, check_start_speed
-from legbench.drives.setup.master_watch import check_master_watch
 from legbench.drives.setup.wire import check_load
 from legbench.drives.transport.lock import ChannelLock
 from legbench.drives.transport.open_bus import timebase_of
 from legbench.drives.transport.timebase import Timebase
 from legbench.errors import PlantFault
-from legbench.interrupts import Shield, shielded
 from legbench.limits.guard import Guard
 from legbench.limits.safety import SafetyLimits
 from legbench.limits.shortfall import Shortfall
 
-LISTEN_NS = 100_000_000
-"""Time that a read-only link listens for another master's SYNC and for heartbeats [ns]."""
-ARRIVED = 1e-9
-"""Largest distance from a target that counts as reached [rad]."""
-
-
-class LinkState(Enum):
-    """States of a link, from new to stopped."""
-
-    NEW = auto()
-    CONFIGURED = auto()
-    """Identity is checked, configuration written and read back; nothing moves."""
-    CYCLIC = auto()
-    """Process data is exchanged, targets follow the motors."""
-    RUNNING = auto()
-    """All drives are in operation enabled, commands are taken."""
-    STOPPING = auto()
-    """Drives have been told to stop, and not every one has been seen without power yet."""
-    STOPPED = auto()
-    """Every drive has been seen without power; or this link never led one."""
-
 
 @final
-class Link(Lead):
+class Link(Opening):
     """Cyclic link of one master to its drives over a bus.
 
     Attributes:
@@ -107,127 +77,14 @@ class Link(Lead):
             ConfigError: the bus cannot carry the schedule.
         """
         check_load(config)
-        self._config, self._limits = config, limits or SafetyLimits()
-        self._port = Port(bus, timebase or timebase_of(bus), listener)
-        self._read_only = read_only
-        self._lock = lock or ChannelLock(str(bus.channel_info))
+        port = Port(bus, timebase or timebase_of(bus), listener)
+        lock = lock or ChannelLock(str(bus.channel_info))
+        super().__init__(port, config, limits or SafetyLimits(), lock, read_only=read_only)
         self._stiffness = tuple(float(value) for value in stiffness)
-        self.cycle = Cycle(self._port, config)
-        self.bring_up = BringUp(self._port, config, self.cycle.other)
         self._guard = Guard(self._limits, config.period)
-        self.state = LinkState.NEW
-        self.fault: PlantFault | None = None
         self.skipped_total = 0
-        self.stopped: StopReport | None = None
-        self.not_parked: list[str] = []
-        self._supervisor = Supervisor(self.cycle, config, self._limits, self._port.timebase)
-        self._start_up = StartUp(self._port, self.cycle, config, read_only=read_only)
         self._last = Tick(0, 0, 0, 0, False)
         self._expected: list[tuple[float, ...]] = []
-        self._holds = self._closed = self._leads = False
-        self._told: Listener | None = None
-        self.listening = False
-
-    def tell(self, listener: Listener) -> None:
-        """Show every frame to a listener from now on, or from when the drives are configured.
-
-        A log that holds their configuration would, played back, bring parked drives back to life.
-        """
-        self._told = listener
-        if self.state is not LinkState.NEW:
-            self._port.listener = listener
-
-    @property
-    def listener_error(self) -> str | None:
-        """Error that a listener raised, in one line; the listener is not called again."""
-        return self._port.listener_error
-
-    # --- before anything moves ---------------------------------------------------------------
-
-    def open(self) -> None:
-        """Take the channel, check who is there, write and read back the configuration.
-
-        In read-only nothing is written, and the channel is taken only if SYNC has to come from
-        here.
-
-        Raises:
-            ConfigError: a drive would go on for too long without its master.
-            BusError: the channel has a master, or the interface does not work.
-            DriveError: a drive is missing, is another one, or refuses its configuration; or, in
-                read-only, is not configured.
-            PlantFault: in read-only, somebody else is about to lead the drives.
-        """
-        if self.state is not LinkState.NEW:
-            return
-        try:
-            if self._read_only:
-                self._prepare_to_look()
-            else:
-                check_master_watch(self._config, speed=self._limits.command_speed)
-                self._hold()
-                self._prepare_to_move()
-            for node, poll in zip(self._config.nodes, self.cycle.polls, strict=True):
-                reading = self.bring_up.temperature(node)
-                if reading is not None:
-                    poll.take(reading)
-        except BaseException:
-            self._let_go()
-            raise
-        self.state = LinkState.CONFIGURED
-        if self._told is not None:
-            self._port.listener = self._told
-
-    def _hold(self) -> None:
-        self._lock.acquire()
-        self._holds = True
-
-    def _let_go(self) -> None:
-        if self._holds:
-            self._holds = False
-            self._lock.release()
-
-    def _prepare_to_move(self) -> None:
-        self.bring_up.listen()
-        self.bring_up.identify()
-        self.bring_up.unpower()
-        self.bring_up.glance()
-        self.bring_up.pre_operational()
-        for node in self._config.nodes:
-            self.bring_up.configure(node)
-            self.bring_up.check_soft_limits(node)
-            self.bring_up.preload(node)
-
-    def _prepare_to_look(self) -> None:
-        """Prepare a read-only link: listen to another master's SYNC, or send SYNC if there is none.
-
-        Raises:
-            BusError: a master of this computer holds the channel, and sends no SYNC yet.
-            DriveError: a drive is not configured, or somebody leads it without SYNC.
-            PlantFault: somebody else is about to lead them.
-        """
-        self._port.may_send = may_read
-        now_ns = self._port.timebase.now_ns()
-        self.listening = self.cycle.hears_sync(now_ns + LISTEN_NS)
-        self._start_up.listening = self.listening
-        if self.listening:
-            self.bring_up.lookout.rest()
-        else:
-            self._hold()
-            self.bring_up.listen()
-        self.bring_up.identify()
-        self.bring_up.refuse_differences()
-        if self.listening:
-            return
-        for node, watch in zip(self._config.nodes, self.cycle.watches, strict=True):
-            powered = self.bring_up.powered(node)
-            if powered or watch.state is NmtState.OPERATIONAL:
-                raise DriveError(
-                    f"drive '{node.name}' (node {node.node_id}) "
-                    f"{'has power' if powered else 'is operational'}, though nobody sends SYNC: "
-                    "somebody else leads it, and read-only does not interfere; end that program"
-                )
-        self._supervisor.alone()
-        self._port.may_send = may_pace(self._config.master_id)
 
     def start(self, *, clear_faults: bool = False) -> Sample:
         """Open if need be, let process data settle, enable all drives where they stand.
@@ -378,39 +235,15 @@ class Link(Lead):
         """
         pace = self._config.start_speed if speed is None else speed
         check_start_speed(pace)
-        step = pace * self._config.period
         wanted = tuple(float(value) for value in motor_pos)
         if not all(map(math.isfinite, wanted)):
             self.command(wanted)  # refused there, and the drives stopped
-        sample = self._sample()
-        while self._guard.applied != wanted:
-            before = self._guard.applied
-            applied = self.command(
-                [
-                    target
-                    if abs(target - last) <= step
-                    else last + (step if target > last else -step)
-                    for target, last in zip(wanted, before, strict=True)
-                ]
-            )
-            sample = self.exchange()
-            if applied == before:
-                break
-        for _ in range(2):
-            self.command(self._guard.applied)
-            sample = self.exchange()
-        self._check_arrived(wanted)
-        return sample
-
-    def _check_arrived(self, wanted: Sequence[float]) -> None:
-        applied, end = self._guard.applied, self._guard.reachable(wanted)
-        if not all(abs(a - b) < ARRIVED for a, b in zip(applied, end, strict=True)):
-            error = PlantFault(
-                "start posture",
-                f"the motors were led to {applied} rad, not to {end} rad; the move has failed",
-            )
+        sample = move(self, self._guard, wanted, pace * self._config.period)
+        error = missed(self._guard, wanted)
+        if error is not None:
             self._end(error)
             raise error
+        return sample
 
     def _tick(self) -> Tick:
         self._last = tick = self.cycle.follow() if self.listening else self.cycle.tick()
@@ -442,79 +275,8 @@ class Link(Lead):
             elapsed=1 + sample.skipped,
         )
 
-    def _end(self, error: PlantFault) -> None:
-        """Keep the first cause, stop all drives at once."""
-        if self.fault is None:
-            self.fault = error
-        self.stop()
-
     def _refuse_ended(self) -> None:
         if self.fault is not None:
             raise self.fault
         if self.state not in (LinkState.CYCLIC, LinkState.RUNNING):
             raise DriveError(f"the link is {self.state.name.lower()}; start it first")
-
-    # --- the end -----------------------------------------------------------------------------
-
-    def stop(self) -> None:
-        """Quick stop of all drives in this cycle, then no power, then a look whether it is gone.
-
-        Raises no error; `stopped` tells how it has ended. No signal gets in between: a ^C that
-        comes meanwhile is raised at the end. While the stop is not verified, calling it again
-        repeats it. Drives that another master took before this one led them are left to it.
-        """
-        if self.state not in (LinkState.CYCLIC, LinkState.RUNNING, LinkState.STOPPING):
-            return
-        with shielded() as shield:
-            self.state = LinkState.STOPPING
-            if self._read_only or (not self._leads and self._led_by_another(shield)):
-                self.state = LinkState.STOPPED
-            else:
-                self._note(StopLadder(self.cycle, shield.hold).run())
-
-    def close(self) -> None:
-        """Stop, leave the drives parked in pre-operational, release the channel; raises no error.
-
-        A second call does nothing. A stop that is not verified is repeated, in the end over SDO. A
-        link that only looks leaves the drives of another master alone.
-        """
-        if self.state is LinkState.NEW or self._closed:
-            return
-        with shielded() as shield:
-            looked = self.listening or self.state is LinkState.CONFIGURED
-            self.stop()
-            led = self._led_by_another(shield)
-            if not ((led and not self._leads) or (self._read_only and looked)):
-                order, nodes = self.bring_up.pre_operational, self._config.nodes
-                report = leave_operational(order, self._port, nodes, self.stopped, shield.hold)
-                if report is not None:
-                    self._note(report)
-            if not (self._read_only or led):
-                self._park(shield)
-            self._let_go()
-            self._closed = True
-            if self.state is not LinkState.STOPPING:
-                self.state = LinkState.STOPPED
-
-    def _note(self, report: StopReport) -> None:
-        """Remember how a stop has ended; one that repeats another keeps what that had to tell."""
-        self.stopped = report.after(self.stopped)
-        if report.verified:
-            self.state = LinkState.STOPPED
-
-    def _park(self, shield: Shield) -> None:
-        """Switch the drives' command frames off, so that no recorded log moves them."""
-        try:
-            powered = () if self.stopped is None else self.stopped.powered
-            self.not_parked = park(self._port, self._config, self.cycle.other, powered)
-        except BaseException as error:  # Whatever a driver raises, the channel is still released.
-            self.not_parked = [f"the drives are not parked: {error!r}"]
-            shield.hold(error)
-
-    def _led_by_another(self, shield: Shield) -> bool:
-        """Whether another master has been heard; where that cannot be told, by what is known."""
-        try:
-            return self.cycle.led_by_another()
-        except BaseException as error:  # Whatever a driver raises, the stop goes on.
-            shield.hold(error)
-            return self._read_only or self.cycle.stranger is not None

@@ -4,7 +4,8 @@ from collections.abc import Sequence
 from operator import attrgetter
 from typing import NamedTuple
 
-from legbench.drives.master.cycle import Cycle, Tick
+from legbench.drives.master.cycle import Cycle
+from legbench.drives.master.tick import Tick
 
 _MOTOR, _LINK = attrgetter("motor_pos"), attrgetter("link_pos")
 _STATUSWORD, _FRESH, _CELSIUS = map(attrgetter, ("statusword", "fresh", "celsius"))

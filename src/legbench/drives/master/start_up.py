@@ -5,8 +5,9 @@ from typing import final
 
 from legbench.drives.errors import DriveError
 from legbench.drives.master.axis_link import AxisLink
-from legbench.drives.master.cycle import Cycle, Tick
+from legbench.drives.master.cycle import Cycle
 from legbench.drives.master.port import Port
+from legbench.drives.master.tick import Tick
 from legbench.drives.protocol.cia402 import (
     DriveState,
     Goal,

@@ -3,7 +3,8 @@
 import math
 from typing import final
 
-from legbench.drives.master.cycle import Cycle, Tick
+from legbench.drives.master.cycle import Cycle
+from legbench.drives.master.tick import Tick
 from legbench.drives.protocol.cia402 import StatusBit, Way, describe_statusword
 from legbench.drives.setup.config import BusConfig
 from legbench.drives.transport.timebase import Timebase
