@@ -24,7 +24,8 @@ from legbench.design.toml import design_to_mapping
 from legbench.errors import ConfigError
 from legbench.interrupts import ignore_interrupts
 from legbench.modes.drive import AbstractDrive, JumpLaw, Passive
-from legbench.modes.hop import NAMES, UNITS, Apex, Ending, return_map
+from legbench.modes.fixed_point import UNITS
+from legbench.modes.hop import NAMES, Apex, Ending, return_map
 from legbench.reading import parse_json
 from legbench.signals import Floats, Ints
 
