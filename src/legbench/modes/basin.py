@@ -103,7 +103,7 @@ class Question:
     tolerance: float = MAP_TOLERANCE
     """Tolerance of the integration; far below `near`, which decides [-]."""
     near: float = 0.05
-    """Distance from the periodic hop that counts as returned, in units of `fixed_point.UNITS` [-]."""
+    """Distance from the periodic hop that counts as returned, in `fixed_point.UNITS` [-]."""
 
     def __post_init__(self) -> None:
         if self.across.name == self.up.name:
