@@ -3,7 +3,8 @@
 import tempfile
 from pathlib import Path
 
-from legbench.commissioning.fault_trial import TRIALS, Result, try_fault
+from legbench.commissioning.fault_table import TRIALS
+from legbench.commissioning.fault_trial import Result, try_fault
 from legbench.design import load_design
 from legbench.viz.live.launch import LiveView, start_live
 

@@ -14,7 +14,8 @@ from unittest import mock
 from sequence_draw import Interrupt, Schedule, Sequence
 
 from legbench import loop
-from legbench.commissioning.fault_trial import SILENCE_NS, excess_of
+from legbench.commissioning.command_excess import excess_of
+from legbench.commissioning.fault_trial import SILENCE_NS
 from legbench.control import BangBangConfig, JumpConfig, PositionJumpConfig
 from legbench.control.settings import ControllerSettings
 from legbench.design import LegDesign, load_design

@@ -14,6 +14,8 @@ FIRST_WORDS = re.compile(
     re.IGNORECASE,
 )
 """Prepositions and conjunctions: a docstring that begins with one leans on its neighbour."""
+MOST_LINES, MOST_FUNCTION_LINES = 300, 50
+"""Longest source file, and longest function with its docstring and without its decorators."""
 
 
 def docstrings(tree: ast.AST) -> Iterator[tuple[int, str]]:
@@ -37,5 +39,25 @@ def test_docstrings_can_be_read_alone() -> None:
         for path in SOURCES
         for line, text in docstrings(ast.parse(path.read_text(encoding="utf-8")))
         if FIRST_WORDS.match(text)
+    ]
+    assert found == []
+
+
+def test_no_file_is_too_long_to_be_read_at_once() -> None:
+    found = [
+        f"{path.parent.name}/{path.name}: {count} lines"
+        for path in SOURCES
+        if (count := len(path.read_text(encoding="utf-8").splitlines())) > MOST_LINES
+    ]
+    assert found == []
+
+
+def test_no_function_is_too_long_to_be_seen_at_once() -> None:
+    found = [
+        f"{path.name}:{node.lineno}: {node.name}, {size} lines"
+        for path in SOURCES
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+        and (size := (node.end_lineno or node.lineno) - node.lineno + 1) > MOST_FUNCTION_LINES
     ]
     assert found == []

@@ -142,13 +142,7 @@ def _cycle(
         now = time.perf_counter()
         cycle_us, previous = 1e6 * (now - previous), now
     wall_time = time.perf_counter() - began
-    if fault is not None:
-        ending = ("fault", fault.cause, str(fault))
-    elif stop.is_set:
-        ending = ("interrupted", None, None)
-    else:
-        ending = ("complete", None, None)
-    status, cause, message = ending
+    status, cause, message = _ending(fault, stop)
     return Outcome(
         status=status,
         cause=cause,
@@ -157,6 +151,13 @@ def _cycle(
         wall_time=wall_time,
         time=observation.time,
     )
+
+
+def _ending(fault: PlantFault | None, stop: StopFlag) -> tuple[str, str | None, str | None]:
+    """Status, cause and message of a loop that has ended."""
+    if fault is not None:
+        return "fault", fault.cause, str(fault)
+    return "interrupted" if stop.is_set else "complete", None, None
 
 
 def _to_rest(plant: AbstractPlant, motor_pos: Floats, outcome: Outcome, stop: StopFlag) -> Outcome:

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from can_rig import BUS, ROOT
 
-from legbench.commissioning.fault_trial import TRIALS, Trial, try_fault
+from legbench.commissioning.fault_table import TRIALS, Trial
+from legbench.commissioning.fault_trial import try_fault
 from legbench.design import load_design
 from legbench.plants import BUS_LOG
 from legbench.recording.reader import load

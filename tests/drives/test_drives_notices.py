@@ -6,7 +6,8 @@ import pytest
 from can_rig import BUS, LIMITS, ROOT
 from drives_rig import rig
 
-from legbench.commissioning.fault_trial import Trial, try_fault
+from legbench.commissioning.fault_table import Trial
+from legbench.commissioning.fault_trial import try_fault
 from legbench.control import BangBangConfig
 from legbench.design import load_design
 from legbench.design.setup import Setup, SetupKind

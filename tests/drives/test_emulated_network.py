@@ -16,7 +16,9 @@ from legbench.drives.emulated.faults import (
     NodeFaultKind,
 )
 from legbench.drives.emulated.injector import Injector
-from legbench.drives.emulated.network import Network, Station, Stuffing
+from legbench.drives.emulated.network import Network
+from legbench.drives.emulated.station import Station
+from legbench.drives.emulated.stuffing import Stuffing
 from legbench.drives.errors import BusError
 from legbench.drives.protocol.frame import Frame
 from legbench.drives.setup.wire import exact_bits, plain_bits, worst_bits

@@ -25,18 +25,8 @@ pytest.importorskip("heyoka")
 from legbench.analytic.taylor import TaylorLeg
 from legbench.modes.basin import Axis, Fate, Question, map_basin
 from legbench.modes.drive import JumpLaw, Passive
-from legbench.modes.hop import (
-    UNITS,
-    Apex,
-    Ending,
-    FixedPoint,
-    apex_of,
-    derivative,
-    differences,
-    fixed_point,
-    return_map,
-    settle,
-)
+from legbench.modes.fixed_point import UNITS, FixedPoint, derivative, differences, fixed_point
+from legbench.modes.hop import Apex, Ending, apex_of, return_map, settle
 from legbench.modes.passive import FreeHop, depths, free_hop, rebound
 from legbench.modes.slip import Slip, slip_groups
 

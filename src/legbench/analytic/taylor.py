@@ -7,9 +7,10 @@ tenth of a millisecond at an error near rounding. `varied` is the same leg on du
 from dataclasses import replace
 from typing import final
 
-from legbench.analytic.compiled import MAX_EVENTS, SILENT, Compiled, Levels, Watched
+from legbench.analytic.compiled import MAX_EVENTS, SILENT, Compiled, Levels
 from legbench.analytic.dual import DUAL
 from legbench.analytic.equations import Pair
+from legbench.analytic.formulas import Watched
 from legbench.analytic.hybrid import overdue, switch
 from legbench.analytic.model import LegModel
 from legbench.analytic.smooth import Accuracy

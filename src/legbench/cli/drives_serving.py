@@ -4,12 +4,16 @@ import math
 import sys
 import time
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from legbench.cli.drives_reading import Bench
 from legbench.cli.output import note, print_json
 from legbench.errors import ConfigError
+
+if TYPE_CHECKING:
+    from legbench.drives.setup.config import BusConfig
 
 UNIX, SLCAN = "legbench_unix", "slcan"
 """Interfaces of a bus behind a socket file, and behind a terminal."""
@@ -18,6 +22,19 @@ UNIX, SLCAN = "legbench_unix", "slcan"
 def _check_time(name: str, value: float) -> None:
     if not value > 0.0:
         raise ConfigError(f"{name} is {value:g} s; it must be positive")
+
+
+def _at_bitrate(config: "BusConfig", bitrate: int | None) -> "BusConfig":
+    return config if bitrate is None else replace(config, bitrate=bitrate)
+
+
+def _print_state(as_json: bool, at: float, node: str, state: str) -> None:
+    """Print the new state of a drive, `at` so many seconds after the start."""
+    if as_json:
+        print_json({"time": at, "node": node, "state": state})
+    else:
+        print(f"{at:9.3f} s  {node}: {state}")
+    sys.stdout.flush()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,9 +73,7 @@ class Emulate:
         chosen = Experiment(design=bench.leg(), controller=JumpConfig())
         start = start_of(chosen)
         body = stiff_body if self.bare else EmulatedLeg(chosen.design, chosen.options, start)
-        config = bench.config()
-        if bench.bitrate is not None:
-            config = replace(config, bitrate=bench.bitrate)
+        config = _at_bitrate(bench.config(), bench.bitrate)
         end = time.monotonic() + self.seconds
         where = None if bench.channel is None else Path(bench.channel)
 
@@ -76,13 +91,6 @@ class Emulate:
             at = f" --bitrate {config.bitrate}" if isinstance(server, SlcanServer) else ""
             note(f"serving {channel}; use it with --interface {interface} --channel {channel}{at}")
 
-        def report(at: float, node: str, state: str) -> None:
-            if bench.json:
-                print_json({"time": at, "node": node, "state": state})
-            else:
-                print(f"{at:9.3f} s  {node}: {state}")
-            sys.stdout.flush()
-
         with stop_on_interrupt() as stop:
             serve(
                 config,
@@ -90,7 +98,7 @@ class Emulate:
                 start_pos=tuple(start.motor_pos.tolist()),
                 body=body,
                 patience=self.patience,
-                report=report,
+                report=partial(_print_state, bench.json),
                 ready=ready,
                 stop=lambda: stop.is_set or time.monotonic() > end,
             )

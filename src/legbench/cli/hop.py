@@ -18,7 +18,8 @@ from legbench.design.statics import Support
 from legbench.errors import ConfigError
 from legbench.modes.basin import Axis, Fate, Question, map_basin
 from legbench.modes.drive import JumpLaw, Passive
-from legbench.modes.hop import Apex, Ending, FixedPoint, fixed_point, return_map, settle
+from legbench.modes.fixed_point import FixedPoint, fixed_point
+from legbench.modes.hop import Apex, Ending, return_map, settle
 from legbench.modes.passive import FreeHop, depths, free_hop
 from legbench.modes.scene import make_scene
 from legbench.modes.slip import Slip, leg_groups, slip_groups

@@ -10,6 +10,7 @@ from legbench.errors import MissingExtraError
 from legbench.experiment.data import Experiment
 
 if TYPE_CHECKING:
+    from legbench.experiment.running import Finished
     from legbench.viz.live.launch import LiveView
 
 
@@ -60,14 +61,11 @@ def main(arguments: list[str]) -> int:
     except UsageError as error:
         report_error(str(error))
         return 2
-    from legbench.cli.table import limited, print_summary
     from legbench.cli.waived import tell_waived_of
     from legbench.clock import WallClock
     from legbench.experiment.running import record
     from legbench.interrupts import stop_on_interrupt
-    from legbench.metrics import summarise
     from legbench.plant.start import PERIOD
-    from legbench.recording.reader import load
 
     chosen, experiment = asked.arguments, asked.experiment
     tell_waived_of(experiment.plant)
@@ -85,6 +83,15 @@ def main(arguments: list[str]) -> int:
             on_started=watching.start if watched else None,
         )
     watching.stop()
+    return _report(finished, as_json=chosen.json)
+
+
+def _report(finished: "Finished", *, as_json: bool) -> int:
+    """Print how a run ended and what it is worth; its exit status."""
+    from legbench.cli.table import limited, print_summary
+    from legbench.metrics import summarise
+    from legbench.recording.reader import load
+
     if finished.outcome.status == "interrupted" and finished.outcome.cycles == 0:
         report_error(f"interrupted before the first row; {finished.path} holds 0 rows")
         return 130
@@ -96,7 +103,7 @@ def main(arguments: list[str]) -> int:
             f"legbench: the limits changed the command in {limited(summary)}: the leg ran "
             "something else than it was asked to; the event 'limited' in events.jsonl says more"
         )
-    if chosen.json:
+    if as_json:
         print_json(summary.to_json())
     else:
         print_summary(summary)

@@ -49,15 +49,7 @@ def serve(
         BusError: the bus cannot be opened, or has failed.
         PlantFault: the leg has come apart.
     """
-    behaviours = [
-        Behaviour(
-            reply_delay_us=(0, 0),
-            start_pos=pos,
-            missing_limit=patience,
-            sync_loss_periods=patience,
-        )
-        for pos in start_pos
-    ]
+    behaviours = [_behaviour(pos, patience) for pos in start_pos]
     # A master on the same processor goes first, as it would on one of its own.
     ask(priority=PRIORITY - 1)
     network = emulate(config, behaviours, body=body)
@@ -74,3 +66,13 @@ def serve(
                 if shown.get(node.name) is not state:
                     shown[node.name] = state
                     reporting(time.monotonic() - began, node.name, state.value)
+
+
+def _behaviour(start_pos: float, patience: int) -> Behaviour:
+    """Behaviour of a drive that replies at once and starts at a motor position [rad]."""
+    return Behaviour(
+        reply_delay_us=(0, 0),
+        start_pos=start_pos,
+        missing_limit=patience,
+        sync_loss_periods=patience,
+    )

@@ -170,15 +170,7 @@ class Guard:
             PlantFault: a limit is exceeded.
         """
         limits = self._limits
-        for axis, (value, (low, high)) in enumerate(
-            zip(joint_pos, limits.joint_range, strict=True), start=1
-        ):
-            if not low <= value <= high:
-                raise PlantFault(
-                    "joint range",
-                    f"joint {axis} is at {value:.3f} rad, the limits are [{low:g}, {high:g}] rad",
-                )
-        self._check_knee(joint_pos)
+        self._check_joints(joint_pos)
         for axis, value in enumerate(spring_torque, start=1):
             if not abs(value) <= limits.spring_torque:
                 raise PlantFault(
@@ -196,7 +188,15 @@ class Guard:
         if expected_pos is not None:
             self._check_encoders(motor_pos, joint_pos, expected_pos, fresh, elapsed)
 
-    def _check_knee(self, joint_pos: Sequence[float]) -> None:
+    def _check_joints(self, joint_pos: Sequence[float]) -> None:
+        for axis, (value, (low, high)) in enumerate(
+            zip(joint_pos, self._limits.joint_range, strict=True), start=1
+        ):
+            if not low <= value <= high:
+                raise PlantFault(
+                    "joint range",
+                    f"joint {axis} is at {value:.3f} rad, the limits are [{low:g}, {high:g}] rad",
+                )
         low, high = self._limits.joint_knee_range
         if (low, high) != UNLIMITED and not low <= knee_of(joint_pos) <= high:
             raise PlantFault(

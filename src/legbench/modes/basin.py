@@ -24,7 +24,8 @@ from legbench.design.toml import design_to_mapping
 from legbench.errors import ConfigError
 from legbench.interrupts import ignore_interrupts
 from legbench.modes.drive import AbstractDrive, JumpLaw, Passive
-from legbench.modes.hop import NAMES, UNITS, Apex, Ending, return_map
+from legbench.modes.fixed_point import UNITS
+from legbench.modes.hop import NAMES, Apex, Ending, return_map
 from legbench.reading import parse_json
 from legbench.signals import Floats, Ints
 
@@ -102,7 +103,7 @@ class Question:
     tolerance: float = MAP_TOLERANCE
     """Tolerance of the integration; far below `near`, which decides [-]."""
     near: float = 0.05
-    """Distance from the periodic hop that counts as returned, in units of `hop.UNITS` [-]."""
+    """Distance from the periodic hop that counts as returned, in `fixed_point.UNITS` [-]."""
 
     def __post_init__(self) -> None:
         if self.across.name == self.up.name:

@@ -22,7 +22,8 @@ from legbench.analytic.hybrid import switch
 from legbench.analytic.state import standing
 from legbench.analytic.taylor import SILENT, TaylorLeg, Watched
 from legbench.modes.drive import Passive
-from legbench.modes.hop import SCALE, UNITS, Apex, FixedPoint, apex_of, differences, return_map
+from legbench.modes.fixed_point import UNITS, FixedPoint, differences
+from legbench.modes.hop import SCALE, Apex, apex_of, return_map
 from legbench.signals import Floats
 
 STANCE = 2.0

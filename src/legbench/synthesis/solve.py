@@ -128,11 +128,20 @@ def solve(
         trace.close()
     if not found.feasible:
         raise DesignError(explain(requirements, found.free))
-    free = refine(requirements, found.free) if plain and found.complete else found.free
+    settled = plain and found.complete
+    check = evolve(requirements.bounds, total, settings.seed) if settled and cross_check else None
+    return _judged(requirements, found, check, seed=settings.seed, plain=plain)
+
+
+def _judged(
+    requirements: Requirements, found: Found, check: Found | None, *, seed: int, plain: bool
+) -> Solution:
+    """Refine what the search found, if it minimised objective (11) alone, and judge the leg."""
+    settled = plain and found.complete
+    free = refine(requirements, found.free) if settled else found.free
     design = design_of(requirements, free)
     value = float(objective(requirements, solve_dependent(requirements, free)))
     angle = standing_angle(design, requirements.relaxed_length)
-    settled = plain and found.complete
     return Solution(
         requirements=requirements,
         design=design,
@@ -143,10 +152,8 @@ def solve(
         active=active_bounds(requirements, free) if settled else (),
         evaluations=found.evaluations,
         complete=found.complete,
-        seed=settings.seed,
-        check=(
-            evolve(requirements.bounds, total, settings.seed) if settled and cross_check else None
-        ),
+        seed=seed,
+        check=check,
     )
 
 

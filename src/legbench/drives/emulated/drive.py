@@ -1,14 +1,15 @@
 """An emulated CiA 301/402 drive: frames in, frames out, time is an argument; pure."""
 
 import random
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import final
 
 from legbench.drives.emulated.axis import SYNC_MISSING, Axis
 from legbench.drives.emulated.behaviour import Behaviour
+from legbench.drives.emulated.heartbeats import HeartbeatConsumer
+from legbench.drives.emulated.identity import write_identity
 from legbench.drives.emulated.process_data import LAST_SYNCHRONOUS, ProcessData
 from legbench.drives.emulated.store import ObjectStore
-from legbench.drives.errors import SdoAbortError
 from legbench.drives.protocol.cia402 import DriveState
 from legbench.drives.protocol.frame import (
     HEARTBEAT_BASE,
@@ -19,14 +20,7 @@ from legbench.drives.protocol.frame import (
     SYNC_ID,
     Frame,
 )
-from legbench.drives.protocol.nmt import (
-    HeartbeatWatch,
-    NmtCommand,
-    NmtState,
-    decode_heartbeat,
-    decode_nmt,
-    heartbeat_frame,
-)
+from legbench.drives.protocol.nmt import NmtCommand, NmtState, decode_nmt, heartbeat_frame
 from legbench.drives.protocol.objects import OBJECTS, TEMPERATURE, Key
 from legbench.drives.protocol.sdo import Abort
 from legbench.drives.protocol.sdo_server import SdoServer
@@ -64,7 +58,7 @@ class EmulatedDrive:
         self._random = random.Random(self._behaviour.seed * LAST_NODE + node.node_id)
         self._store = ObjectStore(OBJECTS.values(), self._check, self._written)
         self._values = self._store.values
-        self._personal()
+        write_identity(self._values, self._node)
         self.axis = Axis(node, self._behaviour, self._values)
         self._pdos = ProcessData(self._store)
         self._sdo = SdoServer(self._store.read, self._store.write)
@@ -75,7 +69,7 @@ class EmulatedDrive:
         self._beat_ns = 0
         self._sync_ns: int | None = None
         self._fresh = False
-        self._watches: dict[int, HeartbeatWatch] = {}
+        self._heartbeats = HeartbeatConsumer(self._values)
         self._out: list[tuple[int, Frame]] = []
         self._mute = False
         self._recall()
@@ -85,16 +79,6 @@ class EmulatedDrive:
             entry = self._store.entry(parameter.key)
             if entry is not None:
                 self._store.put(entry, parameter.value)
-
-    def _personal(self) -> None:
-        identity, node_id = self._node.identity, self._node.node_id
-        values = self._values
-        values[0x1018, 1], values[0x1018, 2] = identity.vendor, identity.product
-        values[0x1018, 3], values[0x1018, 4] = identity.revision or 0, identity.serial or 0
-        values[0x1014, 0] = 0x80 + node_id
-        for base in (0x1400, 0x1800):
-            for number in range(4):
-                values[base + number, 1] += node_id
 
     # --- what the wire and the body call -----------------------------------------------------
 
@@ -145,7 +129,8 @@ class EmulatedDrive:
         self.axis.sense(link_pos, spring_torque)
         self.axis.publish()
         if self.state is NmtState.OPERATIONAL:
-            self._events()
+            for frame in self._pdos.events(self._now_ns):
+                self._send(frame)
 
     # --- faults to inject --------------------------------------------------------------------
 
@@ -153,11 +138,11 @@ class EmulatedDrive:
         """Start over, as after a brown-out: configuration and state are lost."""
         self._now_ns = now_ns
         self._store.load_defaults()
-        self._personal()
+        write_identity(self._values, self._node)
         self.axis.restart()
         self._pdos.rebuild()
         self._recall()
-        self._watches.clear()
+        self._heartbeats.clear()
         self._out.clear()
         self.state, self._sync_ns, self._fresh = NmtState.BOOT_UP, None, False
         self._boot_ns = now_ns + 1000 * self._behaviour.boot_us
@@ -203,7 +188,7 @@ class EmulatedDrive:
             if key[0] & 0x200 or key[1] in (1, 2, 5):
                 self._pdos.rebuild()
         elif key[0] == 0x1016:
-            self._watches.clear()
+            self._heartbeats.clear()
         elif key[0] >= 0x6000:
             if key == TARGET:
                 self._fresh = True
@@ -229,23 +214,11 @@ class EmulatedDrive:
             self._pdos.forget()
             self._sync_ns, self._fresh = None, False
         elif state is NmtState.OPERATIONAL and before is not state:
-            for node_id, timeout_ns in self._consumed():
-                self._watches.setdefault(node_id, HeartbeatWatch(timeout_ns, self._now_ns))
-
-    def _consumed(self) -> Iterator[tuple[int, int]]:
-        """Yield the node and time-out [ns] of every heartbeat to watch (1016h)."""
-        for sub in (1, 2):
-            word = self._values[0x1016, sub]
-            if word >> 16 & 0x7F and word & 0xFFFF:
-                yield word >> 16 & 0x7F, 1_000_000 * (word & 0xFFFF)
+            self._heartbeats.start(self._now_ns)
 
     def _heard(self, node_id: int, data: bytes) -> None:
-        if decode_heartbeat(data) is None:
-            return
-        for watched, timeout_ns in self._consumed():
-            if watched == node_id:
-                self._watches[node_id] = HeartbeatWatch(timeout_ns, self._now_ns)
-                self._send_now(self.axis.alarms.clear(HEARTBEAT_LOST))
+        if self._heartbeats.hear(node_id, data, self._now_ns):
+            self._send_now(self.axis.alarms.clear(HEARTBEAT_LOST))
 
     def _sync(self, data: bytes) -> None:
         overflow = self._values[0x1019, 0]
@@ -254,16 +227,9 @@ class EmulatedDrive:
             return
         if self.state is not NmtState.OPERATIONAL:
             return
-        for pdo in self._pdos.tpdos:
-            if pdo.kind <= LAST_SYNCHRONOUS:
-                pdo.syncs += 1
-                if pdo.syncs >= pdo.kind:
-                    pdo.syncs = 0
-                    self._send(Frame(pdo.cob_id, self._pdos.sample(pdo)))
-        for pdo in self._pdos.rpdos.values():
-            if pdo.waiting is not None and pdo.kind <= LAST_SYNCHRONOUS:
-                values, pdo.waiting = pdo.waiting, None
-                self._apply(pdo.keys, values)
+        for frame in self._pdos.at_sync():
+            self._send(frame)
+        self._pdos.latch()
         self.axis.sync(self._fresh, self._now_ns)
         self._fresh, self._sync_ns = False, self._now_ns
 
@@ -282,18 +248,9 @@ class EmulatedDrive:
         window_ns = 1000 * self._values[0x1007, 0]
         values = pdo.layout.unpack(data[:size])
         if pdo.kind > LAST_SYNCHRONOUS:
-            self._apply(pdo.keys, values)
+            self._pdos.apply(pdo, values)
         elif not (window_ns and self._sync_ns and self._now_ns - self._sync_ns > window_ns):
             pdo.waiting = values
-
-    def _apply(self, keys: tuple[Key, ...], values: tuple[int, ...]) -> None:
-        for key, value in zip(keys, values, strict=True):
-            entry = self._store.entry(key)
-            if entry is not None:
-                try:
-                    self._store.put(entry, value)
-                except SdoAbortError:
-                    continue
 
     def _timers(self) -> None:
         now_ns, values = self._now_ns, self._values
@@ -302,8 +259,8 @@ class EmulatedDrive:
             self._beat_ns = now_ns
             if not self._mute:
                 self._out.append((now_ns, heartbeat_frame(self.node_id, self.state)))
-        if any(watch.lost(now_ns) for watch in self._watches.values()):
-            self._watches.clear()
+        if self._heartbeats.lost(now_ns):
+            self._heartbeats.clear()
             self._connection_lost(HEARTBEAT_LOST)
         for pdo in self._pdos.rpdos.values():
             late = pdo.seen_ns is not None and now_ns - pdo.seen_ns > pdo.timer_ns
@@ -323,18 +280,6 @@ class EmulatedDrive:
         fallback = {0: NmtState.PRE_OPERATIONAL, 2: NmtState.STOPPED}.get(self._values[0x1029, 1])
         if fallback is not None and self.state is NmtState.OPERATIONAL:
             self._enter(fallback)
-
-    def _events(self) -> None:
-        """Send the event-driven TPDOs that have changed or whose timer has run out."""
-        for pdo in self._pdos.tpdos:
-            if pdo.kind <= LAST_SYNCHRONOUS:
-                continue
-            before, data = pdo.last, self._pdos.sample(pdo)
-            since_ns = None if pdo.seen_ns is None else self._now_ns - pdo.seen_ns
-            late = bool(pdo.timer_ns) and (since_ns is None or since_ns >= pdo.timer_ns)
-            if data != before or late:
-                pdo.seen_ns = self._now_ns
-                self._send(Frame(pdo.cob_id, data))
 
     # --- output ------------------------------------------------------------------------------
 

@@ -4,17 +4,17 @@ Frames are sent one after the other, the lowest identifier first; the body moves
 Nothing here looks at a clock, and the same calls give the same frames to the nanosecond.
 """
 
-from collections import deque
 from collections.abc import Callable, Sequence
-from enum import Enum
-from typing import Protocol, final
+from typing import final
 
 from legbench.drives.emulated.drive import EmulatedDrive
 from legbench.drives.emulated.faults import Fault, NodeFault
 from legbench.drives.emulated.injector import Injector
+from legbench.drives.emulated.station import Node, Participant, Station
+from legbench.drives.emulated.stuffing import Stuffing, bits_of
 from legbench.drives.errors import BusError
 from legbench.drives.protocol.frame import Frame
-from legbench.drives.setup.wire import ERROR_BITS, exact_bits, plain_bits, worst_bits
+from legbench.drives.setup.wire import ERROR_BITS, worst_bits
 
 Body = Callable[[tuple[float, ...]], tuple[Sequence[float], Sequence[float]]]
 """Function that moves the body for one period, from the motor positions [rad] to the link
@@ -28,44 +28,6 @@ BUS_OFF_FRAME = Frame(0x40, bytes(8), error=True)
 """SocketCAN's report that the own controller has left the bus."""
 
 
-class Stuffing(Enum):
-    """Ways to count the stuff bits in the length of a frame."""
-
-    NONE = "none"
-    WORST = "worst"
-    EXACT = "exact"
-
-
-class Participant(Protocol):
-    """A participant of the bus that sends frames by itself."""
-
-    def receive(self, frame: Frame, now_ns: int) -> None:
-        """Receive a frame of another node."""
-        ...
-
-    def take(self) -> list[tuple[int, Frame]]:
-        """Frames to send, each with the time at which it is ready [ns]."""
-        ...
-
-    def tick(self, now_ns: int) -> float:
-        """Check the timers, once a body period; returns the motor position of a drive [rad]."""
-        ...
-
-
-@final
-class Station:
-    """A master's controller: a queue of received frames and an error counter."""
-
-    def __init__(self, tx_queue: int, bitrate: int, *, listen_only: bool) -> None:
-        self.received: deque[tuple[int, Frame]] = deque()
-        self.tx_queue, self.bitrate, self.listen_only = tx_queue, bitrate, listen_only
-        self.waiting = 0
-        """Number of frames that have not been on the wire yet."""
-        self.unread = 0
-        """Receive error counter: frames of others that made no sense here."""
-
-
-Node = Participant | Station
 _Pending = tuple[int, int, int, Node, Frame]
 """Frame that waits for the wire: ready at [ns], identifier, sequence number, sender, frame."""
 
@@ -235,7 +197,7 @@ class Network:
         self._flying = winner
         frame = winner[4]
         self._broken = self._injector.breaks(frame, now_ns) or self._garbled(winner[3])
-        bits = ERROR_BITS + worst_bits(0) if self._broken else self._length(frame)
+        bits = ERROR_BITS + worst_bits(0) if self._broken else bits_of(frame, self._stuffing)
         self._end_ns = now_ns + bits * self._bit_ns
 
     def _garbled(self, sender: Node) -> bool:
@@ -252,12 +214,6 @@ class Network:
             active = max(self.errors[stranger], stranger.unread) < PASSIVE
             broken = broken or (active and not stranger.listen_only)
         return broken
-
-    def _length(self, frame: Frame) -> int:
-        if self._stuffing is Stuffing.EXACT:
-            return exact_bits(frame)
-        count = worst_bits if self._stuffing is Stuffing.WORST else plain_bits
-        return count(len(frame.data), extended=frame.extended)
 
     def _land(self) -> None:
         flying, self._flying = self._flying, None

@@ -3,8 +3,8 @@
 from typing import final
 
 from legbench.drives.emulated.store import ObjectStore
-from legbench.drives.errors import CodecError
-from legbench.drives.protocol.frame import COB_INVALID, COB_MASK
+from legbench.drives.errors import CodecError, SdoAbortError
+from legbench.drives.protocol.frame import COB_INVALID, COB_MASK, Frame
 from legbench.drives.protocol.objects import MAX_MAPPED, PDO_COUNT, Access, Key
 from legbench.drives.protocol.pdo import Mapped, PdoMap, split_word
 from legbench.drives.protocol.sdo import Abort
@@ -135,6 +135,48 @@ class ProcessData:
         values = self._store.values
         pdo.last = pdo.layout.pack([values[key] for key in pdo.keys])
         return pdo.last
+
+    def at_sync(self) -> list[Frame]:
+        """Sample the TPDOs that a SYNC makes due."""
+        frames: list[Frame] = []
+        for pdo in self.tpdos:
+            if pdo.kind <= LAST_SYNCHRONOUS:
+                pdo.syncs += 1
+                if pdo.syncs >= pdo.kind:
+                    pdo.syncs = 0
+                    frames.append(Frame(pdo.cob_id, self.sample(pdo)))
+        return frames
+
+    def latch(self) -> None:
+        """Apply the synchronous RPDOs received before a SYNC."""
+        for pdo in self.rpdos.values():
+            if pdo.waiting is not None and pdo.kind <= LAST_SYNCHRONOUS:
+                values, pdo.waiting = pdo.waiting, None
+                self.apply(pdo, values)
+
+    def apply(self, pdo: Pdo, values: tuple[int, ...]) -> None:
+        """Write the values of an RPDO to its objects; one that is refused keeps its value."""
+        for key, value in zip(pdo.keys, values, strict=True):
+            entry = self._store.entry(key)
+            if entry is not None:
+                try:
+                    self._store.put(entry, value)
+                except SdoAbortError:
+                    continue
+
+    def events(self, now_ns: int) -> list[Frame]:
+        """Sample the event-driven TPDOs that have changed or whose timer has run out."""
+        frames: list[Frame] = []
+        for pdo in self.tpdos:
+            if pdo.kind <= LAST_SYNCHRONOUS:
+                continue
+            before, data = pdo.last, self.sample(pdo)
+            since_ns = None if pdo.seen_ns is None else now_ns - pdo.seen_ns
+            late = bool(pdo.timer_ns) and (since_ns is None or since_ns >= pdo.timer_ns)
+            if data != before or late:
+                pdo.seen_ns = now_ns
+                frames.append(Frame(pdo.cob_id, data))
+        return frames
 
     def forget(self) -> None:
         """Discard what was received and not yet latched, as on leaving operational."""

@@ -2,7 +2,8 @@
 
 from typing import final
 
-from legbench.drives.emulated.network import Network, Station
+from legbench.drives.emulated.network import Network
+from legbench.drives.emulated.station import Station
 from legbench.drives.errors import BusError
 from legbench.drives.protocol.slcan import (
     BITRATES,

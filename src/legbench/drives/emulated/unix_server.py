@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import final
 
 from legbench.closing import Closing
-from legbench.drives.emulated.network import Network, Station
+from legbench.drives.emulated.network import Network
 from legbench.drives.emulated.pacer import Pacer
+from legbench.drives.emulated.station import Station
 from legbench.drives.errors import BusError
 from legbench.drives.transport.unix_bus import PACKET, opened_at, pack_frame, unpack_frame
 

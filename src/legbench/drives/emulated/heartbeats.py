@@ -1,0 +1,45 @@
+"""Heartbeats of other nodes that an emulated drive watches (CiA 301, object 1016h)."""
+
+from collections.abc import Iterator, Mapping
+from typing import final
+
+from legbench.drives.protocol.nmt import HeartbeatWatch, decode_heartbeat
+from legbench.drives.protocol.objects import Key
+
+
+@final
+class HeartbeatConsumer:
+    """Watches over the nodes whose heartbeats a drive consumes."""
+
+    def __init__(self, values: Mapping[Key, int]) -> None:
+        self._values = values
+        self._watches: dict[int, HeartbeatWatch] = {}
+
+    def clear(self) -> None:
+        """Watch nobody, until a heartbeat comes or the drive becomes operational again."""
+        self._watches.clear()
+
+    def start(self, now_ns: int) -> None:
+        """Begin to watch all nodes that are to be watched and are not yet."""
+        for node_id, timeout_ns in self._consumed():
+            self._watches.setdefault(node_id, HeartbeatWatch(timeout_ns, now_ns))
+
+    def hear(self, node_id: int, data: bytes, now_ns: int) -> bool:
+        """Take a heartbeat; returns whether it is one of a node that is to be watched."""
+        if decode_heartbeat(data) is None:
+            return False
+        timeouts = [timeout_ns for watched, timeout_ns in self._consumed() if watched == node_id]
+        if timeouts:
+            self._watches[node_id] = HeartbeatWatch(timeouts[-1], now_ns)
+        return bool(timeouts)
+
+    def lost(self, now_ns: int) -> bool:
+        """Whether any heartbeat is overdue."""
+        return any(watch.lost(now_ns) for watch in self._watches.values())
+
+    def _consumed(self) -> Iterator[tuple[int, int]]:
+        """Yield the node and time-out [ns] of every heartbeat to watch (1016h)."""
+        for sub in (1, 2):
+            word = self._values[0x1016, sub]
+            if word >> 16 & 0x7F and word & 0xFFFF:
+                yield word >> 16 & 0x7F, 1_000_000 * (word & 0xFFFF)

@@ -1,0 +1,22 @@
+"""Length of a frame on an emulated wire, by the way its stuff bits are counted; pure."""
+
+from enum import Enum
+
+from legbench.drives.protocol.frame import Frame
+from legbench.drives.setup.wire import exact_bits, plain_bits, worst_bits
+
+
+class Stuffing(Enum):
+    """Ways to count the stuff bits in the length of a frame."""
+
+    NONE = "none"
+    WORST = "worst"
+    EXACT = "exact"
+
+
+def bits_of(frame: Frame, stuffing: Stuffing) -> int:
+    """Number of bits that a frame takes on the wire, the space to the next one included."""
+    if stuffing is Stuffing.EXACT:
+        return exact_bits(frame)
+    count = worst_bits if stuffing is Stuffing.WORST else plain_bits
+    return count(len(frame.data), extended=frame.extended)
