@@ -214,12 +214,14 @@ class LinkWatch:
         if len(self._links[0]) < STANDING_CYCLES:
             return None
         limit = self._bounds.standing + self._widening
+        if all(abs(shown[-1] - shown[0]) > STANDING_BAND for shown in self._links):
+            return None
+        ranges = (_range(self._links[0]), _range(self._links[1]))
         for place in (0, 1):
-            shown = self._links[place]
-            if abs(shown[-1] - shown[0]) > STANDING_BAND or _range(shown) > STANDING_BAND:
+            if ranges[place] > STANDING_BAND or ranges[1 - place] <= limit:
                 continue
             # A link that its motor merely carries along pulls at nothing: the spring must work.
-            moved = min(_range(self._links[1 - place]), _range(self._springs[1 - place]))
+            moved = min(ranges[1 - place], _range(self._springs[1 - place]))
             if moved > limit:
                 return Doubt(
                     "joint encoder",
