@@ -147,6 +147,19 @@ def shielded() -> Shield:
     return Shield()
 
 
+@contextmanager
+def children_without_interrupts() -> Iterator[None]:
+    """Start processes in this block that ^C does not reach from their first instruction on.
+
+    A new process inherits which signals are blocked; here a ^C waits until the block has ended.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def ignore_interrupts() -> None:
     """Leave ^C, which goes to a whole group of processes, to the parent of this one."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)

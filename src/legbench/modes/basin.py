@@ -22,7 +22,7 @@ from legbench.control import JumpConfig
 from legbench.design import LegDesign
 from legbench.design.toml import design_to_mapping
 from legbench.errors import ConfigError
-from legbench.interrupts import ignore_interrupts
+from legbench.interrupts import children_without_interrupts, ignore_interrupts
 from legbench.modes.drive import AbstractDrive, JumpLaw, Passive
 from legbench.modes.fixed_point import UNITS
 from legbench.modes.hop import NAMES, Apex, Ending, return_map
@@ -227,7 +227,11 @@ def _rows(question: Question, todo: list[int], workers: int) -> Iterator[tuple[i
         yield from map(_row, todo)
         return
     with _pool(question, workers) as pool:
-        for future in as_completed([pool.submit(_row, index) for index in todo]):
+        # The first submission starts all workers; one that ^C reached while it loads its modules
+        # would die before it could ignore it.
+        with children_without_interrupts():
+            futures = [pool.submit(_row, index) for index in todo]
+        for future in as_completed(futures):
             yield future.result()
 
 
