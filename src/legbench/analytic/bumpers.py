@@ -23,41 +23,44 @@ FIRST = int(Event.KNEE_LOW)
 
 @final
 class Bumpers:
-    """The stops of knee and hip, lower and upper end each; none of a leg that has no stops."""
+    """The stops of knee and hip, lower and upper end each; none of a leg that has no stops.
+
+    Attributes:
+        touched: whether a joint is beyond a limit.
+    """
 
     def __init__(self, model: LegModel) -> None:
         self._model, self._stops = model, model.stops
         self._touched = [False] * len(model.stops)
         self._pushing, self._free = [False, False], [False, False]
-
-    @property
-    def touched(self) -> bool:
-        """Whether a joint is beyond a limit."""
-        return True in self._touched
+        self.touched = False
 
     def find(self, q: Pair, v: Pair) -> None:
         """Tell by the law which limits a leg is beyond that is put somewhere."""
         for index, stop in enumerate(self._stops):
             depth = stop.depth(q)
             self._touched[index] = depth > AT_LIMIT or (depth > -AT_LIMIT and stop.speed(v) > 0.0)
+        self.touched = True in self._touched
 
-    def lay(self) -> tuple[list[float], list[float]]:
-        """Gains and levels of the four events: to go beyond a limit, or to come back."""
-        gains, levels = [OFF[0]] * 4, [OFF[1]] * 4
+    def lay(self, watch: Watch) -> None:
+        """Watch the four events: to go beyond a limit, or to come back."""
         for index, (stop, beyond) in enumerate(zip(self._stops, self._touched, strict=True)):
-            gains[index] = stop.sign if beyond else -stop.sign
-            levels[index] = gains[index] * stop.limit
-        return gains, levels
+            gain = stop.sign if beyond else -stop.sign
+            if watch.gain[FIRST + index] != gain:
+                watch.lay(FIRST + index, gain, gain * stop.limit)
 
     def cross(self, event: int) -> None:
         """A joint has gone beyond a limit, or has come back."""
         self._touched[event - FIRST] ^= True
+        self.touched = True in self._touched
 
     def decide(self, watch: Watch, terms: PairTerms, motor: Pair, q: Pair, v: Pair) -> None:
         """Let those stops push of which the law asks it, after something has jumped."""
         if not self.touched:
-            watch.pars[PUSHES : PUSHES + 4 : 2] = 0.0
+            if watch.pushed:
+                self._silence(watch)
             return
+        watch.pushed = True
         asked = self._asked(terms, motor, q, v)
         self._pushing = [push > 0.0 for push in asked]
         if watch.held:
@@ -88,10 +91,15 @@ class Bumpers:
                 watch.lay(first + joint, -stop.sign if pushing[joint] else stop.sign, 0.0)
                 watch.guard(first + joint, stop.sign * asked[joint])
 
-    def silence(self, watch: Watch) -> None:
-        """Watch no push, as no joint is beyond a limit."""
+    def _silence(self, watch: Watch) -> None:
+        """Let no stop act, and watch no push, as no joint is beyond a limit."""
+        watch.pushed = False
+        watch.pars[PUSHES : PUSHES + 4 : 2] = 0.0
         for event in (Event.KNEE_PUSH, Event.HIP_PUSH):
-            if watch.gain[event] != 0.0:
+            watch.lay(event, *OFF)
+        if watch.held:
+            watch.pars[FREE_PUSHES : FREE_PUSHES + 2] = 0.0
+            for event in (Event.KNEE_FREE, Event.HIP_FREE):
                 watch.lay(event, *OFF)
 
     def _switch(self, watch: Watch) -> None:

@@ -11,7 +11,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from legbench.analytic.equations import SCALAR, Ops
+from legbench.analytic.equations import SCALAR, Ops, Pair
 from legbench.signals import Floats
 
 
@@ -105,3 +105,8 @@ def without_gradients(value: Any) -> Any:
         parts = {part.name: getattr(value, part.name) for part in fields(value)}
         return replace(value, **{name: without_gradients(part) for name, part in parts.items()})
     return value
+
+
+def floats(pair: Pair) -> Pair:
+    """A pair without gradients."""
+    return float(pair[0]), float(pair[1])

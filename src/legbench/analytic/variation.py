@@ -7,14 +7,19 @@ the event shifts (`Course`). Chained over events this is the product of transiti
 matrices.
 """
 
-from typing import final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 
-from legbench.analytic.compiled import varied_integrator
+from legbench.analytic.compiled import parameters_of, varied_integrator
 from legbench.analytic.dual import Dual, gradient
-from legbench.analytic.places import PROBE, SMOOTH
+from legbench.analytic.equations import SCALAR, Pair
+from legbench.analytic.places import HEIGHT, MOTOR, PROBE, SMOOTH, SPEED
+from legbench.analytic.readings import read
 from legbench.signals import Floats
+
+if TYPE_CHECKING:
+    from legbench.analytic.course import Course
 
 STATES = 4
 """Two angles and their rates [-]."""
@@ -30,7 +35,43 @@ class Variation:
     def __init__(self, tolerance: float) -> None:
         self._integrator = varied_integrator(tolerance)
 
-    def moved(self, start: list[float], pars: Floats, time: float, varied: list[float]) -> Floats:
+    def carry(self, course: "Course", q: Pair, v: Pair, until: float, event: int | None) -> None:
+        """Carry the derivatives of a course through a piece, and begin the next one at its end.
+
+        Args:
+            course: dual numbers at the beginning of the piece.
+            q: angles at the end [rad].
+            v: rates at the end [rad/s].
+            until: time at which the piece was to end [s].
+            event: the event that ended it, if one did.
+        """
+        watch, plain = course.watch, course.plain
+        time = float(watch.integrator.time)
+        varied = parameters_of(course.model, course.regime, course.probe)[:MOTOR]
+        start = [*course.q, *course.v]
+        moved = self._moved(start, watch.pars, time, [*varied, *course.motor])
+        torque = plain.torque(course.plain_motor, q, v)
+        a = course.bumpers.turns(SCALAR, course.terms, torque, q, v)[1]
+        values, rates = [*q, *v], np.array([*v, *a])
+        if event is None:
+            shift = gradient(until - course.began)
+        else:
+            gain, level = watch.gain[event], watch.level[event]
+            reading = read(course, event, _duals(values, moved), time)
+            change = gradient(gain * reading - level)
+            timed, elapsed = _duals(values, rates[:, np.newaxis]), Dual(time, np.ones(1))
+            reading = read(course, event, timed, elapsed, plain=True)
+            shift = -change / (gain * gradient(reading)[0])
+        q1, q2, v1, v2 = _duals(values, moved + np.multiply.outer(rates, shift))
+        course.q, course.v = (q1, q2), (v1, v2)
+        course.time = until if event is None else course.began + Dual(time, shift)
+        if watch.flies:
+            course.point, course.drift = course.centre()
+            watch.pars[HEIGHT], watch.pars[SPEED] = course.point[1], course.drift[1]
+        course.began = course.time
+        watch.integrator.time = 0.0
+
+    def _moved(self, start: list[float], pars: Floats, time: float, varied: list[float]) -> Floats:
         """How the state at a fixed time moves with the seeds (4, m).
 
         Args:
@@ -50,7 +91,7 @@ class Variation:
         return by_state @ _gradients(start) + by_pars @ _gradients(varied)
 
 
-def duals(values: list[float], slopes: Floats) -> list[Dual]:
+def _duals(values: list[float], slopes: Floats) -> list[Dual]:
     """Numbers with their gradients, one a row (n, m)."""
     return [Dual(value, row) for value, row in zip(values, slopes, strict=True)]
 

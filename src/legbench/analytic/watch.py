@@ -28,6 +28,7 @@ class Watch:
         kind: which equations and events.
         held: whether the ground pulls on a foot that would go down if it were let go.
         flies: whether nothing touches the ground.
+        pushed: whether a joint is beyond a limit.
         integrator: heyoka's, for (q1, q2, v1, v2).
         state: view of its state (4,).
         pars: view of its parameters (n,).
@@ -39,6 +40,7 @@ class Watch:
         self.kind = kind
         self.held = kind is Kind.HELD
         self.flies = kind is Kind.FLIGHT
+        self.pushed = False
         self.integrator = event_integrator(kind, tolerance)
         self.state: Floats = self.integrator.state
         self.pars: Floats = self.integrator.pars
@@ -51,12 +53,12 @@ class Watch:
         self.gain[event], self.level[event] = gain, level
         self.pars[GAIN + event], self.pars[LEVEL + event] = gain, level
 
-    def lay_all(self, gain: list[float], level: list[float]) -> None:
-        """Watch the first events, as many as are given."""
-        count = len(gain)
-        self.gain[:count], self.level[:count] = gain, level
-        self.pars[GAIN : GAIN + count] = gain
-        self.pars[LEVEL : LEVEL + count] = level
+    def lay_bounds(self, fall: int, rise: int, lower: float, upper: float, never: float) -> None:
+        """Watch a reading fall through a lower and rise through an upper level, unless `never`."""
+        if upper != self.level[rise] or self.gain[rise] == 0.0:
+            self.lay(rise, *((1.0, upper) if upper < never else OFF))
+        if -lower != self.level[fall] or self.gain[fall] == 0.0:
+            self.lay(fall, *((-1.0, -lower) if lower > -never else OFF))
 
     def restore(self) -> None:
         """Put the levels back that the guard has moved."""
