@@ -1,7 +1,7 @@
 """Hops by an independent path: DOP853 on the interpreted equations, events on dense output.
 
 Nothing is shared with the compiled leg but the design and the settings. Stops act by comparison in
-the equations, on short steps, or one would pass over a push; the controller is its rules, not levels of a probe; every condition is looked at on
+the equations, and steps end where a push begins or ends; the controller is its rules, not levels of a probe; every condition is looked at on
 the interpolant of each step, and where two looks may hide a double crossing, its largest value is
 searched between them.
 """
@@ -17,7 +17,8 @@ from scipy.optimize import brentq, minimize_scalar
 
 from legbench.analytic import LegModel
 from legbench.analytic.contact import hold
-from legbench.analytic.equations import SCALAR, touchdown_rates
+from legbench.analytic.equations import SCALAR, pair_acceleration, touchdown_rates
+from legbench.analytic.stops import Stop
 from legbench.control import JumpConfig, LegTargets
 from legbench.design import LegDesign
 from legbench.design.statics import Support
@@ -176,10 +177,23 @@ class DenseHop:
             conditions[f"{stop} {past}"] = lambda _, y, stop=stop, sign=sign: (
                 sign * stop.depth(y[:2]) - 1e-12
             )
+            if past:
+                pushes = self._push(stop, self.y) > 0.0
+                sign = -1.0 if pushes else 1.0
+                conditions[f"{stop} {pushes} push"] = lambda _, y, stop=stop, sign=sign: (
+                    sign * self._push(stop, y) - 1e-10
+                )
         what = self._integrate(end, conditions, 4e-4 if any(beyond) else 4e-3)
         if what is None or what.startswith("Stop"):  # goes on with finer or coarser steps
             return False
         return self._happen(what)
+
+    def _push(self, stop: Stop, y: Sequence[float]) -> float:
+        """What the law asks of a stop, alone [rad/s^2]."""
+        q, v = (y[0], y[1]), (y[2], y[3])
+        terms = self.model.falling if self.flies else self.model.stance
+        torque = self.model.torque(self.rules.motor, q, v)
+        return stop.turn(q, v, pair_acceleration(SCALAR, terms, q, v, torque))
 
     def _happen(self, what: str) -> bool:
         if what == "contact":
