@@ -1,7 +1,7 @@
 """Hops by an independent path: DOP853 on the interpreted equations, events on dense output.
 
-Nothing is shared with the compiled leg but the design and the settings. Stops act by comparison in
-the equations, and steps end where a push begins or ends; the controller is its rules, not levels of a probe; every condition is looked at on
+Nothing is shared with the compiled leg but the design and the settings. Steps end where a stop
+begins or ends to push; the controller is its rules, not levels of a probe; every condition is looked at on
 the interpolant of each step, and where two looks may hide a double crossing, its largest value is
 searched between them.
 """
@@ -17,7 +17,12 @@ from scipy.optimize import brentq, minimize_scalar
 
 from legbench.analytic import LegModel
 from legbench.analytic.contact import hold
-from legbench.analytic.equations import SCALAR, pair_acceleration, touchdown_rates
+from legbench.analytic.equations import (
+    SCALAR,
+    pair_acceleration,
+    pair_solve,
+    touchdown_rates,
+)
 from legbench.analytic.stops import Stop
 from legbench.control import JumpConfig, LegTargets
 from legbench.design import LegDesign
@@ -171,29 +176,38 @@ class DenseHop:
         if not self.flies and not blind and conditions["contact"](self.time, self.y) > 0.0:
             self._switch()
             return False
-        beyond = [stop.depth(self.y[:2]) > 1e-13 for stop in model.stops]
+        self.pushing, beyond = [], [stop.depth(self.y[:2]) > 0.0 for stop in model.stops]
         for stop, past in zip(model.stops, beyond, strict=True):
             sign = -1.0 if past else 1.0
             conditions[f"{stop} {past}"] = lambda _, y, stop=stop, sign=sign: (
                 sign * stop.depth(y[:2]) - 1e-12
             )
             if past:
-                pushes = self._push(stop, self.y) > 0.0
+                pushes = self._asked(stop, self.y)[0] > 0.0
                 sign = -1.0 if pushes else 1.0
                 conditions[f"{stop} {pushes} push"] = lambda _, y, stop=stop, sign=sign: (
-                    sign * self._push(stop, y) - 1e-10
+                    sign * self._asked(stop, y)[0] - 1e-5
                 )
-        what = self._integrate(end, conditions, 4e-4 if any(beyond) else 4e-3)
-        if what is None or what.startswith("Stop"):  # goes on with finer or coarser steps
+                self.pushing += [stop] * pushes
+        what = self._integrate(end, conditions, 1e-3 if any(beyond) else 4e-3)
+        if what is None or what.startswith("Stop"):  # goes on with other stops
             return False
         return self._happen(what)
 
-    def _push(self, stop: Stop, y: Sequence[float]) -> float:
-        """What the law asks of a stop, alone [rad/s^2]."""
+    def _asked(self, asking: Stop | None, y: Sequence[float]) -> tuple[float, tuple[float, float]]:
+        """What the law asks of a stop before its own push, and accelerations [rad/s^2]."""
         q, v = (y[0], y[1]), (y[2], y[3])
         terms = self.model.falling if self.flies else self.model.stance
-        torque = self.model.torque(self.rules.motor, q, v)
-        return stop.turn(q, v, pair_acceleration(SCALAR, terms, q, v, torque))
+        torque, asked = self.model.torque(self.rules.motor, q, v), 0.0
+        a = pair_acceleration(SCALAR, terms, q, v, torque)
+        for stop in self.model.stops:
+            answer = pair_solve(SCALAR, terms, q, stop.normal)
+            if stop is asking:
+                asked = stop.turn(q, v, a)
+            if stop in self.pushing:
+                push = stop.push(q, v, a, answer)
+                a = a[0] + answer[0] * push, a[1] + answer[1] * push
+        return asked, a
 
     def _happen(self, what: str) -> bool:
         if what == "contact":
@@ -237,12 +251,10 @@ class DenseHop:
         self, end: float, conditions: dict[str, Condition], longest: float
     ) -> str | None:
         """Go on to the first condition that holds, or to the end."""
-        model, motor = self.model, self.rules.motor
-        terms = model.falling if self.flies else model.stance
 
         def rates(_t: float, y: Any) -> list[float]:
-            q, v = (float(y[0]), float(y[1])), (float(y[2]), float(y[3]))
-            return [*v, *model.acceleration(terms, motor, q, v)]
+            state = y.tolist()
+            return [*state[2:], *self._asked(None, state)[1]]
 
         solver = DOP853(
             rates, self.time, np.array(self.y), end, rtol=1e-11, atol=1e-13, max_step=longest
