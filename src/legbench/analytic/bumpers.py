@@ -127,6 +127,12 @@ class Bumpers:
         """
         return self._turns(ops, terms, torque, q, v, self._free if free else self._pushing)
 
+    def released(self, terms: PairTerms, torque: Pair, q: Pair, v: Pair) -> Pair:
+        """Accelerations where those stops act, of the limits a joint is known to be beyond, that
+        would push.
+        """
+        return self._turns(SCALAR, terms, torque, q, v, None)[1]
+
     def _asked(self, terms: PairTerms, motor: Pair, q: Pair, v: Pair) -> list[float]:
         """What the law asks of each joint's stop, where those act that would push."""
         torque = self._model.torque(motor, q, v)

@@ -23,6 +23,7 @@ from legbench.analytic.equations import (
     Pair,
     Term,
     contact_force,
+    free_foot_acceleration,
     pair_acceleration,
     pair_kinetic,
     sweep,
@@ -309,15 +310,23 @@ class Course:
     def _force(self) -> float:
         """Vertical force on the standing foot, over the weight."""
         plain, q, v = self.plain, self._q, self._v
-        if self.bumpers.touched:
-            return plain.stance_force(self.plain_motor, q, v)[1] / self._weight
-        torque = plain.torque(self.plain_motor, q, v)
-        a = pair_acceleration(plain.ops, plain.stance, q, v, torque)
+        a = self._accelerations()
         return contact_force(plain.ops, plain.floating, q, v, a)[1] / self._weight
 
     def _released(self) -> float:
         """Acceleration that the standing foot would have if it were let go, over gravity."""
-        return self.plain.released_rise(self.plain_motor, self._q, self._v) / GRAVITY
+        plain, q, v = self.plain, self._q, self._v
+        torque = plain.torque(self.plain_motor, q, v)
+        a = self.bumpers.released(plain.falling, torque, q, v)
+        return free_foot_acceleration(plain.ops, plain.floating, q, v, a)[1] / GRAVITY
+
+    def _accelerations(self) -> Pair:
+        """Accelerations of the angles, where those stops act that are known to."""
+        plain, q, v = self.plain, self._q, self._v
+        torque = plain.torque(self.plain_motor, q, v)
+        if self.bumpers.touched:
+            return self.bumpers.turns(plain.ops, self.terms, torque, q, v)[1]
+        return pair_acceleration(plain.ops, self.terms, q, v, torque)
 
     def _guard_turn(self) -> None:
         """Watch the probe's next turn, which is the other kind after one that has just been."""
@@ -326,7 +335,7 @@ class Course:
         if self._turn == 0.0:
             towards = rate
             if abs(rate) <= NUDGE:
-                a = self.plain.acceleration(self.terms, self.plain_motor, self._q, self._v)
+                a = self._accelerations()
                 towards = p1 * a[0] + p2 * a[1]
             self._turn = -1.0 if towards > 0.0 else 1.0
         if self.watch.gain[Event.TURN] != self._turn:
