@@ -101,6 +101,7 @@ def _varied(tolerance: float) -> Any:
             tol=tolerance,
             fast_math=True,
             compact_mode=True,  # slower, but compiled in a second instead of a minute
+            opt_level=1,  # no slower than the highest, and compiled in half the time
         )
 
     return kept(f"varied {tolerance!r} {system} {seeds}", build)
