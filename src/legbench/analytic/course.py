@@ -34,7 +34,7 @@ from legbench.analytic.model import LegModel
 from legbench.analytic.places import HEIGHT, MOTOR, SPEED, Event, Kind, Watched
 from legbench.analytic.state import LegState, Regime
 from legbench.analytic.variation import Variation
-from legbench.analytic.watch import NUDGE, OFF, PAIRS, Watch
+from legbench.analytic.watch import NUDGE, OFF, Watch
 from legbench.design.statics import GRAVITY
 from legbench.errors import PlantFault
 
@@ -56,6 +56,13 @@ SEEN = {
     Event.FELL_BACK: Watched.FELL,
 }
 """Conditions on angles, which may hold already when a piece begins."""
+LINEAR = (
+    *(Event.RISE, Event.FALL, Event.FELL, Event.FELL_BACK),
+    *(Event.KNEE_LOW, Event.KNEE_HIGH, Event.HIP_LOW, Event.HIP_HIGH),
+)
+"""Events of angles; they can be near zero only where they were laid anew or the leg was put."""
+PROBED = 2
+"""Number of those that look at the probe [-]."""
 KINDS = {Regime.FLIGHT: Kind.FLIGHT, Regime.STANCE: Kind.STANCE}
 """The compiled equations that a regime begins with; the fixed ones for all others."""
 
@@ -110,6 +117,7 @@ class Course:
         self._watches: dict[tuple[Regime, bool], Watch] = {}
         self._variation = Variation(tolerance) if model.ops is DUAL else None
         self._levels, self._turn, self._blind, self._lean = SILENT, 0.0, 0.0, NEVER
+        self._fresh = 0
         self.motor: Pair = (0.0, 0.0)
 
     def start(self, state: LegState) -> None:
@@ -230,20 +238,10 @@ class Course:
 
     def _due(self) -> int | None:
         """Guard every event against the zero it starts on; one whose condition holds already."""
-        watch, (q1, q2) = self.watch, self._q
-        watch.restore()
-        reading = self.probe[0] * q1 + self.probe[1] * q2
-        lean, knee, low, high = q1 + q2, q2 - q1, watch.low, watch.high
-        due = None
-        if not (
-            low[0] < reading < high[0]
-            and low[1] < lean < high[1]
-            and low[2] < knee < high[2]
-            and low[3] < q1 < high[3]
-        ):
-            due = self._near((reading, lean, knee, q1))
-        if self._levels.turns:
-            self._guard_turn()
+        watch = self.watch
+        if watch.moved:
+            watch.restore()
+        due = self._near() if self._fresh else None
         if self.bumpers.touched:
             self.bumpers.guard(watch, self.terms, self.plain_motor, self._q, self._v)
         if self._free:
@@ -251,13 +249,20 @@ class Course:
             due = contact if due is None else due
         return due
 
-    def _near(self, readings: tuple[float, ...]) -> int | None:
-        """Guard the events that are near; one whose condition holds already."""
+    def _near(self) -> int | None:
+        """Guard what has been laid anew or jumped; one whose condition holds already."""
+        guard, (q1, q2), (p1, p2) = self.watch.guard, self._q, self.probe
+        reading, lean, knee = p1 * q1 + p2 * q2, q1 + q2, q2 - q1
         due = None
-        for reading, pair in zip(readings, PAIRS, strict=True):
-            for event in pair:
-                if self.watch.guard(event, reading) and event in SEEN and due is None:
-                    due = event
+        for event, value in zip(
+            LINEAR[: self._fresh], (reading, reading, lean, lean, knee, knee, q1, q1), strict=False
+        ):
+            if guard(event, value) and event in SEEN and due is None:
+                due = event
+        if self._levels.turns:
+            self._guard_turn()
+        if due is None:
+            self._fresh = 0
         return due
 
     def _contact(self) -> int | None:
@@ -372,6 +377,7 @@ class Course:
             return SEEN[Event(event)]
         if event == Event.TURN:
             self._turn = -self._turn
+            watch.lay(Event.TURN, self._turn, 0.0)
             return Watched.TURN
         if event <= Event.HIP_HIGH:
             self.bumpers.cross(event)
@@ -414,6 +420,7 @@ class Course:
         watch.pars[MOTOR : MOTOR + 2] = self.plain_motor
         if watch.flies:
             watch.pars[HEIGHT], watch.pars[SPEED] = self.point[1], self.drift[1]
+        self._fresh = len(LINEAR)
         watch.restore()
         watch.lay_bounds(Event.FELL, Event.FELL_BACK, -self._lean, self._lean, NEVER)
         self.bumpers.lay(watch)
@@ -423,7 +430,7 @@ class Course:
     def _lay(self, levels: Levels) -> None:
         """Watch other levels."""
         self._levels, watch = levels, self.watch
-        watch.restore()
+        self._fresh = max(self._fresh, PROBED)
         watch.lay_bounds(Event.FALL, Event.RISE, levels.lower, levels.upper, NEVER)
         if not levels.turns:
             self._turn = 0.0
