@@ -49,20 +49,20 @@ TIME_LIMIT = int(hy.taylor_outcome.time_limit)
 TIE = 1e-7
 """Acceleration over gravity below which the released foot counts as rising: on the radial mode it
 vanishes together with the force [-]."""
+RISE, FALL, FELL, FELL_BACK, TURN, CONTACT = map(
+    int, (Event.RISE, Event.FALL, Event.FELL, Event.FELL_BACK, Event.TURN, Event.CONTACT)
+)
+LIMITS = tuple(range(Event.KNEE_LOW, Event.HIP_HIGH + 1))
+"""Events of the joints' limits."""
+EVENTS = len(Event)
+"""Number of events that an integrator may watch [-]."""
 SEEN = {
-    Event.RISE: Watched.RISE,
-    Event.FALL: Watched.FALL,
-    Event.FELL: Watched.FELL,
-    Event.FELL_BACK: Watched.FELL,
+    RISE: Watched.RISE,
+    FALL: Watched.FALL,
+    FELL: Watched.FELL,
+    FELL_BACK: Watched.FELL,
 }
 """Conditions on angles, which may hold already when a piece begins."""
-LINEAR = (
-    *(Event.RISE, Event.FALL, Event.FELL, Event.FELL_BACK),
-    *(Event.KNEE_LOW, Event.KNEE_HIGH, Event.HIP_LOW, Event.HIP_HIGH),
-)
-"""Events of angles; they can be near zero only where they were laid anew or the leg was put."""
-PROBED = 2
-"""Number of those that look at the probe [-]."""
 KINDS = {Regime.FLIGHT: Kind.FLIGHT, Regime.STANCE: Kind.STANCE}
 """The compiled equations that a regime begins with; the fixed ones for all others."""
 
@@ -117,7 +117,7 @@ class Course:
         self._watches: dict[tuple[Regime, bool], Watch] = {}
         self._variation = Variation(tolerance) if model.ops is DUAL else None
         self._levels, self._turn, self._blind, self._lean = SILENT, 0.0, 0.0, NEVER
-        self._fresh = 0
+        self._fresh = self._jumped = False
         self.motor: Pair = (0.0, 0.0)
 
     def start(self, state: LegState) -> None:
@@ -251,39 +251,43 @@ class Course:
 
     def _near(self) -> int | None:
         """Guard what has been laid anew or jumped; one whose condition holds already."""
-        guard, (q1, q2), (p1, p2) = self.watch.guard, self._q, self.probe
-        reading, lean, knee = p1 * q1 + p2 * q2, q1 + q2, q2 - q1
-        due = None
-        for event, value in zip(
-            LINEAR[: self._fresh], (reading, reading, lean, lean, knee, knee, q1, q1), strict=False
-        ):
-            if guard(event, value) and event in SEEN and due is None:
-                due = event
+        guard, (q1, q2), due = self.watch.guard, self._q, None
+        reading = self.probe[0] * q1 + self.probe[1] * q2
+        if guard(RISE, reading):
+            due = RISE
+        elif guard(FALL, reading):
+            due = FALL
         if self._levels.turns:
             self._guard_turn()
+        if self._jumped:
+            lean, knee = q1 + q2, q2 - q1
+            if guard(FELL, lean) or guard(FELL_BACK, lean):
+                due = FELL
+            for event, angle in zip(LIMITS, (knee, knee, q1, q1), strict=True):
+                guard(event, angle)
         if due is None:
-            self._fresh = 0
+            self._fresh = self._jumped = False
         return due
 
     def _contact(self) -> int | None:
         """Guard touchdown or lift-off; the event if the leg cannot stay in its regime."""
         watch = self.watch
         if self.time < self._blind:
-            if watch.gain[Event.CONTACT] != 0.0:
-                watch.lay(Event.CONTACT, *OFF)
+            if watch.gain[CONTACT] != 0.0:
+                watch.lay(CONTACT, *OFF)
             return None
         if watch.flies:
             return self._touchdown()
         force = self._force()
         if not watch.held:
             if force < 0.0:
-                return Event.CONTACT
+                return CONTACT
             self._expect(force)
             return None
         released = self._released()
         if force > 0.0 or released > -TIE:
-            return Event.RECOVER if force > 0.0 else Event.CONTACT
-        for event, reading in ((Event.CONTACT, released), (Event.RECOVER, force)):
+            return Event.RECOVER if force > 0.0 else CONTACT
+        for event, reading in ((CONTACT, released), (Event.RECOVER, force)):
             watch.lay(event, 1.0, 0.0)
             watch.guard(event, reading)
         return None
@@ -300,17 +304,17 @@ class Course:
             return None
         arm_vel = sweep_rate(self.plain.ops, self._q, self._v, self._plain_arm)
         if dz - fallen + arm_vel[1] < 0.0:
-            return Event.CONTACT
+            return CONTACT
         self._blind = self.time + self._min_phase  # under the ground and rising: look later
-        watch.lay(Event.CONTACT, *OFF)
+        watch.lay(CONTACT, *OFF)
         return None
 
     def _expect(self, reading: float) -> None:
         """Watch height or force fall to zero."""
-        if self.watch.gain[Event.CONTACT] != -1.0:
-            self.watch.lay(Event.CONTACT, -1.0, 0.0)
+        if self.watch.gain[CONTACT] != -1.0:
+            self.watch.lay(CONTACT, -1.0, 0.0)
         if reading < NUDGE:
-            self.watch.guard(Event.CONTACT, reading)
+            self.watch.guard(CONTACT, reading)
 
     def _force(self) -> float:
         """Vertical force on the standing foot, over the weight."""
@@ -343,10 +347,10 @@ class Course:
                 a = self._accelerations()
                 towards = p1 * a[0] + p2 * a[1]
             self._turn = -1.0 if towards > 0.0 else 1.0
-        if self.watch.gain[Event.TURN] != self._turn:
-            self.watch.lay(Event.TURN, self._turn, 0.0)
+        if self.watch.gain[TURN] != self._turn:
+            self.watch.lay(TURN, self._turn, 0.0)
         if self._turn * rate > -NUDGE:
-            self.watch.guard(Event.TURN, rate)
+            self.watch.guard(TURN, rate)
 
     def _piece(self, until: float) -> int | None:
         """Integrate to `until` or to the next event."""
@@ -354,7 +358,7 @@ class Course:
         # max_steps by its place: by name it costs a fifth of a short call.
         outcome = int(integrator.propagate_until(float(until - self.began), MAX_STEPS)[0])
         event = None if outcome == TIME_LIMIT else -outcome - 1
-        if event is not None and not 0 <= event < len(Event):
+        if event is not None and not 0 <= event < EVENTS:
             raise PlantFault(
                 "integration failed",
                 f"integration failed at t = {self.began + integrator.time:.6f} s: the state runs "
@@ -374,10 +378,10 @@ class Course:
         """What an event says to the outside; those of the stops are dealt with here."""
         watch = self.watch
         if event in SEEN:
-            return SEEN[Event(event)]
-        if event == Event.TURN:
+            return SEEN[event]
+        if event == TURN:
             self._turn = -self._turn
-            watch.lay(Event.TURN, self._turn, 0.0)
+            watch.lay(TURN, self._turn, 0.0)
             return Watched.TURN
         if event <= Event.HIP_HIGH:
             self.bumpers.cross(event)
@@ -385,7 +389,7 @@ class Course:
             self._decide()
         elif event == Event.RECOVER:
             self._load(held=False)
-        elif event != Event.CONTACT:
+        elif event != CONTACT:
             self.bumpers.flip(watch, event)
         elif watch.flies or watch.held or self._released() > -TIE:
             return Watched.CONTACT
@@ -420,9 +424,9 @@ class Course:
         watch.pars[MOTOR : MOTOR + 2] = self.plain_motor
         if watch.flies:
             watch.pars[HEIGHT], watch.pars[SPEED] = self.point[1], self.drift[1]
-        self._fresh = len(LINEAR)
+        self._fresh = self._jumped = True
         watch.restore()
-        watch.lay_bounds(Event.FELL, Event.FELL_BACK, -self._lean, self._lean, NEVER)
+        watch.lay_bounds(FELL, FELL_BACK, -self._lean, self._lean, NEVER)
         self.bumpers.lay(watch)
         self._lay(self._levels)
         self._decide()
@@ -430,12 +434,12 @@ class Course:
     def _lay(self, levels: Levels) -> None:
         """Watch other levels."""
         self._levels, watch = levels, self.watch
-        self._fresh = max(self._fresh, PROBED)
-        watch.lay_bounds(Event.FALL, Event.RISE, levels.lower, levels.upper, NEVER)
+        self._fresh = True
+        watch.lay_bounds(FALL, RISE, levels.lower, levels.upper, NEVER)
         if not levels.turns:
             self._turn = 0.0
-            if watch.gain[Event.TURN] != 0.0:
-                watch.lay(Event.TURN, *OFF)
+            if watch.gain[TURN] != 0.0:
+                watch.lay(TURN, *OFF)
 
     def _decide(self) -> None:
         self.bumpers.decide(self.watch, self.terms, self.plain_motor, self._q, self._v)
