@@ -248,7 +248,7 @@ def test_a_drive_that_is_found_enabled_is_stopped_before_it_is_configured(tmp_pa
             drive._values[0x1016, 1] = 0
             drive._values[0x1400, 5] = 0
             drive._heartbeats.clear()
-        it.link._lock.release()
+        it.link._parts.channel.release()
         again = LockstepBus("rig", network=it.network)
         link = Link(again, it.config, LIMITS, stiffness=STIFFNESS, lock=ChannelLock("b", tmp_path))
         before = it.angles

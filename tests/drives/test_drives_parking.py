@@ -15,6 +15,7 @@ from legbench.drives.master.parking import park
 from legbench.drives.master.port import Port
 from legbench.drives.protocol.cia402 import POWERED, DriveState
 from legbench.drives.protocol.frame import COB_INVALID
+from legbench.drives.transport.lock import ChannelLock
 from legbench.loop import run
 
 RPDO_1, SYNC, NMT_START = (0x1400, 1), 0x080, b"\x01"
@@ -86,8 +87,8 @@ def test_parked_drives_are_configured_by_the_next_run(tmp_path: Path) -> None:
         for drive in it.network.drives:
             assert drive._values[RPDO_1] == COB_INVALID | (0x200 + drive.node_id)
             assert drive._pdos.rpdos == {}
-        again = type(it.link)(it.bus, it.config, stiffness=(1.0, 1.0))
-        again._lock = it.link._lock
+        lock = ChannelLock("rig", tmp_path)
+        again = type(it.link)(it.bus, it.config, stiffness=(1.0, 1.0), lock=lock)
         again.start()
         assert it.states == [DriveState.OPERATION_ENABLED] * 2
         again.close()
