@@ -131,7 +131,7 @@ class Link(Opening):
         sample = self._sample()
         self._check(sample)
         self._guard.check_start(sample.motor_pos)
-        up.seek(Goal.ENABLED, self.cycle.axes, self._watched_tick, "become enabled")
+        up.enable(self._watched_tick)
         # The guard begins from the targets that the drives hold, not from their encoders.
         held = tuple(axis.target_pos for axis in self.cycle.axes)
         self._guard.start_at(held)
