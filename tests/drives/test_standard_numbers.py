@@ -8,7 +8,7 @@ import itertools
 
 import pytest
 
-from legbench.drives.emulated import axis, drive
+from legbench.drives.emulated import axis, drive, process_data
 from legbench.drives.emulated.alarms import register_of
 from legbench.drives.emulated.power import POWERED as POWERED_INSIDE
 from legbench.drives.emulated.power import PowerStage
@@ -375,6 +375,7 @@ ABORTS = {
     0x06090031: "too high",
     0x06090032: "too low",
     0x08000000: "general error",
+    0x08000020: "transferred or stored",
     0x08000021: "local control",
     0x08000022: "device state",
 }
@@ -433,8 +434,8 @@ def test_error_codes_say_what_the_standard_says_they_mean() -> None:
         drive.UNDER_VOLTAGE: (0x3220, "under-voltage"),
         drive.OVER_TEMPERATURE: (0x4310, "drive over-temperature"),
         drive.HEARTBEAT_LOST: (0x8130, "heartbeat lost"),
-        drive.PDO_SHORT: (0x8210, "PDO too short"),
-        drive.PDO_LONG: (0x8220, "PDO too long"),
+        process_data.PDO_SHORT: (0x8210, "PDO too short"),
+        process_data.PDO_LONG: (0x8220, "PDO too long"),
         drive.SYNC_LENGTH: (0x8240, "SYNC of unexpected length"),
         drive.RPDO_LATE: (0x8250, "RPDO timeout"),
         axis.FOLLOWING_ERROR: (0x8611, "following error"),

@@ -6,10 +6,14 @@ from typing import final
 
 from legbench.drives.emulated.axis import SYNC_MISSING, Axis
 from legbench.drives.emulated.behaviour import Behaviour
-from legbench.drives.emulated.heartbeats import HeartbeatConsumer
-from legbench.drives.emulated.identity import write_identity
-from legbench.drives.emulated.process_data import LAST_SYNCHRONOUS, ProcessData
+from legbench.drives.emulated.heartbeats import HeartbeatConsumer, HeartbeatProducer
+from legbench.drives.emulated.identity import lss_address
+from legbench.drives.emulated.lss import LssSlave
+from legbench.drives.emulated.memory import Memory
+from legbench.drives.emulated.power import POWERED
+from legbench.drives.emulated.process_data import PDO_SHORT, ProcessData
 from legbench.drives.emulated.store import ObjectStore
+from legbench.drives.protocol import lss
 from legbench.drives.protocol.cia402 import DriveState
 from legbench.drives.protocol.frame import (
     HEARTBEAT_BASE,
@@ -27,7 +31,7 @@ from legbench.drives.protocol.sdo_server import SdoServer
 from legbench.drives.setup.config import NodeConfig, Parameter
 
 UNDER_VOLTAGE, OVER_TEMPERATURE = 0x3220, 0x4310
-HEARTBEAT_LOST, PDO_SHORT, PDO_LONG, SYNC_LENGTH, RPDO_LATE = 0x8130, 0x8210, 0x8220, 0x8240, 0x8250
+HEARTBEAT_LOST, SYNC_LENGTH, RPDO_LATE = 0x8130, 0x8240, 0x8250
 TARGET = (0x607A, 0)
 _ORDERS = {
     NmtCommand.START: NmtState.OPERATIONAL,
@@ -53,12 +57,14 @@ class EmulatedDrive:
         kept: Sequence[Parameter] = (),
     ) -> None:
         """Switch it on; `kept` is what its memory holds instead of the defaults (1010h)."""
-        self._node, self._behaviour, self._kept = node, behaviour or Behaviour(), kept
+        self._node, self._behaviour = node, behaviour or Behaviour()
         self.node_id = node.node_id
+        self._lss = LssSlave(lss_address(node.identity), node.node_id)
         self._random = random.Random(self._behaviour.seed * LAST_NODE + node.node_id)
         self._store = ObjectStore(OBJECTS.values(), self._check, self._written)
         self._values = self._store.values
-        write_identity(self._values, self._node)
+        self._memory = Memory(self._store, node.identity, kept)
+        self._memory.recall(self.node_id)
         self.axis = Axis(node, self._behaviour, self._values)
         self._pdos = ProcessData(self._store)
         self._sdo = SdoServer(self._store.read, self._store.write)
@@ -66,19 +72,12 @@ class EmulatedDrive:
         self._now_ns = 0
         self._tick_ns = 0
         self._boot_ns = 1000 * self._behaviour.boot_us
-        self._beat_ns = 0
+        self._beat = HeartbeatProducer(self._values)
         self._sync_ns: int | None = None
         self._fresh = False
         self._heartbeats = HeartbeatConsumer(self._values)
         self._out: list[tuple[int, Frame]] = []
-        self._mute = False
-        self._recall()
-
-    def _recall(self) -> None:
-        for parameter in self._kept:
-            entry = self._store.entry(parameter.key)
-            if entry is not None:
-                self._store.put(entry, parameter.value)
+        self._pdos.rebuild()
 
     # --- what the wire and the body call -----------------------------------------------------
 
@@ -90,10 +89,15 @@ class EmulatedDrive:
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Receive a frame of another node; whatever it says, nothing is raised."""
         self._now_ns = now_ns
-        if frame.error or frame.extended or frame.remote or self.state is NmtState.BOOT_UP:
+        booting = self.state is NmtState.BOOT_UP and self.node_id != lss.UNCONFIGURED
+        if frame.error or frame.extended or frame.remote or booting:
             return
         cob_id, data = frame.cob_id, frame.data
-        if cob_id == SYNC_ID:
+        if cob_id == lss.REQUEST_ID:
+            self._layer_setting(data)
+        elif self.node_id == lss.UNCONFIGURED:
+            return
+        elif cob_id == SYNC_ID:
             self._sync(data)
         elif cob_id in self._pdos.rpdos:
             self._rpdo(cob_id, data)
@@ -116,7 +120,7 @@ class EmulatedDrive:
         if step_ns <= 0:
             return self.axis.motion.angle
         if self.state is NmtState.BOOT_UP:
-            if now_ns >= self._boot_ns:
+            if now_ns >= self._boot_ns and self.node_id != lss.UNCONFIGURED:
                 self._boot()
             return self.axis.motion.angle
         angle = self.axis.tick(now_ns, step_ns)
@@ -134,14 +138,13 @@ class EmulatedDrive:
 
     # --- faults to inject --------------------------------------------------------------------
 
-    def reset(self, now_ns: int) -> None:
-        """Start over, as after a brown-out: configuration and state are lost."""
+    def reset(self, now_ns: int, *, cold: bool = True) -> None:
+        """Start over without what is not stored; a cold start forgets a node id set by LSS, too."""
         self._now_ns = now_ns
-        self._store.load_defaults()
-        write_identity(self._values, self._node)
+        self.axis.node_id = self.node_id = self._lss.begin(cold=cold)
+        self._memory.recall(self.node_id)
         self.axis.restart()
         self._pdos.rebuild()
-        self._recall()
         self._heartbeats.clear()
         self._out.clear()
         self.state, self._sync_ns, self._fresh = NmtState.BOOT_UP, None, False
@@ -172,11 +175,21 @@ class EmulatedDrive:
 
     def mute_heartbeat(self, mute: bool = True) -> None:
         """Stop producing heartbeats, while everything else goes on."""
-        self._mute = mute
+        self._beat.mute = mute
 
     # --- CiA 301 -----------------------------------------------------------------------------
 
+    def _layer_setting(self, data: bytes) -> None:
+        """Answer LSS (CiA 305); a drive that has got its first node id boots."""
+        answer = self._lss.feed(data)
+        if answer is not None:
+            self._send(Frame(lss.ANSWER_ID, answer))
+        if self._lss.released:
+            self.reset(self._now_ns, cold=False)
+
     def _check(self, key: Key, value: int) -> Abort | None:
+        if Memory.owns(key):
+            return Memory.check(key, value, powered=self.axis.power.state in POWERED)
         if ProcessData.owns(key):
             return self._pdos.check(key, value)
         if key == (0x1019, 0) and self._values[0x1006, 0]:
@@ -187,6 +200,8 @@ class EmulatedDrive:
         if ProcessData.owns(key):
             if key[0] & 0x200 or key[1] in (1, 2, 5):
                 self._pdos.rebuild()
+        elif Memory.owns(key):
+            self._memory.obey(key)
         elif key[0] == 0x1016:
             self._heartbeats.clear()
         elif key[0] >= 0x6000:
@@ -197,13 +212,13 @@ class EmulatedDrive:
     def _boot(self) -> None:
         self.state = NmtState.PRE_OPERATIONAL
         self._pdos.rebuild()
-        self.axis.power.boot()
-        self._beat_ns = self._now_ns
+        self.axis.boot(self._now_ns)
+        self._beat.begin(self._now_ns)
         self._out.append((self._now_ns, heartbeat_frame(self.node_id, NmtState.BOOT_UP)))
 
     def _obey(self, command: NmtCommand) -> None:
         if command in (NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION):
-            self.reset(self._now_ns)
+            self.reset(self._now_ns, cold=command is NmtCommand.RESET_NODE)
             return
         self._enter(_ORDERS[command])
 
@@ -236,29 +251,17 @@ class EmulatedDrive:
     def _rpdo(self, cob_id: int, data: bytes) -> None:
         if self.state is not NmtState.OPERATIONAL:
             return
-        pdo = self._pdos.rpdos[cob_id]
-        size = pdo.layout.size
-        if len(data) < size:
-            self._send_now(self.axis.alarms.raise_(PDO_SHORT))
-            return
-        if len(data) > size:
-            self._send_now(self.axis.alarms.raise_(PDO_LONG))
-        pdo.seen_ns = self._now_ns
-        self._send_now(self.axis.alarms.clear(RPDO_LATE))
-        window_ns = 1000 * self._values[0x1007, 0]
-        values = pdo.layout.unpack(data[:size])
-        if pdo.kind > LAST_SYNCHRONOUS:
-            self._pdos.apply(pdo, values)
-        elif not (window_ns and self._sync_ns and self._now_ns - self._sync_ns > window_ns):
-            pdo.waiting = values
+        window_ns, since_ns = 1000 * self._values[0x1007, 0], self._sync_ns
+        late = bool(window_ns and since_ns) and self._now_ns - (since_ns or 0) > window_ns
+        error = self._pdos.take(cob_id, data, self._now_ns, in_window=not late)
+        if error is not None:
+            self._send_now(self.axis.alarms.raise_(error))
+        if error != PDO_SHORT:
+            self._send_now(self.axis.alarms.clear(RPDO_LATE))
 
     def _timers(self) -> None:
         now_ns, values = self._now_ns, self._values
-        beat_ns = 1_000_000 * values[0x1017, 0]
-        if beat_ns and now_ns - self._beat_ns >= beat_ns:
-            self._beat_ns = now_ns
-            if not self._mute:
-                self._out.append((now_ns, heartbeat_frame(self.node_id, self.state)))
+        self._send_now(self._beat.due(self.node_id, self.state, now_ns))
         if self._heartbeats.lost(now_ns):
             self._heartbeats.clear()
             self._connection_lost(HEARTBEAT_LOST)

@@ -1,10 +1,42 @@
-"""Heartbeats of other nodes that an emulated drive watches (CiA 301, object 1016h)."""
+"""Heartbeat of an emulated drive, and those that it watches (CiA 301, 1017h and 1016h)."""
 
 from collections.abc import Iterator, Mapping
 from typing import final
 
-from legbench.drives.protocol.nmt import HeartbeatWatch, decode_heartbeat
+from legbench.drives.protocol.frame import Frame
+from legbench.drives.protocol.nmt import (
+    HeartbeatWatch,
+    NmtState,
+    decode_heartbeat,
+    heartbeat_frame,
+)
 from legbench.drives.protocol.objects import Key
+
+
+@final
+class HeartbeatProducer:
+    """Heartbeat of an emulated drive (CiA 301, object 1017h).
+
+    Attributes:
+        mute: no heartbeat is sent, while everything else goes on.
+    """
+
+    def __init__(self, values: Mapping[Key, int]) -> None:
+        self._values = values
+        self._last_ns = 0
+        self.mute = False
+
+    def begin(self, now_ns: int) -> None:
+        """Begin a period, as the boot-up message does."""
+        self._last_ns = now_ns
+
+    def due(self, node_id: int, state: NmtState, now_ns: int) -> Frame | None:
+        """Return the heartbeat of a node where its period has passed."""
+        period_ns = 1_000_000 * self._values[0x1017, 0]
+        if not period_ns or now_ns - self._last_ns < period_ns:
+            return None
+        self._last_ns = now_ns
+        return None if self.mute else heartbeat_frame(node_id, state)
 
 
 @final

@@ -11,6 +11,8 @@ from legbench.drives.protocol.sdo import Abort
 
 RPDO, TPDO = 0x1400, 0x1800
 LAST_SYNCHRONOUS = 240
+PDO_SHORT, PDO_LONG = 0x8210, 0x8220
+"""Error codes of process data with too few and with too many bytes."""
 _EVENT_TYPES = (254, 255)
 
 
@@ -101,6 +103,27 @@ class ProcessData:
             return None
         mapped = Mapped(at, sub, entry.kind)
         return mapped if mapped.bits == bits else None
+
+    def take(self, cob_id: int, data: bytes, now_ns: int, *, in_window: bool) -> int | None:
+        """Take an RPDO, to be latched at SYNC or applied at once; returns the error of its length.
+
+        Args:
+            cob_id: one of `rpdos`.
+            data: the bytes received; surplus ones are ignored.
+            now_ns: time of the reception [ns].
+            in_window: it has come within the synchronous window (1007h).
+        """
+        pdo = self.rpdos[cob_id]
+        size = pdo.layout.size
+        if len(data) < size:
+            return PDO_SHORT
+        pdo.seen_ns = now_ns
+        values = pdo.layout.unpack(data[:size])
+        if pdo.kind > LAST_SYNCHRONOUS:
+            self.apply(pdo, values)
+        elif in_window:
+            pdo.waiting = values
+        return PDO_LONG if len(data) > size else None
 
     def rebuild(self) -> None:
         """Read the PDOs' objects again, after one of them was written."""
