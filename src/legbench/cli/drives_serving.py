@@ -28,6 +28,15 @@ def _at_bitrate(config: "BusConfig", bitrate: int | None) -> "BusConfig":
     return config if bitrate is None else replace(config, bitrate=bitrate)
 
 
+def only(config: "BusConfig", name: str) -> "BusConfig":
+    """Return a bus with one of its drives alone; raises ConfigError for another name."""
+    nodes = tuple(node for node in config.nodes if node.name == name)
+    if not nodes:
+        names = ", ".join(node.name for node in config.nodes)
+        raise ConfigError(f"no node '{name}' in the bus file; there are {names}")
+    return replace(config, nodes=nodes)
+
+
 def _print_state(as_json: bool, at: float, node: str, state: str) -> None:
     """Print the new state of a drive, `at` so many seconds after the start."""
     if as_json:
@@ -50,6 +59,8 @@ class Emulate:
     """How other processes reach it: a socket file, or python-can's slcan on a terminal."""
     bare: bool = False
     """Nothing on the shafts: no MuJoCo."""
+    only: str | None = None
+    """Name of the only drive of the bus file on this bus, bare, such as for `drives node-id`."""
     patience: int = 5
     """Periods without SYNC or target that fault an enabled drive; more on a busy machine."""
     seconds: float = math.inf
@@ -72,8 +83,12 @@ class Emulate:
         self._check_way(bench)
         chosen = Experiment(design=bench.leg(), controller=JumpConfig())
         start = start_of(chosen)
-        body = stiff_body if self.bare else EmulatedLeg(chosen.design, chosen.options, start)
+        bare = self.bare or self.only is not None
+        body = stiff_body if bare else EmulatedLeg(chosen.design, chosen.options, start)
         config = _at_bitrate(bench.config(), bench.bitrate)
+        start_pos = tuple(start.motor_pos.tolist())
+        if self.only is not None:
+            config, start_pos = only(config, self.only), (0.0,)
         end = time.monotonic() + self.seconds
         where = None if bench.channel is None else Path(bench.channel)
 
@@ -95,7 +110,7 @@ class Emulate:
             serve(
                 config,
                 serve_at,
-                start_pos=tuple(start.motor_pos.tolist()),
+                start_pos=start_pos,
                 body=body,
                 patience=self.patience,
                 report=partial(_print_state, bench.json),

@@ -35,6 +35,10 @@ START_HOMING = 0x1F
 """Enable operation with bit 4."""
 IN_PLACE = (35, 37)
 """Methods that do not move."""
+INDEX_ONLY = (33, 34)
+"""Methods that search the index pulse alone, at the slower speed."""
+STANDARD, MAKERS = range(1, 38), range(-128, 0)
+"""Homing methods of CiA 402-2, and of the makers of drives."""
 NEEDED = ((0x6065, 0), (0x6072, 0), (0x6085, 0))
 """Window, torque and ramp that a search is not made without, in the bus file."""
 FASTEST = 1.0
@@ -69,7 +73,7 @@ def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20
     Args:
         session: the channel is taken.
         node: of the bus file.
-        method: 6098h; 37 calls the present position zero, -1 to -4 drive against a hard stop.
+        method: 6098h; 37 calls the present position zero, all others but 35 search.
         timeout: [s]
 
     Raises:
@@ -83,6 +87,11 @@ def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20
     """
     if not 0.0 < timeout <= LONGEST:
         raise ConfigError(f"timeout is {timeout:g} s; it must be positive, {LONGEST:g} s at most")
+    if method not in STANDARD and method not in MAKERS:
+        raise ConfigError(
+            f"homing method is {method}; the standard has 1 to {STANDARD[-1]}, makers of drives "
+            f"{MAKERS[0]} to -1"
+        )
     if method not in IN_PLACE:
         _check_bounded(node)
     # Led by SDO a drive gets no RPDO, whose deadline therefore never begins.
@@ -97,7 +106,7 @@ def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20
     up.configure(node)
     sdo = up.sdo(node)
     if method not in IN_PLACE:
-        _check_speed(sdo, node)
+        _check_speed(sdo, node, method)
     before = up.preload(node)
     _choose(sdo, node, method)
     master = _Master(session, up, node)
@@ -125,13 +134,19 @@ def _check_bounded(node: NodeConfig) -> None:
         )
 
 
-def _check_speed(sdo: SdoPort, node: NodeConfig) -> None:
-    speed = sdo.get_int(0x6099, 1, U32) / abs(node.motor.counts_per_rad)
-    if speed > FASTEST:
-        raise ConfigError(
-            f"'{node.name}' would search its stop at {speed:.3g} rad/s, the limit is {FASTEST:g} "
-            'rad/s; give "6099:01 u32" [counts/s] in its parameters'
-        )
+def _check_speed(sdo: SdoPort, node: NodeConfig, method: int) -> None:
+    """Refuse a search that is too fast, or that would never come anywhere (6099h)."""
+    subs = {1: "for a switch or stop", 2: "for zero"}
+    for sub, what in subs.items():
+        speed = sdo.get_int(0x6099, sub, U32) / abs(node.motor.counts_per_rad)
+        # The maker's own methods need not use the second speed, an index pulse not the first.
+        needed = sub == 1 if method in MAKERS else sub == 2 or method not in INDEX_ONLY
+        if speed > FASTEST or (needed and not speed):
+            raise ConfigError(
+                f"'{node.name}' would search {what} at {speed:.3g} rad/s; it must be above 0 and "
+                f'at most {FASTEST:g} rad/s: give "6099:{sub:02X} u32" [counts/s] in its '
+                "parameters"
+            )
 
 
 def _choose(sdo: SdoPort, node: NodeConfig, method: int) -> None:
@@ -182,8 +197,10 @@ class _Master(Lead):
             if way is Way.REFUSED:
                 break
             self.command(controlword)
+        way = f"; remove the cause, then run `legbench drives reset --node {self._node.name}`"
         raise DriveError(
             f"drive '{self._node.name}' does not become enabled: {describe_statusword(word)}"
+            f"{way if decode_state(word) is DriveState.FAULT else ''}"
         )
 
     def await_end(self, timeout: float) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from legbench.commissioning.status import read_counts
 from legbench.drives.errors import DriveError
+from legbench.drives.master.preparation import check_homed
 from legbench.drives.master.session import Session
 from legbench.drives.setup.config import NodeConfig
 from legbench.drives.setup.file_edit import Place, edit_file
@@ -36,7 +37,7 @@ def measure(session: Session, posture: Sequence[float]) -> list[Zero]:
     Raises:
         ConfigError: an angle that no leg stands at.
         PlantFault: somebody else leads these drives.
-        DriveError: a drive does not answer, is another one, or its encoders move.
+        DriveError: a drive does not answer, is another one, is not homed, or its encoders move.
     """
     for angle in posture:
         if not abs(angle) <= math.pi:
@@ -44,6 +45,7 @@ def measure(session: Session, posture: Sequence[float]) -> list[Zero]:
     up = session.bring_up()
     up.listen()
     up.identify()
+    check_homed(up, session.config.nodes)
     return [
         _node(session, node, angle)
         for node, angle in zip(session.config.nodes, posture, strict=True)

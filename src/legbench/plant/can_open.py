@@ -5,7 +5,7 @@ from typing import Any, final
 
 from legbench.clock import AbstractClock
 from legbench.drives.emulated.behaviour import Behaviour
-from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.build import emulate, on_bench
 from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.emulated.network import Network
 from legbench.drives.master.session import Session
@@ -162,9 +162,9 @@ def _emulated(config: BusConfig, choice: CanChoice, leg: Leg | None) -> Network:
     For those who only look its drives have kept their configuration: nobody may write it.
     """
     if leg is None:
-        idle = [Behaviour(start_pos=start) for start in IDLE_POS]
-        fits = len(config.nodes) == len(idle)
-        return emulate(config, idle if fits else None, configured=choice.read_only)
+        starts = IDLE_POS if len(config.nodes) == len(IDLE_POS) else (0.0,) * len(config.nodes)
+        idle = [on_bench(node, start) for node, start in zip(config.nodes, starts, strict=True)]
+        return emulate(config, idle, configured=choice.read_only)
     motors = [float(value) for value in leg.start.motor_pos]
     return emulate(
         config,

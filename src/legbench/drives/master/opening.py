@@ -3,7 +3,12 @@
 from legbench.drives.master.ending import Ending
 from legbench.drives.master.link_state import LinkState
 from legbench.drives.master.port import Listener, Port
-from legbench.drives.master.preparation import prepare_to_move, read_temperatures, refuse_led
+from legbench.drives.master.preparation import (
+    check_homed,
+    prepare_to_move,
+    read_temperatures,
+    refuse_led,
+)
 from legbench.drives.master.read_only import may_pace, may_read
 from legbench.drives.master.start_up import StartUp
 from legbench.drives.master.supervisor import Supervisor
@@ -105,6 +110,7 @@ class Opening(Ending):
             self._hold()
             self.bring_up.listen()
         self.bring_up.identify()
+        check_homed(self.bring_up, self._config.nodes)
         self.bring_up.refuse_differences()
         if self.listening:
             return

@@ -21,6 +21,7 @@ from legbench.drives.setup.config import (
     PdoConfig,
 )
 from legbench.drives.setup.configuration import interpolation_time
+from legbench.drives.setup.homed import HomedCondition
 from legbench.drives.setup.units import AxisUnits
 from legbench.errors import ConfigError
 from legbench.limits.safety import SafetyLimits
@@ -143,6 +144,9 @@ def _node_of(given: dict[str, Any], where: str) -> NodeConfig:
             pdos = _list(key, given.pop(key))
             with _at(f"{where}: {key}"):
                 given[plural] = tuple(_pdo(where, entry, usual) for entry in pdos)
+    if "homed" in given:
+        with _at(f"{where} homed"):
+            given["homed"] = _homed(f"{where} homed", given["homed"])
     if "soft_limits" in given:
         given["soft_limits"] = _range("soft_limits", given["soft_limits"])
     parameters = _table("parameters", given.get("parameters", {}))
@@ -152,7 +156,14 @@ def _node_of(given: dict[str, Any], where: str) -> NodeConfig:
         if keys.count(key) > 1:
             raise ConfigError(f"{where} gives parameter {name_of(*key)} twice")
     done = ("identity", "motor", "link", "link_object", "temperature_object", "rpdos", "tpdos")
-    return _build(NodeConfig, where, given, converted=(*done, "parameters", "soft_limits"))
+    return _build(NodeConfig, where, given, converted=(*done, "parameters", "soft_limits", "homed"))
+
+
+def _homed(where: str, table: object) -> HomedCondition:
+    given = _table("homed", table)
+    if "object" in given:
+        given["object"] = parse_object(given["object"])
+    return _build(HomedCondition, where, given, converted=("object",))
 
 
 def _pdo(where: str, table: object, usual: Mapping[str, int]) -> PdoConfig:
