@@ -1,4 +1,4 @@
-"""LSS of an emulated drive: canopen's LSS master as an independent peer, and CiA 305 by the byte."""
+"""LSS of an emulated drive, by the byte as CiA 305 prints it."""
 
 import struct
 

@@ -25,8 +25,7 @@ def count_answers(port: Port, node_id: int, index: int, sub: int) -> int:
     """
     most = 0
     for _ in range(QUESTIONS):
-        while port.take() is not None:
-            pass
+        _quiet(port)
         errors = port.error_frames
         port.send(SDO_REQUEST_BASE + node_id, Upload(index, sub).request)
         answers, until_ns = 0, port.timebase.now_ns() + ANSWER_NS
@@ -40,3 +39,10 @@ def count_answers(port: Port, node_id: int, index: int, sub: int) -> int:
             answers += 1
         most = max(most, answers)
     return most
+
+
+def _quiet(port: Port) -> None:
+    """Discard late answers to earlier questions."""
+    until_ns = port.timebase.now_ns() + ECHO_NS
+    while port.timebase.now_ns() < until_ns:
+        port.receive(until_ns)

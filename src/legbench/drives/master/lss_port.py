@@ -26,6 +26,8 @@ SCAN_NS = 25_000_000
 """Longest wait for an answer that may not come, of which a scan has about 250 [ns]."""
 STORE_NS = 5_000_000_000
 """Longest wait for a drive that writes its memory [ns]."""
+SEND_NS = 2_000_000
+"""Time in which a frame is on the wire [ns]."""
 ECHO_NS = 15_000_000
 """Time after an answer in which a second drive would answer, too [ns]."""
 
@@ -62,8 +64,11 @@ class LssPort:
         return answers
 
     def release(self) -> None:
-        """Bring all drives back to waiting; a new node id may be in use from here; BusError."""
-        self._port.send(REQUEST_ID, lss_frame(Lss.SWITCH_GLOBAL, bytes((LssMode.WAITING,))))
+        """Bring all drives back to waiting, where a first node id is used; raises BusError."""
+        port = self._port
+        port.send(REQUEST_ID, lss_frame(Lss.SWITCH_GLOBAL, bytes((LssMode.WAITING,))))
+        # An interface that is closed at once may drop what it has not sent.
+        port.timebase.wait_until(port.timebase.now_ns() + SEND_NS)
 
     def select(self, address: LssAddress) -> None:
         """Bring the one drive of an address into configuration.
