@@ -248,7 +248,7 @@ def test_a_data_sheet_describes_objects_as_the_standard_spells_them() -> None:
     # Arrays are of one type, records are not (CiA 301, 7.4.3).
     kinds = {
         name: (found[name]["ObjectType"], found[name]["SubNumber"])
-        for name in ("1003", "1016", "1018", "1400", "1600", "607D", "60C2")
+        for name in ("1003", "1010", "1011", "1016", "1018", "1400", "1600", "607D", "60C2")
     }
     assert kinds == {
         "1003": ("0x8", "2"),
@@ -256,6 +256,8 @@ def test_a_data_sheet_describes_objects_as_the_standard_spells_them() -> None:
         "1018": ("0x9", "5"),
         "1400": ("0x9", "5"),
         "1600": ("0x9", "9"),
+        "1010": ("0x8", "4"),
+        "1011": ("0x8", "4"),
         "607D": ("0x8", "3"),
         "60C2": ("0x9", "3"),
     }
@@ -283,7 +285,7 @@ def test_a_configured_sheet_holds_the_node_and_what_it_is_told() -> None:
     commissioning = found["DeviceComissioning"]
     assert (commissioning["NodeID"], commissioning["NodeName"]) == ("2", "knee")
     assert (commissioning["Baudrate"], commissioning["LSS_SerialNumber"]) == ("500", "101")
-    identity = [found[f"1018sub{sub}"]["ParameterValue"] for sub in (1, 2, 3, 4)]
+    identity = [found[f"1018sub{sub}"]["DefaultValue"] for sub in (1, 2, 3, 4)]
     assert identity == ["0x1234", "0x7", "0x9", "0x65"]
     last = {key: (kind, value) for key, kind, value in told(bus, chosen)}
     for key, (kind, value) in last.items():
@@ -295,4 +297,4 @@ def test_a_configured_sheet_holds_the_node_and_what_it_is_told() -> None:
     bare = replace(chosen, identity=replace(chosen.identity, serial=None, revision=None))
     found = sheet(dcf_text(bus_of(bare), bare))
     assert found["DeviceComissioning"]["LSS_SerialNumber"] == "0"
-    assert [found[f"1018sub{sub}"]["ParameterValue"] for sub in (3, 4)] == ["0x0", "0x0"]
+    assert [found[f"1018sub{sub}"]["DefaultValue"] for sub in (3, 4)] == ["0x0", "0x0"]

@@ -13,6 +13,7 @@ from legbench.cli.output import note, print_json
 from legbench.errors import ConfigError
 
 if TYPE_CHECKING:
+    from legbench.drives.emulated.network import Body
     from legbench.drives.setup.config import BusConfig
 
 UNIX, SLCAN = "legbench_unix", "slcan"
@@ -69,24 +70,17 @@ class Emulate:
     def run(self, bench: Bench) -> int:
         """Serve until ^C or SIGTERM, printing every change of a drive's state."""
         from legbench.commissioning.emulate import Server, serve
-        from legbench.control import JumpConfig
         from legbench.drives.emulated.bus_server import BusServer
-        from legbench.drives.emulated.network import Network, stiff_body
+        from legbench.drives.emulated.network import Network
         from legbench.drives.emulated.slcan_server import SlcanServer
         from legbench.drives.emulated.unix_server import UnixServer
-        from legbench.experiment import Experiment, start_of
         from legbench.interrupts import stop_on_interrupt
         from legbench.plant.can_open import open_session
-        from legbench.plant.emulated_leg import EmulatedLeg
 
         _check_time("seconds", self.seconds)
         self._check_way(bench)
-        chosen = Experiment(design=bench.leg(), controller=JumpConfig())
-        start = start_of(chosen)
-        bare = self.bare or self.only is not None
-        body = stiff_body if bare else EmulatedLeg(chosen.design, chosen.options, start)
         config = _at_bitrate(bench.config(), bench.bitrate)
-        start_pos = tuple(start.motor_pos.tolist())
+        start_pos, body = self._leg(bench)
         if self.only is not None:
             config, start_pos = only(config, self.only), (0.0,)
         end = time.monotonic() + self.seconds
@@ -118,6 +112,19 @@ class Emulate:
                 stop=lambda: stop.is_set or time.monotonic() > end,
             )
         return 0
+
+    def _leg(self, bench: Bench) -> "tuple[tuple[float, ...], Body]":
+        """Motor positions at power-on [rad], and what hangs on the shafts."""
+        from legbench.control import JumpConfig
+        from legbench.drives.emulated.network import stiff_body
+        from legbench.experiment import Experiment, start_of
+        from legbench.plant.emulated_leg import EmulatedLeg
+
+        chosen = Experiment(design=bench.leg(), controller=JumpConfig())
+        start = start_of(chosen)
+        bare = self.bare or self.only is not None
+        body = stiff_body if bare else EmulatedLeg(chosen.design, chosen.options, start)
+        return tuple(start.motor_pos.tolist()), body
 
     def _check_way(self, bench: Bench) -> None:
         if self.serve == SLCAN and bench.interface is not None:

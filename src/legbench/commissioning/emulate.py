@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable
 
+from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.build import emulate, on_bench
 from legbench.drives.emulated.bus_server import BusServer
 from legbench.drives.emulated.network import Body, Network, stiff_body
@@ -48,16 +49,7 @@ def serve(
         BusError: the bus cannot be opened, or has failed.
         PlantFault: the leg has come apart.
     """
-    behaviours = [
-        on_bench(
-            node,
-            pos,
-            reply_delay_us=(0, 0),
-            missing_limit=patience,
-            sync_loss_periods=patience,
-        )
-        for node, pos in zip(config.nodes, start_pos, strict=True)
-    ]
+    behaviours = _behaviours(config, start_pos, patience)
     # A master on the same processor goes first, as it would on one of its own.
     ask(priority=PRIORITY - 1)
     network = emulate(config, behaviours, body=body)
@@ -74,3 +66,17 @@ def serve(
                 if shown.get(node.name) is not state:
                     shown[node.name] = state
                     reporting(time.monotonic() - began, node.name, state.value)
+
+
+def _behaviours(config: BusConfig, start_pos: tuple[float, ...], patience: int) -> list[Behaviour]:
+    """Behaviours of drives that reply at once and start at some motor positions [rad]."""
+    return [
+        on_bench(
+            node,
+            pos,
+            reply_delay_us=(0, 0),
+            missing_limit=patience,
+            sync_loss_periods=patience,
+        )
+        for node, pos in zip(config.nodes, start_pos, strict=True)
+    ]

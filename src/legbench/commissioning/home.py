@@ -7,7 +7,7 @@ when this master falls silent; it is always led out by quick stop.
 from dataclasses import dataclass
 from typing import final
 
-from legbench.drives.errors import DriveError
+from legbench.drives.errors import DriveError, SdoAbortError
 from legbench.drives.master.bring_up import BringUp
 from legbench.drives.master.sdo_port import SdoPort
 from legbench.drives.master.sdo_stop import SdoStop, leave_operational
@@ -85,15 +85,7 @@ def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20
         DriveError: another drive, a refused step, or homing failed.
         StopError: the drive keeps its power, or does not answer.
     """
-    if not 0.0 < timeout <= LONGEST:
-        raise ConfigError(f"timeout is {timeout:g} s; it must be positive, {LONGEST:g} s at most")
-    if method not in STANDARD and method not in MAKERS:
-        raise ConfigError(
-            f"homing method is {method}; the standard has 1 to {STANDARD[-1]}, makers of drives "
-            f"{MAKERS[0]} to -1"
-        )
-    if method not in IN_PLACE:
-        _check_bounded(node)
+    _check_asked(node, method, timeout)
     # Led by SDO a drive gets no RPDO, whose deadline therefore never begins.
     check_master_watch(session.config, speed=FASTEST, commands=False)
     session.hold()
@@ -124,6 +116,19 @@ def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20
     return Homed(node=node.name, method=method, before_counts=before, after_counts=after)
 
 
+def _check_asked(node: NodeConfig, method: int, timeout: float) -> None:
+    """Refuse what no drive has or no search should be made with; raises ConfigError."""
+    if not 0.0 < timeout <= LONGEST:
+        raise ConfigError(f"timeout is {timeout:g} s; it must be positive, {LONGEST:g} s at most")
+    if method not in STANDARD and method not in MAKERS:
+        raise ConfigError(
+            f"homing method is {method}; the standard has 1 to {STANDARD[-1]}, makers of drives "
+            f"{MAKERS[0]} to -1"
+        )
+    if method not in IN_PLACE:
+        _check_bounded(node)
+
+
 def _check_bounded(node: NodeConfig) -> None:
     given = {parameter.key for parameter in node.parameters if parameter.value > 0}
     missing = [name_of(*key) for key in NEEDED if key not in given]
@@ -136,21 +141,29 @@ def _check_bounded(node: NodeConfig) -> None:
 
 def _check_speed(sdo: SdoPort, node: NodeConfig, method: int) -> None:
     """Refuse a search that is too fast, or that would never come anywhere (6099h)."""
-    subs = {1: "for a switch or stop", 2: "for zero"}
+    subs = {1: "a switch or stop", 2: "zero"}
     for sub, what in subs.items():
         speed = sdo.get_int(0x6099, sub, U32) / abs(node.motor.counts_per_rad)
         # The maker's own methods need not use the second speed, an index pulse not the first.
         needed = sub == 1 if method in MAKERS else sub == 2 or method not in INDEX_ONLY
-        if speed > FASTEST or (needed and not speed):
+        way = f'give "6099:{sub:02X} u32" [counts/s] in its parameters'
+        if speed > FASTEST:
             raise ConfigError(
-                f"'{node.name}' would search {what} at {speed:.3g} rad/s; it must be above 0 and "
-                f'at most {FASTEST:g} rad/s: give "6099:{sub:02X} u32" [counts/s] in its '
-                "parameters"
+                f"'{node.name}' would search {what} at {speed:.3g} rad/s, the limit is "
+                f"{FASTEST:g} rad/s; {way}"
             )
+        if needed and not speed:
+            raise ConfigError(f"'{node.name}' has no speed to search {what} with; {way}")
 
 
 def _choose(sdo: SdoPort, node: NodeConfig, method: int) -> None:
-    sdo.put(0x6098, 0, I8, method)
+    try:
+        sdo.put(0x6098, 0, I8, method)
+    except SdoAbortError as error:
+        raise DriveError(
+            f"drive '{node.name}' does not take homing method {method}: {error}; its manual lists "
+            "those that it has"
+        ) from error
     there = sdo.get_int(0x6098, 0, I8)
     if there != method:
         raise DriveError(f"drive '{node.name}' does not take homing method {method}: {there}")
