@@ -8,7 +8,7 @@ from datetime import datetime
 from pathlib import Path
 
 import canopen
-import eds
+import eds  # pyright: ignore[reportMissingImports]
 import pytest
 from can_rig import BUS, ROOT
 

@@ -27,6 +27,7 @@ from legbench.drives.protocol.cia402 import POWERED, DriveState
 from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.frame import Frame
 from legbench.drives.protocol.pdo import Mapped
+from legbench.drives.protocol.sdo import Abort
 from legbench.drives.setup.bus_file import load_bus, load_limits
 from legbench.drives.setup.config import BusConfig, NodeConfig
 from legbench.drives.setup.homed import HomedCondition
@@ -172,7 +173,12 @@ def test_what_the_drives_hold_outlasts_their_power() -> None:
         for drive in network.drives:
             drive.reset(network.now_ns)
         network.advance(network.now_ns + 20 * MS)
-        assert [session.bring_up().differences(node) for node in session.config.nodes] == [[], []]
+        # All but the command frames, which are stored switched off.
+        for node in session.config.nodes:
+            left = session.bring_up().differences(node)
+            assert [(one.key, there) for one, there in left] == [
+                ((0x1400, 1), 1 << 31 | 0x200 + node.node_id)
+            ]
     # The signature is "save", once a drive.
     saves = [frame for frame in written(network) if frame.data[1:4] == b"\x10\x10\x01"]
     assert [frame.data[4:] for frame in saves] == [b"save", b"save"]
@@ -201,7 +207,18 @@ def test_a_drive_that_refuses_or_has_no_memory_is_named_with_those_before_it() -
         pytest.raises(DriveError, match=r"stores nothing on command: 1010h:01 reads 0000"),
     ):
         store(session, session.config.nodes)
-    assert written(network) == []
+    assert not [frame for frame in written(network) if frame.data[1:3] == b"\x10\x10"]
+
+
+def test_nothing_is_stored_where_command_frames_stay_on() -> None:
+    session, network = opened()
+    drive = network.drives[0]
+    with session:
+        session.bring_up().configure(session.config.nodes[0])
+        drive._pdos.check = lambda key, value: Abort.DEVICE_STATE if key == (0x1400, 1) else None
+        with pytest.raises(DriveError, match=r"'motor1' .* is not parked.*nothing has been stored"):
+            store(session, session.config.nodes)
+    assert not [frame for frame in written(network) if frame.data[1:3] == b"\x10\x10"]
 
 
 def test_a_drive_that_never_answers_to_the_signature_is_told_as_unknown() -> None:
@@ -216,7 +233,7 @@ def test_a_drive_that_never_answers_to_the_signature_is_told_as_unknown() -> Non
     drive.receive = receive  # pyright: ignore[reportAttributeAccessIssue]
     with session, pytest.raises(NoAnswerError, match=r"within 3 s, so whether it has stored"):
         store(session, session.config.nodes, timeout=3.0)
-    assert len(written(network)) == 1
+    assert len([frame for frame in written(network) if frame.data[1:3] == b"\x10\x10"]) == 1
 
 
 @pytest.mark.parametrize(
@@ -308,12 +325,12 @@ def test_no_node_id_is_given_to_a_drive_with_power_or_to_nobody() -> None:
         set_node_id(session, 42)
     assert written(network) == []
     session, network = alone(BENCH.nodes[0])
-    network.drives[0]._lss.feed = lambda _data: None
+    network.drives[0]._lss.feed = lambda data: None
     with session, pytest.raises(NoAnswerError, match="no drive answers over LSS"):
         set_node_id(session, 42)
     assert written(network) == []
     session, network = alone(BENCH.nodes[0])
-    network.drives[0].receive = lambda _frame, _now_ns: None
+    network.drives[0].receive = lambda frame, now_ns: None
     with session, pytest.raises(NoAnswerError, match="no node answers, with a node id or without"):
         set_node_id(session, 42)
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from legbench.drives.errors import DriveError, NoAnswerError, SdoAbortError
 from legbench.drives.master.bring_up import BringUp
+from legbench.drives.master.parking import park
 from legbench.drives.master.preparation import refuse_powered
 from legbench.drives.master.sdo_port import SdoPort
 from legbench.drives.master.session import Session
@@ -17,6 +18,8 @@ LONGEST = 60.0
 """Longest time that a drive may take to write its memory [s]."""
 LAST_PART = 127
 """Highest sub-index of 1010h; parts from 4 on are the maker's own."""
+COMMUNICATION = (1, 2)
+"""Parts of 1010h that hold the COB-IDs of command frames."""
 U32 = DataType.UNSIGNED32
 
 
@@ -36,7 +39,9 @@ def store(
 ) -> list[Stored]:
     """Make drives store their parameters: write the signature "save", check every answer.
 
-    The signature is written once: a memory of this kind bears some 10 000 writes.
+    Command frames are switched off first, as at the end of every run: drives that wake up with them
+    would obey a log that is played back. The signature is written once: a memory of this kind bears
+    some 10 000 writes.
 
     Args:
         session: the channel is taken.
@@ -59,6 +64,10 @@ def store(
     up.listen()
     up.identify()
     refuse_powered(up, session.config.nodes)
+    if part in COMMUNICATION:
+        failed = park(session.port(), session.config, up.lookout.hear)
+        if failed:
+            raise DriveError(f"{failed[0]}; nothing has been stored")
     done: list[Stored] = []
     for node in nodes:
         try:

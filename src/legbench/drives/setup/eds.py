@@ -34,7 +34,7 @@ class Stamps:
 
 def stamps_of(text: str) -> Stamps | None:
     """Times that the head of a data sheet names; none if it names none."""
-    lines = dict(line.partition("=")[::2] for line in text.splitlines() if "=" in line)
+    lines = {key: value for key, _, value in (line.partition("=") for line in text.splitlines())}
     try:
         created, modified = (
             datetime.strptime(f"{lines[f'{what}Date']} {lines[f'{what}Time']}", f"{DATE} {TIME}")
