@@ -76,6 +76,7 @@ class NodeId:
 
         with bench.session(leads=True) as session:
             done = set_node_id(session, self.to)
+            nodes = session.config.nodes
         if bench.json:
             print_json(asdict(done))
         else:
@@ -84,6 +85,9 @@ class NodeId:
                 f"vendor {done.vendor:#010x}  product {done.product:#010x}  serial {done.serial}  "
                 f"revision {done.revision}  {was}, is node {done.after}"
             )
+        for node in nodes:
+            if node.identity.serial == done.serial and node.node_id != done.after:
+                note(f"give '{node.name}' the line id = {done.after} in {bench.bus}")
         if not done.stored:
             note(
                 f"the drive does not store its node id: it is node {done.after} until its power is "

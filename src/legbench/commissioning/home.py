@@ -9,6 +9,7 @@ from typing import final
 
 from legbench.drives.errors import DriveError, SdoAbortError
 from legbench.drives.master.bring_up import BringUp
+from legbench.drives.master.preparation import is_homed
 from legbench.drives.master.sdo_port import SdoPort
 from legbench.drives.master.sdo_stop import SdoStop, leave_operational
 from legbench.drives.master.session import Session
@@ -82,7 +83,7 @@ def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20
         BusError: the channel has a master.
         PlantFault: somebody else leads these drives; before the homing has begun, nothing has been
             sent since it was heard.
-        DriveError: another drive, a refused step, or homing failed.
+        DriveError: another drive, a refused step, homing failed, or is not shown afterwards.
         StopError: the drive keeps its power, or does not answer.
     """
     _check_asked(node, method, timeout)
@@ -113,6 +114,11 @@ def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20
     up.lookout.rest()
     sdo.put(0x6060, 0, I8, Mode.CYCLIC_SYNCHRONOUS_POSITION)
     after = sdo.get_int(0x6064, 0, I32)
+    if is_homed(up, node) is False:
+        raise DriveError(
+            f"drive '{node.name}' has homed, and does not show it ({node.homed}): correct its "
+            "'homed' in the bus file, by which nothing begins otherwise"
+        )
     return Homed(node=node.name, method=method, before_counts=before, after_counts=after)
 
 

@@ -13,6 +13,7 @@ from legbench.drives.protocol.frame import HEARTBEAT_BASE, LAST_NODE
 from legbench.drives.protocol.lss import UNCONFIGURED, LssAddress, LssError
 from legbench.drives.protocol.nmt import NmtCommand, nmt_frame
 from legbench.errors import ConfigError
+from legbench.interrupts import shielded
 
 BOOT_NS = 5_000_000_000
 """Longest wait for the boot-up message under the new node id [ns]."""
@@ -62,7 +63,8 @@ def set_node_id(session: Session, node_id: int) -> NodeIdChange:
         stored = lss.store()
     finally:
         # No drive may stay in configuration, whatever happens: it would take the next node id.
-        lss.release()
+        with shielded():
+            lss.release()
     _restart(session, before, node_id, address)
     if stored is LssError.STORE_FAILED:
         raise DriveError(
