@@ -120,3 +120,16 @@ def test_inputs_show_the_switches_as_402_numbers_them() -> None:
     switches = Switches(UNITS, Behaviour(hard_stop=STOPS, home_switch=CAM))
     shown = [switches.inputs(angle * PER_RAD) for angle in (-8.97, 0.0, 1.7, 7.97)]
     assert shown == [0b001, 0b000, 0b100, 0b010]
+
+
+def test_switches_are_active_at_their_very_edges() -> None:
+    units = AxisUnits(counts_per_rev=1000)
+    behaviour = Behaviour(hard_stop=(-2.0, 2.0), home_switch=(0.5, 1.0))
+    switches = Switches(units, behaviour)
+    per_rad = units.counts_per_rad
+    low, high = -2.0 * per_rad + LIMIT_SWITCH * per_rad, 2.0 * per_rad - LIMIT_SWITCH * per_rad
+    for edge, outwards, bit in ((low, -1, 1), (high, 1, 2), (0.5 * per_rad, 1, 4)):
+        assert switches.inputs(edge) == bit
+        assert switches.inputs(edge + 1e-6 * outwards) == bit
+        assert switches.inputs(edge - 1e-6 * outwards) == 0
+    assert switches.inputs(1.0 * per_rad) == 4

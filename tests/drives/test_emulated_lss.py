@@ -102,6 +102,25 @@ def test_a_drive_with_a_node_id_takes_no_part_in_scans() -> None:
     assert ask(bare, 0x51, word(0), 0x80, 0, 0) == b"\x4f" + bytes(7)
 
 
+def test_a_scan_can_begin_anew_and_asks_32_bits_of_4_words() -> None:
+    slave = LssSlave(ADDRESS, 255)
+    vendor = word(VENDOR)
+    assert ask(slave, 0x51, vendor, 0, 0, 1) == b"\x4f" + bytes(7)
+    # The next word is asked for now, and no longer the first one.
+    assert ask(slave, 0x51, vendor, 0, 0, 1) is None
+    assert ask(slave, 0x51, word(PRODUCT), 31, 1, 1) == b"\x4f" + bytes(7)
+    ask(slave, 0x51, word(0), 0x80, 0, 0)
+    assert ask(slave, 0x51, vendor, 31, 0, 0) == b"\x4f" + bytes(7)
+    assert ask(slave, 0x51, vendor, 32, 0, 0) is None
+    assert ask(slave, 0x51, vendor, 0, 4, 0) is None
+
+
+def test_a_mode_that_does_not_exist_is_ignored() -> None:
+    slave = configuring()
+    assert ask(slave, 0x04, 2) is None
+    assert ask(slave, 0x5E) is not None
+
+
 def test_frames_of_another_length_are_ignored() -> None:
     slave = configuring()
     for length in (0, 1, 7):

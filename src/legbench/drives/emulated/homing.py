@@ -90,11 +90,8 @@ class Homing:
     def _free(self, move: Move, motion: Motion) -> bool:
         """Whether the way is free; a search that may turn round at a limit switch does it once."""
         towards = Until.POSITIVE_LIMIT if move.direction > 0 else Until.NEGATIVE_LIMIT
-        if move.until is Until.STOP:
-            return True
-        if motion.blocked():
-            return False
-        if move.until is towards or not self._switches.active(towards, motion.travel):
+        # A limit switch lies before its mechanical stop, so no other move ever reaches one.
+        if move.until in (Until.STOP, towards) or not self._switches.active(towards, motion.travel):
             return True
         if move.turns:
             self._moves[0] = replace(move, direction=-move.direction, turns=False)
