@@ -135,6 +135,24 @@ def test_a_bus_log_is_read_by_others_and_its_failure_is_not_ours(tmp_path: Path)
     found = list(can.CanutilsLogReader(path))
     for message, back in zip(sent, found, strict=True):
         assert message.equals(back, timestamp_delta=1e-6, check_channel=False)
+    # SocketCAN's reports of a bus error and of bus-off; a remote frame that asks for 8 bytes.
+    rare = [
+        can.Message(
+            timestamp=2, arbitration_id=cob_id, is_extended_id=False, is_error_frame=True, dlc=8
+        )
+        for cob_id in (0x88, 0x40)
+    ]
+    rare.append(
+        can.Message(
+            timestamp=3, arbitration_id=0x181, is_extended_id=False, is_remote_frame=True, dlc=8
+        )
+    )
+    with BusLog(tmp_path / "rare.log", "can0") as log:
+        for message in rare:
+            log(message)
+    found = list(can.CanutilsLogReader(tmp_path / "rare.log"))
+    assert [message.is_error_frame for message in found] == [True, True, False]
+    assert (found[2].is_remote_frame, found[2].dlc) == (True, 8)
     with pytest.raises(BusError, match="cannot write a bus log: File exists"):
         BusLog(path, "can0")
     full = BusLog(tmp_path / "other.log", "can0")

@@ -10,6 +10,20 @@ from legbench.drives.errors import BusError
 
 FLUSH_FRAMES = 500
 """Number of frames between two flushes of the log: about 100 ms of a busy bus."""
+ERROR_FLAG, BUS_ERROR = 0x20000000, 0x80
+"""Bits of SocketCAN's error frames: that one is an error frame, and that a bus error is among its
+reasons. python-can's reader takes what lacks either of them for data."""
+
+
+def line_of(message: can.Message, channel: str) -> str:
+    """The line of a frame in candump's format, its end included."""
+    if message.is_error_frame:
+        name = f"{ERROR_FLAG | BUS_ERROR | message.arbitration_id:08X}"
+    else:
+        width = 8 if message.is_extended_id else 3
+        name = f"{message.arbitration_id:0{width}X}"
+    data = f"R{message.dlc}" if message.is_remote_frame else message.data.hex().upper()
+    return f"({message.timestamp:.6f}) {channel} {name}#{data}\n"
 
 
 @final
@@ -36,13 +50,7 @@ class BusLog(Closing):
 
     def __call__(self, message: can.Message) -> None:
         """Add one frame to the log."""
-        if message.is_error_frame:
-            name = f"{0x20000000 | message.arbitration_id:08X}"
-        else:
-            width = 8 if message.is_extended_id else 3
-            name = f"{message.arbitration_id:0{width}X}"
-        data = "R" if message.is_remote_frame else message.data.hex().upper()
-        self._lines.append(f"({message.timestamp:.6f}) {self._channel} {name}#{data}\n")
+        self._lines.append(line_of(message, self._channel))
         if len(self._lines) >= FLUSH_FRAMES:
             self._flush()
 
