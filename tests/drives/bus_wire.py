@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Protocol, final
+from typing import Any, Protocol, final
 
 import can
 
@@ -97,10 +97,10 @@ def drain(ports: Ports, bus: can.BusABC, milliseconds: int = 20) -> list[can.Mes
     return found
 
 
-def message(cob_id: int = 0x123, data: bytes = b"\1\2", **changes: object) -> can.Message:
+def message(cob_id: int = 0x123, data: bytes | None = b"\1\2", **changes: Any) -> can.Message:
     """A data frame with an 11-bit identifier, unless it is changed."""
-    plain: dict[str, object] = {"arbitration_id": cob_id, "data": data, "is_extended_id": False}
-    return can.Message(**{**plain, **changes})  # pyright: ignore[reportArgumentType]
+    plain: dict[str, Any] = {"arbitration_id": cob_id, "data": data, "is_extended_id": False}
+    return can.Message(**{**plain, **changes})
 
 
 def accepted(bus: can.BusABC, frames: Iterator[can.Message]) -> list[can.Message]:

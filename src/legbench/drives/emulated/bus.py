@@ -1,10 +1,12 @@
 """The emulated bus as a python-can interface: `can.Bus(interface="legbench", channel=FILE)`.
 
 Lock-step and threadless: time is virtual and passes only while somebody waits, in `recv` or in
-`NetworkTime.wait_until`. The same calls give the same frames, time stamps included.
+`NetworkTime.wait_until`. The same calls give the same frames, time stamps included. Programs that
+receive in a thread, such as python-can's `Notifier`, may do so; their order is then up to threads.
 """
 
 import math
+import time
 from pathlib import Path
 from typing import final
 
@@ -23,7 +25,9 @@ from legbench.drives.transport.virtual_bus import VirtualBus
 from legbench.errors import ConfigError
 
 IDLE_NS = 1_000_000_000
-"""Longest wait of `recv` without a time-out, as nothing else can happen in lock-step [ns]."""
+"""Time that passes at once while `recv` waits without a time-out [ns]."""
+YIELD_S = 1e-3
+"""Pause of such a wait, in which another thread may send [s]."""
 LOOK_NS = 50_000
 """Time after which a sender who waits for room looks again: the shortest frame at 1 Mbit/s [ns]."""
 
@@ -110,12 +114,13 @@ class LockstepBus(VirtualBus):
         """
         self._check_open()
         frame = frame_of(msg)
-        if timeout and not self.network.takes(self._station):
-            self._wait_for_room(math.ceil(1e9 * timeout))
-        try:
-            self.network.send(self._station, frame)
-        except BusError as error:
-            raise can.CanOperationError(str(error)) from error
+        with self.network.lock:
+            if timeout and not self.network.takes(self._station):
+                self._wait_for_room(math.ceil(1e9 * timeout))
+            try:
+                self.network.send(self._station, frame)
+            except BusError as error:
+                raise can.CanOperationError(str(error)) from error
 
     def _wait_for_room(self, span_ns: int) -> None:
         network, until_ns = self.network, self.network.now_ns + span_ns
@@ -123,10 +128,23 @@ class LockstepBus(VirtualBus):
             network.advance(min(until_ns, network.now_ns + LOOK_NS))
 
     def recv(self, timeout: float | None = None) -> can.Message | None:
-        """The next frame that passes the filters; lets time pass until it comes."""
+        """The next frame that passes the filters; lets time pass until it comes.
+
+        Raises:
+            can.CanOperationError: the bus is shut down.
+        """
+        if timeout is not None:
+            return self._recv_within(math.ceil(1e9 * max(0.0, timeout)))
+        while (message := self._recv_within(IDLE_NS)) is None:
+            time.sleep(YIELD_S)
+        return message
+
+    def _recv_within(self, span_ns: int) -> can.Message | None:
         self._check_open()
-        span_ns = IDLE_NS if timeout is None else math.ceil(1e9 * max(0.0, timeout))
-        until_ns = self.network.now_ns + span_ns
+        with self.network.lock:
+            return self._next_message(self.network.now_ns + span_ns)
+
+    def _next_message(self, until_ns: int) -> can.Message | None:
         received = self._station.received
         while True:
             if not received:
@@ -152,4 +170,5 @@ class LockstepBus(VirtualBus):
         super().shutdown()
         if self._open:
             self._open = False
-            self.network.detach(self._station)
+            with self.network.lock:
+                self.network.detach(self._station)

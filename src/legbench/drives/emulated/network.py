@@ -5,9 +5,11 @@ Nothing here looks at a clock, and the same calls give the same frames to the na
 """
 
 from collections.abc import Callable, Sequence
+from threading import Lock
 from typing import final
 
 from legbench.drives.emulated.drive import EmulatedDrive
+from legbench.drives.emulated.error_frames import BUS_OFF_FRAME, ERROR_FRAME
 from legbench.drives.emulated.faults import Fault, NodeFault
 from legbench.drives.emulated.injector import Injector
 from legbench.drives.emulated.station import Heard, Node, Participant, Station
@@ -21,11 +23,6 @@ Body = Callable[[tuple[float, ...]], tuple[Sequence[float], Sequence[float]]]
 positions [rad] and spring torques [N m] at its end."""
 PASSIVE, BUS_OFF = 128, 256
 """Transmit error counts from which a node is error passive, or off the bus (ISO 11898-1)."""
-
-ERROR_FRAME = Frame(0x88, bytes(8), error=True)
-"""SocketCAN's report of a bus error: protocol violation."""
-BUS_OFF_FRAME = Frame(0x40, bytes(8), error=True)
-"""SocketCAN's report that the own controller has left the bus."""
 
 
 _Pending = tuple[int, int, int, Node, Frame]
@@ -47,6 +44,7 @@ class Network:
         log: every frame that was on the wire with the time of its end, if wanted.
         errors: transmit error counter of every node.
         bitrate: bitrate of the wire and of all drives [bit/s].
+        lock: held by those who call from several threads.
     """
 
     def __init__(
@@ -62,6 +60,7 @@ class Network:
         keep_log: bool = False,
     ) -> None:
         self.now_ns = 0
+        self.lock = Lock()
         self.drives = tuple(drives)
         self.log: list[tuple[int, Frame]] | None = [] if keep_log else None
         self._body = body

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import final
 
 from legbench.closing import Closing
+from legbench.drives.emulated.error_frames import OVERFLOW_FRAME
 from legbench.drives.emulated.network import PASSIVE, Network
 from legbench.drives.emulated.pacer import Pacer
 from legbench.drives.emulated.station import Heard, Station
 from legbench.drives.errors import BusError
-from legbench.drives.protocol.frame import Frame
 from legbench.drives.transport.unix_packet import (
     PACKET,
     Controller,
@@ -25,8 +25,6 @@ from legbench.drives.transport.unix_packet import (
 
 UNREAD = 4096
 """Number of frames that wait for a master who does not read; what comes then is lost to it."""
-OVERFLOW_FRAME = Frame(0x04, b"\0\1" + bytes(6), error=True)
-"""SocketCAN's report that the receive buffer of the own controller has overflowed."""
 
 
 @final
