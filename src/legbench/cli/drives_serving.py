@@ -59,8 +59,9 @@ class Emulate:
         """Serve until ^C or SIGTERM, printing every change of a drive's state."""
         from legbench.commissioning.emulate import Server, serve
         from legbench.control import JumpConfig
+        from legbench.drives.emulated.body import stiff_body
         from legbench.drives.emulated.bus_server import BusServer
-        from legbench.drives.emulated.network import Network, stiff_body
+        from legbench.drives.emulated.network import Network
         from legbench.drives.emulated.slcan_server import SlcanServer
         from legbench.drives.emulated.unix_server import UnixServer
         from legbench.experiment import Experiment, start_of

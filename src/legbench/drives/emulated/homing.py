@@ -4,6 +4,7 @@ from enum import Enum, auto
 from typing import final
 
 from legbench.drives.emulated.motion import Motion
+from legbench.drives.protocol.cia402 import StatusBit
 from legbench.drives.protocol.objects import Key
 
 IN_PLACE = (35, 37)
@@ -24,6 +25,14 @@ class HomingState(Enum):
     FAILED = auto()
 
 
+STATUS = {
+    HomingState.ATTAINED: StatusBit.TARGET_REACHED | StatusBit.FOLLOWS_COMMAND,
+    HomingState.FAILED: StatusBit.TARGET_REACHED | StatusBit.FOLLOWING_ERROR,
+    HomingState.IDLE: StatusBit.TARGET_REACHED,
+}
+"""Bits of the statusword by state; homing in progress has none of them."""
+
+
 @final
 class Homing:
     """Homing run of an emulated motor."""
@@ -33,6 +42,12 @@ class Homing:
         self.state = HomingState.IDLE
         self._asked = False
         self._index = 0.0
+
+    def status(self, *, halted: bool, standing: bool) -> int:
+        """Bits 10, 12 and 13 of the statusword; a halt interrupts homing once the motor stands."""
+        if halted and standing and self.state in (HomingState.SEARCHING, HomingState.LEAVING):
+            return StatusBit.TARGET_REACHED
+        return STATUS.get(self.state, 0)
 
     def command(self, controlword: int) -> None:
         """Start or interrupt homing by bit 4 of a controlword."""
@@ -47,7 +62,7 @@ class Homing:
     def step(self, motion: Motion, step_ns: int) -> None:
         """Run homing for one motion cycle."""
         method = self._values[0x6098, 0]
-        home = self._values[0x607C, 0]
+        home = motion.sign * self._values[0x607C, 0]
         if self.state is HomingState.SEARCHING:
             if method in IN_PLACE:
                 motion.call_it(home)
@@ -56,9 +71,9 @@ class Homing:
                 motion.demand = motion.actual
                 self._at_stop(motion, method, home)
             else:
-                motion.seek(TO_STOP[method] * float(self._values[0x6099, 1]), step_ns)
+                motion.seek(motion.sign * TO_STOP[method] * float(self._values[0x6099, 1]), step_ns)
         elif self.state is HomingState.LEAVING:
-            speed = -TO_STOP[method] * float(self._values[0x6099, 2])
+            speed = -motion.sign * TO_STOP[method] * float(self._values[0x6099, 2])
             motion.seek(speed, step_ns)
             if (motion.demand - self._index) * speed >= 0.0:
                 motion.demand = self._index
@@ -72,5 +87,5 @@ class Homing:
             self.state = HomingState.ATTAINED
             return
         turns = motion.actual // self._per_rev
-        self._index = self._per_rev * (turns if TO_STOP[method] > 0 else turns + 1)
+        self._index = self._per_rev * (turns if motion.sign * TO_STOP[method] > 0 else turns + 1)
         self.state = HomingState.LEAVING if self._values[0x6099, 2] else HomingState.FAILED

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from threading import Lock
 from typing import final
 
+from legbench.drives.emulated.body import Body, stiff_body
 from legbench.drives.emulated.drive import EmulatedDrive
 from legbench.drives.emulated.error_frames import BUS_OFF_FRAME, ERROR_FRAME
 from legbench.drives.emulated.faults import Fault, NodeFault
@@ -18,20 +19,12 @@ from legbench.drives.errors import BusError
 from legbench.drives.protocol.frame import Frame
 from legbench.drives.setup.wire import ERROR_BITS, worst_bits
 
-Body = Callable[[tuple[float, ...]], tuple[Sequence[float], Sequence[float]]]
-"""Function that moves the body for one period, from the motor positions [rad] to the link
-positions [rad] and spring torques [N m] at its end."""
 PASSIVE, BUS_OFF = 128, 256
 """Transmit error counts from which a node is error passive, or off the bus (ISO 11898-1)."""
 
 
 _Pending = tuple[int, int, int, Node, Frame]
 """Frame that waits for the wire: ready at [ns], identifier, sequence number, sender, frame."""
-
-
-def stiff_body(motor_pos: tuple[float, ...]) -> tuple[Sequence[float], Sequence[float]]:
-    """A body without springs: the links are where the motors are."""
-    return motor_pos, (0.0,) * len(motor_pos)
 
 
 @final
@@ -133,6 +126,8 @@ class Network:
         self.errors[node] = 0
         if isinstance(node, Station):
             node.unread = 0
+        elif isinstance(node, EmulatedDrive):
+            node.bus_on(self.now_ns)
 
     def send(self, station: Station, frame: Frame) -> None:
         """Hand a master's frame to its controller.
@@ -295,4 +290,7 @@ class Network:
             if drive.node_id == fault.node_id:
                 self._injector.strike(drive, fault, self.now_ns, begins=begins)
                 if self._injector.cuts_off(fault):
-                    self.errors[drive] = BUS_OFF if begins else 0
+                    if begins:
+                        self.errors[drive] = BUS_OFF
+                    else:
+                        self.recover(drive)

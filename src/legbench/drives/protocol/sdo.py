@@ -43,6 +43,7 @@ class Abort(IntEnum):
     GENERAL = 0x08000000
     LOCAL_CONTROL = 0x08000021
     DEVICE_STATE = 0x08000022
+    NO_DATA = 0x08000024
 
 
 MEANINGS = {
@@ -68,6 +69,7 @@ MEANINGS = {
     Abort.GENERAL: "general error",
     Abort.LOCAL_CONTROL: "data cannot be transferred because of local control",
     Abort.DEVICE_STATE: "data cannot be transferred in the present device state",
+    Abort.NO_DATA: "no data available",
 }
 
 
