@@ -62,6 +62,7 @@ def run(
         (0x6099, 1): speeds.get("fast", FAST),
         (0x6099, 2): speeds.get("slow", SLOW),
         (0x6080, 0): 0,
+        (0x607E, 0): speeds.get("polarity", 0),
     }
     motion = Motion(UNITS, behaviour, values)
     homing = Homing(values, Switches(UNITS, behaviour))
@@ -87,6 +88,19 @@ def test_a_search_ends_at_the_place_of_the_standard(method: int, start: float) -
         assert motion.angle == pytest.approx(at_index(edge, side), abs=1e-5)
     else:
         assert motion.angle == pytest.approx(edge, abs=2 * SLOW * 1e-3 / PER_RAD)
+
+
+MIRROR = {1: 2, 3: 5, 4: 6, 7: 11, 8: 12, 9: 13, 10: 14}
+MIRROR |= {other: method for method, other in MIRROR.items()}
+
+
+@pytest.mark.parametrize("method", EDGES)
+def test_the_polarity_turns_a_search_round(method: int) -> None:
+    home, edge, side = EDGES[MIRROR[method]]
+    homing, motion = run(method, 0.5, home, polarity=0x80)
+    assert homing.state is HomingState.ATTAINED
+    assert motion.actual == -4321
+    assert motion.angle == pytest.approx(at_index(edge, side), abs=1e-5)
 
 
 @pytest.mark.parametrize(("method", "side"), [(33, -1), (34, 1)])

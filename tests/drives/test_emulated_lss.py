@@ -147,7 +147,9 @@ def test_a_new_node_id_moves_every_service_of_the_drive() -> None:
     bench.sent.clear()
     while bench.drive.state is NmtState.BOOT_UP:
         bench.wait(1)
-    assert [frame for _, frame in bench.sent] == [Frame(0x721, b"\0")]
+    assert [frame for _, frame in bench.sent if frame.cob_id > 0x700] == [Frame(0x721, b"\0")]
+    # The end of the connection is a fault by default (6007h), told under the new node id.
+    assert [frame.cob_id for _, frame in bench.sent if frame.cob_id < 0x100] == [0xA1]
     bench.sent.clear()
     for request in (0x601, 0x621):
         bench.give(Frame(request, bytes.fromhex("4014100000000000")))

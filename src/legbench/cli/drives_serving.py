@@ -13,7 +13,7 @@ from legbench.cli.output import note, print_json
 from legbench.errors import ConfigError
 
 if TYPE_CHECKING:
-    from legbench.drives.emulated.network import Body
+    from legbench.drives.emulated.body import Body
     from legbench.drives.setup.config import BusConfig
 
 UNIX, SLCAN = "legbench_unix", "slcan"
@@ -116,7 +116,7 @@ class Emulate:
     def _leg(self, bench: Bench) -> "tuple[tuple[float, ...], Body]":
         """Motor positions at power-on [rad], and what hangs on the shafts."""
         from legbench.control import JumpConfig
-        from legbench.drives.emulated.network import stiff_body
+        from legbench.drives.emulated.body import stiff_body
         from legbench.experiment import Experiment, start_of
         from legbench.plant.emulated_leg import EmulatedLeg
 

@@ -4,9 +4,10 @@ import time
 from collections.abc import Callable
 
 from legbench.drives.emulated.behaviour import Behaviour
+from legbench.drives.emulated.body import Body, stiff_body
 from legbench.drives.emulated.build import emulate, on_bench
 from legbench.drives.emulated.bus_server import BusServer
-from legbench.drives.emulated.network import Body, Network, stiff_body
+from legbench.drives.emulated.network import Network
 from legbench.drives.emulated.slcan_server import SlcanServer
 from legbench.drives.emulated.unix_server import UnixServer
 from legbench.drives.protocol.cia402 import DriveState

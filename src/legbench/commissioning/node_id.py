@@ -65,7 +65,10 @@ def set_node_id(session: Session, node_id: int) -> NodeIdChange:
         # No drive may stay in configuration, whatever happens: it would take the next node id.
         with shielded():
             lss.release()
-    _restart(session, before, node_id, address)
+    # A reset of the node loses what is not stored, but leaves no fault of a lost connection behind.
+    kept = stored is LssError.NONE
+    order = NmtCommand.RESET_NODE if kept else NmtCommand.RESET_COMMUNICATION
+    _restart(session, before, node_id, address, order)
     if stored is LssError.STORE_FAILED:
         raise DriveError(
             f"node {node_id} could not store its node id (LSS error 2); it is back after the next "
@@ -79,7 +82,7 @@ def set_node_id(session: Session, node_id: int) -> NodeIdChange:
         product=product,
         revision=revision,
         serial=serial,
-        stored=stored is LssError.NONE,
+        stored=kept,
     )
 
 
@@ -143,14 +146,16 @@ def _refuse_powered(session: Session, node_id: int) -> None:
         )
 
 
-def _restart(session: Session, before: int | None, node_id: int, address: LssAddress) -> None:
-    """Reset communication so that the new node id is in use; raises DriveError if it is not.
+def _restart(
+    session: Session, before: int | None, node_id: int, address: LssAddress, order: NmtCommand
+) -> None:
+    """Reset the drive so that the new node id is in use; raises DriveError if it is not.
 
     A drive without node id boots by itself once it has one (CiA 305).
     """
     port = session.port()
     if before is not None:
-        port.send_frame(nmt_frame(NmtCommand.RESET_COMMUNICATION, before))
+        port.send_frame(nmt_frame(order, before))
     until_ns = port.timebase.now_ns() + BOOT_NS
     while (message := port.receive(until_ns)) is not None:
         if message.arbitration_id == HEARTBEAT_BASE + node_id:

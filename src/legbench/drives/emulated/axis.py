@@ -5,10 +5,10 @@ from typing import final
 
 from legbench.drives.emulated.alarms import Alarms
 from legbench.drives.emulated.behaviour import Behaviour
-from legbench.drives.emulated.homing import Homing, HomingState
+from legbench.drives.emulated.homing import Homing
 from legbench.drives.emulated.homing_methods import METHODS
 from legbench.drives.emulated.motion import Motion
-from legbench.drives.emulated.power import HALT, PowerStage
+from legbench.drives.emulated.power import HALT, POWERED, PowerStage
 from legbench.drives.emulated.sensors import Sensors
 from legbench.drives.emulated.switches import Switches
 from legbench.drives.protocol.cia402 import DriveState, Mode, StatusBit
@@ -19,6 +19,7 @@ from legbench.drives.setup.config import NodeConfig
 from legbench.drives.setup.units import wrap
 
 MODES = (Mode.NONE, Mode.HOMING, Mode.CYCLIC_SYNCHRONOUS_POSITION)
+POLARITY = (0x607E, 0)
 FOLLOWING_ERROR, SETPOINTS_MISSING, SYNC_MISSING = 0x8611, 0xFF10, 0xFF11
 HOMED = 1 << 15
 """Bit 15 of the statusword, the maker's own: the position refers to a home since power-on."""
@@ -58,6 +59,10 @@ class Axis:
         self._out: list[Frame] = []
         self.publish()
 
+    def address(self, node_id: int) -> None:
+        """Report under another node id from now on."""
+        self.node_id = self.alarms.node_id = node_id
+
     def boot(self, now_ns: int) -> None:
         """Leave the self-test; a mode of operation that was stored is entered (6060h)."""
         self.power.boot()
@@ -90,6 +95,9 @@ class Axis:
                 return Abort.DEVICE_STATE
         if key == (0x6098, 0) and value not in METHODS:
             return Abort.INVALID_VALUE
+        if key == POLARITY and value != self._values[key] and self.power.state in POWERED:
+            # The target would be another one, all at once.
+            return Abort.DEVICE_STATE
         return None
 
     def written(self, key: Key, now_ns: int) -> None:
@@ -129,7 +137,7 @@ class Axis:
         if target is not None:
             # The object wraps; the motor takes the short way round.
             near = round(self.motion.demand)
-            target = near + wrap(target - near)
+            target = near + wrap(self.motion.sign * target - near)
         self.motion.latch(target, now_ns)
         if self.motion.missing > self._behaviour.missing_limit:
             self.fault(SETPOINTS_MISSING)
@@ -146,7 +154,8 @@ class Axis:
         self.sensors.tick(step_ns)
         before = self.motion.actual
         self._move(now_ns, step_ns)
-        self._values[0x606C, 0] = round((self.motion.actual - before) * 1e9 / step_ns)
+        turned = -1 if self._values[POLARITY] & 0x40 else 1
+        self._values[0x606C, 0] = turned * round((self.motion.actual - before) * 1e9 / step_ns)
         return self.motion.angle
 
     def _move(self, now_ns: int, step_ns: int) -> None:
@@ -186,13 +195,14 @@ class Axis:
         values, motion = self._values, self.motion
         actual = self.sensors.motor.show(round(motion.actual))
         link = self.sensors.link.show(self._link_counts)
-        values[0x6064, 0] = wrap(actual)
-        values[0x6062, 0] = wrap(round(motion.demand))
-        values[0x60F4, 0] = wrap(round(motion.demand) - actual)
+        sign = motion.sign
+        values[0x6064, 0] = wrap(sign * actual)
+        values[0x6062, 0] = wrap(sign * round(motion.demand))
+        values[0x60F4, 0] = wrap(sign * (round(motion.demand) - actual))
         values[0x60E4, 1] = wrap(link)
         values[LINK_SHORT, 0] = wrap(link, 16)
         if self._switches.present:
-            values[0x60FD, 0] = self._switches.inputs(motion.travel)
+            values[0x60FD, 0] = self._switches.inputs(motion.travel, sign)
         values[0x6077, 0] = min(max(self._torque, -32768), 32767)
         self._status()
 
@@ -212,11 +222,8 @@ class Axis:
             if self._values[0x603F, 0] == FOLLOWING_ERROR:
                 word |= StatusBit.FOLLOWING_ERROR
         elif mode == Mode.HOMING:
-            word |= {
-                HomingState.ATTAINED: StatusBit.TARGET_REACHED | StatusBit.FOLLOWS_COMMAND,
-                HomingState.FAILED: StatusBit.TARGET_REACHED | StatusBit.FOLLOWING_ERROR,
-                HomingState.IDLE: StatusBit.TARGET_REACHED,
-            }.get(self._homing.state, 0)
+            halted = bool(self._values[0x6040, 0] & HALT)
+            word |= self._homing.status(halted=halted, standing=self.motion.speed == 0.0)
         self._show(int(word))
 
     def _show(self, word: int) -> None:

@@ -5,9 +5,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from legbench.drives.emulated.behaviour import Behaviour
+from legbench.drives.emulated.body import Body, stiff_body
 from legbench.drives.emulated.drive import EmulatedDrive
 from legbench.drives.emulated.faults import Fault
-from legbench.drives.emulated.network import Body, Network, stiff_body
+from legbench.drives.emulated.network import Network
 from legbench.drives.emulated.stuffing import Stuffing
 from legbench.drives.setup.config import BusConfig, NodeConfig
 from legbench.drives.setup.configuration import configuration

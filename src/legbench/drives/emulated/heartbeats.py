@@ -1,42 +1,11 @@
-"""Heartbeat of an emulated drive, and those that it watches (CiA 301, 1017h and 1016h)."""
+"""Heartbeats that an emulated drive watches, and its own (CiA 301, 1016h and 1017h)."""
 
 from collections.abc import Iterator, Mapping
 from typing import final
 
-from legbench.drives.protocol.frame import Frame
-from legbench.drives.protocol.nmt import (
-    HeartbeatWatch,
-    NmtState,
-    decode_heartbeat,
-    heartbeat_frame,
-)
+from legbench.drives.emulated.rules import watched
+from legbench.drives.protocol.nmt import HeartbeatWatch, decode_heartbeat
 from legbench.drives.protocol.objects import Key
-
-
-@final
-class HeartbeatProducer:
-    """Heartbeat of an emulated drive (CiA 301, object 1017h).
-
-    Attributes:
-        mute: no heartbeat is sent, while everything else goes on.
-    """
-
-    def __init__(self, values: Mapping[Key, int]) -> None:
-        self._values = values
-        self._last_ns = 0
-        self.mute = False
-
-    def begin(self, now_ns: int) -> None:
-        """Begin a period, as the boot-up message does."""
-        self._last_ns = now_ns
-
-    def due(self, node_id: int, state: NmtState, now_ns: int) -> Frame | None:
-        """Return the heartbeat of a node where its period has passed."""
-        period_ns = 1_000_000 * self._values[0x1017, 0]
-        if not period_ns or now_ns - self._last_ns < period_ns:
-            return None
-        self._last_ns = now_ns
-        return None if self.mute else heartbeat_frame(node_id, state)
 
 
 @final
@@ -72,6 +41,27 @@ class HeartbeatConsumer:
     def _consumed(self) -> Iterator[tuple[int, int]]:
         """Yield the node and time-out [ns] of every heartbeat to watch (1016h)."""
         for sub in (1, 2):
-            word = self._values[0x1016, sub]
-            if word >> 16 & 0x7F and word & 0xFFFF:
-                yield word >> 16 & 0x7F, 1_000_000 * (word & 0xFFFF)
+            asked = watched(self._values[0x1016, sub])
+            if asked is not None:
+                yield asked[0], 1_000_000 * asked[1]
+
+
+@final
+class HeartbeatProducer:
+    """Grid of the heartbeats that a drive produces (1017h).
+
+    Attributes:
+        since_ns: time of the last one, or of the boot-up message [ns].
+        mute: whether none is sent, while their time goes on.
+    """
+
+    def __init__(self) -> None:
+        self.since_ns = 0
+        self.mute = False
+
+    def due(self, period_ns: int, now_ns: int) -> bool:
+        """Whether a heartbeat is to be sent now; none is with a period of 0."""
+        if not period_ns or now_ns - self.since_ns < period_ns:
+            return False
+        self.since_ns = now_ns
+        return not self.mute

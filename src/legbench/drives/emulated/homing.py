@@ -5,14 +5,17 @@ from dataclasses import replace
 from enum import Enum, auto
 from typing import final
 
-from legbench.drives.emulated.homing_methods import METHODS, Move, Until
+from legbench.drives.emulated.homing_methods import METHODS, Move, Until, mirrored
 from legbench.drives.emulated.motion import SECOND_NS, Motion
 from legbench.drives.emulated.switches import Switches
+from legbench.drives.protocol.cia402 import StatusBit
 from legbench.drives.protocol.objects import Key
 
 START = 1 << 4
 """Bit 4 of 6040h; homing starts at its rising edge and is interrupted by its end."""
 
+POSITION_POLARITY = 1 << 7
+"""Bit 7 of 607Eh, which turns the sign of positions."""
 AT_INDEX = 1e-3
 """Distance from an index pulse at which the motor stands on it [counts]."""
 
@@ -24,6 +27,14 @@ class HomingState(Enum):
     SEARCHING = auto()
     ATTAINED = auto()
     FAILED = auto()
+
+
+STATUS = {
+    HomingState.ATTAINED: StatusBit.TARGET_REACHED | StatusBit.FOLLOWS_COMMAND,
+    HomingState.FAILED: StatusBit.TARGET_REACHED | StatusBit.FOLLOWING_ERROR,
+    HomingState.IDLE: StatusBit.TARGET_REACHED,
+}
+"""Bits of the statusword by state; homing in progress has none of them."""
 
 
 @final
@@ -43,13 +54,22 @@ class Homing:
         self._moves: list[Move] = []
         self._index: float | None = None
 
+    def status(self, *, halted: bool, standing: bool) -> int:
+        """Bits 10, 12 and 13 of the statusword; a halt interrupts homing once the motor stands."""
+        if halted and standing and self.state is HomingState.SEARCHING:
+            return StatusBit.TARGET_REACHED
+        return STATUS.get(self.state, 0)
+
     def command(self, controlword: int) -> None:
         """Start or interrupt homing by bit 4 of a controlword."""
         asked = bool(controlword & START)
         if asked and not self._asked:
             moves = METHODS.get(self._values[0x6098, 0])
             self.state = HomingState.FAILED if moves is None else HomingState.SEARCHING
-            self._moves, self._index = list(moves or ()), None
+            # The polarity turns the axis round, and its limit switches with it.
+            turned = self._values[0x607E, 0] & POSITION_POLARITY
+            self._moves = list(mirrored(moves or ()) if turned else moves or ())
+            self._index = None
             self.done = False
         elif not asked and self.state is HomingState.SEARCHING:
             self.state = HomingState.IDLE
@@ -63,7 +83,7 @@ class Homing:
             self._moves.pop(0)
             self._index = None
         if not self._moves:
-            motion.call_it(self._values[0x607C, 0])
+            motion.call_it(motion.sign * self._values[0x607C, 0])
             self.state, self.done = HomingState.ATTAINED, True
             return
         move = self._moves[0]

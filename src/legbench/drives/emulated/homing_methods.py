@@ -34,7 +34,7 @@ class Move:
     """Whether a limit switch on the way turns the search round, once."""
 
 
-def _mirrored(moves: tuple[Move, ...]) -> tuple[Move, ...]:
+def mirrored(moves: tuple[Move, ...]) -> tuple[Move, ...]:
     """Moves of the method that searches the other way."""
     other = {
         Until.NEGATIVE_LIMIT: Until.POSITIVE_LIMIT,
@@ -75,7 +75,7 @@ def _indexed() -> Mapping[int, tuple[Move, ...]]:
         10: (_FIND_OR_TURN, _OFF_UP, _INDEX_UP),
     }
     mirror = {1: 2, 3: 5, 4: 6, 7: 11, 8: 12, 9: 13, 10: 14}
-    return upwards | {mirror[method]: _mirrored(moves) for method, moves in upwards.items()}
+    return upwards | {mirror[method]: mirrored(moves) for method, moves in upwards.items()}
 
 
 METHODS: Mapping[int, tuple[Move, ...]] = {
@@ -86,8 +86,8 @@ METHODS: Mapping[int, tuple[Move, ...]] = {
     35: (),
     37: (),
     -1: (*_HARD_STOP, _INDEX_UP),
-    -2: _mirrored((*_HARD_STOP, _INDEX_UP)),
+    -2: mirrored((*_HARD_STOP, _INDEX_UP)),
     -3: _HARD_STOP,
-    -4: _mirrored(_HARD_STOP),
+    -4: mirrored(_HARD_STOP),
 }
 """Method (6098h) -> its moves; -1 to -4 are the maker's own, against a mechanical stop."""

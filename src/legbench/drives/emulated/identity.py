@@ -2,14 +2,9 @@
 
 from collections.abc import MutableMapping
 
-from legbench.drives.protocol.lss import LssAddress
+from legbench.drives.emulated.lss import lss_address
 from legbench.drives.protocol.objects import Key
 from legbench.drives.setup.config import Identity
-
-
-def lss_address(identity: Identity) -> LssAddress:
-    """LSS address of a drive: the four words of its identity object (CiA 305, 4.1)."""
-    return (identity.vendor, identity.product, identity.revision or 0, identity.serial or 0)
 
 
 def write_identity(values: MutableMapping[Key, int], identity: Identity, node_id: int) -> None:

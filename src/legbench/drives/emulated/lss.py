@@ -20,6 +20,12 @@ from legbench.drives.protocol.lss import (
     LssMode,
     lss_frame,
 )
+from legbench.drives.setup.config import Identity
+
+
+def lss_address(identity: Identity) -> LssAddress:
+    """LSS address of a drive: the four words of its identity object (CiA 305, 4.1)."""
+    return (identity.vendor, identity.product, identity.revision or 0, identity.serial or 0)
 
 
 @final

@@ -1,6 +1,6 @@
 """Memory of an emulated drive, in which parameters outlast its power (CiA 301, 1010h and 1011h)."""
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from typing import final
 
 from legbench.drives.emulated.identity import write_identity
@@ -20,6 +20,9 @@ from legbench.drives.setup.parameters import Parameter
 NEVER = (0x1003, STORE, RESTORE, 0x6040, 0x6071, 0x607A)
 """Objects that are no parameters: history, signatures, controlword and targets."""
 
+ALL = range(0x10000)
+"""Indices of all objects."""
+
 
 @final
 class Memory:
@@ -33,13 +36,14 @@ class Memory:
         self._defaults: dict[Key, int] = {}
         self._kept: dict[Key, int] = {entry.key: entry.value for entry in kept}
 
-    def recall(self, node_id: int) -> None:
-        """Set every object to its default for a node id, then to what is kept, as at power-on."""
+    def recall(self, node_id: int, indices: Container[int] = ALL) -> None:
+        """Set objects to their defaults for a node id, then to what is kept, as at power-on."""
         values = self._store.values
-        self._store.load_defaults()
+        self._store.load_defaults(indices)
         write_identity(values, self._identity, node_id)
-        self._defaults = dict(values)
-        values |= {key: value for key, value in self._kept.items() if key in values}
+        among = [key for key in values if key[0] in indices]
+        self._defaults |= {key: values[key] for key in among}
+        values |= {key: self._kept[key] for key in among if key in self._kept}
 
     @staticmethod
     def owns(key: Key) -> bool:

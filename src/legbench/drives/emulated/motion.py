@@ -55,6 +55,11 @@ class Motion:
         return self.actual - self._true_zero
 
     @property
+    def sign(self) -> int:
+        """Sign between positions of the object dictionary and of the motor: bit 7 of 607Eh."""
+        return -1 if self._values[0x607E, 0] & 0x80 else 1
+
+    @property
     def span_ns(self) -> int:
         """Interpolation time 60C2h [ns]."""
         value, exponent = self._values[0x60C2, 1], self._values[0x60C2, 2]
@@ -81,6 +86,8 @@ class Motion:
 
     def _limit(self, goal: float) -> float:
         low, high = self._values[0x607D, 1], self._values[0x607D, 2]
+        if self.sign < 0:
+            low, high = -high, -low
         if low >= high:
             self.limited = False
             return goal

@@ -37,9 +37,15 @@ class Switches:
             return travel >= self._limits[1]
         return self._home is not None and self._home[0] <= travel <= self._home[1]
 
-    def inputs(self, travel: float) -> int:
-        """Bits 0 to 2 of the digital inputs (60FDh): negative limit, positive limit, home."""
-        switches = (Until.NEGATIVE_LIMIT, Until.POSITIVE_LIMIT, Until.HOME)
+    def inputs(self, travel: float, sign: int = 1) -> int:
+        """Bits 0 to 2 of the digital inputs (60FDh): negative limit, positive limit, home.
+
+        Args:
+            travel: place of the motor [counts].
+            sign: -1 where the polarity (607Eh) turns the axis round, and its limits with it.
+        """
+        ends = (Until.NEGATIVE_LIMIT, Until.POSITIVE_LIMIT)[::sign]
+        switches = (*ends, Until.HOME)
         return sum(self.active(switch, travel) << place for place, switch in enumerate(switches))
 
     def next_index(self, travel: float, direction: int) -> float:

@@ -44,6 +44,7 @@ class Abort(IntEnum):
     NOT_TRANSFERRED = 0x08000020
     LOCAL_CONTROL = 0x08000021
     DEVICE_STATE = 0x08000022
+    NO_DATA = 0x08000024
 
 
 MEANINGS = {
@@ -70,6 +71,7 @@ MEANINGS = {
     Abort.NOT_TRANSFERRED: "data cannot be transferred or stored to the application",
     Abort.LOCAL_CONTROL: "data cannot be transferred because of local control",
     Abort.DEVICE_STATE: "data cannot be transferred in the present device state",
+    Abort.NO_DATA: "no data available",
 }
 
 
