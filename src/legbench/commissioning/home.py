@@ -114,12 +114,17 @@ def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20
     up.lookout.rest()
     sdo.put(0x6060, 0, I8, Mode.CYCLIC_SYNCHRONOUS_POSITION)
     after = sdo.get_int(0x6064, 0, I32)
+    _check_shown(up, node)
+    return Homed(node=node.name, method=method, before_counts=before, after_counts=after)
+
+
+def _check_shown(up: BringUp, node: NodeConfig) -> None:
+    """Check that a drive shows its homing as the bus file says; raises DriveError."""
     if is_homed(up, node) is False:
         raise DriveError(
             f"drive '{node.name}' has homed, and does not show it ({node.homed}): correct its "
             "'homed' in the bus file, by which nothing begins otherwise"
         )
-    return Homed(node=node.name, method=method, before_counts=before, after_counts=after)
 
 
 def _check_asked(node: NodeConfig, method: int, timeout: float) -> None:
