@@ -12,6 +12,8 @@ from legbench.drives.setup.configuration import configuration
 MANDATORY = (0x1000, 0x1001, 0x1018)
 MANUFACTURER = range(0x2000, 0x6000)
 VAR, ARRAY, RECORD = 0x7, 0x8, 0x9
+FIXED = (Access.RO, Access.CONST)
+"""Access to what cannot be written, and is therefore no parameter."""
 ARRAYS = (0x1003, 0x1016, 0x1029, 0x607D, 0x6099, 0x60E4)
 BAUD_RATES = (10, 20, 50, 125, 250, 500, 800, 1000)
 """Bitrates that an EDS names [kbit/s]."""
@@ -19,17 +21,15 @@ BAUD_RATES = (10, 20, 50, 125, 250, 500, 800, 1000)
 
 def eds_text() -> str:
     """The data sheet of the drives that are emulated here."""
-    return _text("legbench-drive.eds", {}, None)
+    return _text("legbench-drive.eds", {}, None, (0, 0, 0))
 
 
 def dcf_text(bus: BusConfig, node: NodeConfig) -> str:
     """The data sheet with what `node` is and is told: parameter values and node id."""
-    values: dict[Key, int] = {
-        (0x1018, 1): node.identity.vendor,
-        (0x1018, 2): node.identity.product,
-        (0x1018, 3): node.identity.revision or 0,
-        (0x1018, 4): node.identity.serial or 0,
-    }
+    identity = node.identity
+    device = (identity.vendor, identity.product, identity.revision or 0)
+    numbers = (*device, identity.serial or 0)
+    values: dict[Key, int] = {(0x1018, sub): each for sub, each in enumerate(numbers, start=1)}
     values |= {parameter.key: parameter.value for parameter in configuration(bus, node)}
     commissioning = {
         "NodeID": str(node.node_id),
@@ -38,13 +38,18 @@ def dcf_text(bus: BusConfig, node: NodeConfig) -> str:
         "NetNumber": "0",
         "NetworkName": "legbench",
         "CANopenManager": "0",
-        "LSS_SerialNumber": str(node.identity.serial or 0),
+        "LSS_SerialNumber": str(identity.serial or 0),
     }
-    return _text(f"{node.name}.dcf", values, commissioning)
+    return _text(f"{node.name}.dcf", values, commissioning, device)
 
 
-def _text(name: str, values: Mapping[Key, int], commissioning: Mapping[str, str] | None) -> str:
-    sections = [*_head(name)]
+def _text(
+    name: str,
+    values: Mapping[Key, int],
+    commissioning: Mapping[str, str] | None,
+    device: tuple[int, int, int],
+) -> str:
+    sections = [*_head(name, device)]
     if commissioning is not None:
         # The spelling is that of CiA 306.
         sections.append(_section("DeviceComissioning", commissioning))
@@ -61,7 +66,9 @@ def _text(name: str, values: Mapping[Key, int], commissioning: Mapping[str, str]
     return "\n".join(sections)
 
 
-def _head(name: str) -> Iterator[str]:
+def _head(name: str, device: tuple[int, int, int]) -> Iterator[str]:
+    """Yield the head of a sheet for the device with a vendor, product and revision number."""
+    vendor, product, revision = (f"0x{number:X}" for number in device)
     yield _section(
         "FileInfo",
         {
@@ -78,10 +85,10 @@ def _head(name: str) -> Iterator[str]:
         "DeviceInfo",
         {
             "VendorName": "legbench",
-            "VendorNumber": "0",
+            "VendorNumber": vendor,
             "ProductName": "legbench-drive",
-            "ProductNumber": "0",
-            "RevisionNumber": "0",
+            "ProductNumber": product,
+            "RevisionNumber": revision,
             "OrderCode": "none",
             **rates,
             "SimpleBootUpMaster": "0",
@@ -118,15 +125,18 @@ def _entry(entry: ObjectEntry, kind: int, values: Mapping[Key, int]) -> dict[str
         "ObjectType": f"0x{kind:X}",
         "DataType": f"0x{entry.kind:04X}",
         "AccessType": entry.access.value,
-        "DefaultValue": _default(entry),
+        "DefaultValue": _default(entry, values),
         "PDOMapping": str(int(entry.mappable)),
     }
-    if entry.key in values and entry.access is not Access.RO:
+    if entry.key in values and entry.access not in FIXED:
         lines["ParameterValue"] = _number(entry, values[entry.key])
     return lines
 
 
-def _default(entry: ObjectEntry) -> str:
+def _default(entry: ObjectEntry, values: Mapping[Key, int]) -> str:
+    """The value at power-on; what is const has the value of this very drive."""
+    if entry.access is Access.CONST and entry.key in values:
+        return _number(entry, values[entry.key])
     if isinstance(entry.default, int):
         if entry.key == (0x1014, 0):
             return "$NODEID+0x80"
