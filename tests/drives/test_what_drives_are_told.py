@@ -287,6 +287,13 @@ def test_a_configured_sheet_holds_the_node_and_what_it_is_told() -> None:
     assert (commissioning["Baudrate"], commissioning["LSS_SerialNumber"]) == ("500", "101")
     identity = [found[f"1018sub{sub}"]["DefaultValue"] for sub in (1, 2, 3, 4)]
     assert identity == ["0x1234", "0x7", "0x9", "0x65"]
+    device = found["DeviceInfo"]
+    numbers = [device[f"{what}Number"] for what in ("Vendor", "Product", "Revision")]
+    assert numbers == ["0x1234", "0x7", "0x9"]
+    # What cannot be written is no parameter.
+    const = [name for name, entry in found.items() if entry.get("AccessType") == "const"]
+    assert len(const) > 10
+    assert not any("ParameterValue" in found[name] for name in const)
     last = {key: (kind, value) for key, kind, value in told(bus, chosen)}
     for key, (kind, value) in last.items():
         index, sub = key.split(":")
