@@ -1,4 +1,4 @@
-"""What a `RunWriter` hands its rows to."""
+"""The destination of a `RunWriter`'s rows."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from legbench.recording.rows import BATCH_ROWS, Block
 
 MAX_WAITING = 60_000 // BATCH_ROWS
-"""Blocks that may wait for the disk: 60 s at 1 kHz, 14 MB."""
+"""Largest number of blocks that may wait for the disk: 60 s at 1 kHz, 14 MB."""
 
 
 @dataclass(slots=True)
@@ -25,7 +25,7 @@ class Kept:
 
 
 class AbstractDisk(ABC):
-    """Takes blocks and events of one run, and writes them beside the control loop.
+    """Destination of the blocks and events of one run.
 
     Attributes:
         kept: what has been written.
@@ -36,15 +36,15 @@ class AbstractDisk(ABC):
     @property
     @abstractmethod
     def lagging(self) -> bool:
-        """Whether more rows wait than a run may have in memory, or nobody writes any more."""
+        """Whether more rows wait than a run may have in memory."""
 
     @abstractmethod
-    def swap(self, block: Block) -> Block:
-        """Take a block to write and give an empty one; never waits."""
+    def take(self, block: Block) -> None:
+        """Take the rows of a block and empty it; raises nothing, an error is in `kept`."""
 
     @abstractmethod
     def event(self, line: bytes) -> None:
-        """Take one whole line for the events; never waits."""
+        """Take one whole line for the events; raises nothing, an error is in `kept`."""
 
     @abstractmethod
     def finish(self) -> None:

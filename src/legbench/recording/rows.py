@@ -77,7 +77,7 @@ ONE_LEG_ROWS: Final = RowLayout(ONE_LEG)
 
 @final
 class Block:
-    """Fifty rows that the loop fills and the disk thread empties.
+    """Fifty rows that the loop fills and the disk empties.
 
     Attributes:
         values: the rows (BATCH_ROWS, size), laid out as its `RowLayout` says.
