@@ -191,17 +191,13 @@ def _angle(solution: "Solution") -> float:
 
 def _write(chosen: DesignArguments, solution: "Solution", trace: "Trace") -> None:
     """Write what was asked for."""
-    try:
-        if chosen.out is not None:
-            chosen.out.parent.mkdir(parents=True, exist_ok=True)
-            save_design(solution.design, chosen.out)
-            note(f"wrote {chosen.out}")
-        if chosen.drawing is not None:
-            _draw(chosen.drawing, solution)
-        if chosen.plot is not None:
-            _plot(chosen.plot, solution, trace)
-    except OSError as error:
-        raise ConfigError(f"cannot write {error.filename}: {error.strerror}") from None
+    if chosen.out is not None:
+        save_design(solution.design, chosen.out)
+        note(f"wrote {chosen.out}")
+    if chosen.drawing is not None:
+        _draw(chosen.drawing, solution)
+    if chosen.plot is not None:
+        _plot(chosen.plot, solution, trace)
 
 
 def _draw(path: Path, solution: "Solution") -> None:

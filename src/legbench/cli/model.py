@@ -9,7 +9,7 @@ from legbench.design import load_design
 from legbench.design.setup import Setup, SetupKind
 from legbench.errors import RecordingError
 from legbench.mjcf import BuildOptions, Linkage, LinkageKind, build_spec, to_xml, xml_hash
-from legbench.recording.files import write_whole
+from legbench.writing import reason, write_whole
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,4 +62,4 @@ def _write(path: Path, xml: str) -> None:
         else:
             path.write_text(xml, encoding="utf-8")
     except OSError as error:
-        raise RecordingError(f"cannot write {path}: {error.strerror}") from None
+        raise RecordingError(f"cannot write {path}: {reason(error)}") from None

@@ -8,7 +8,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from legbench.errors import ConfigError
 from legbench.strict_json import null_for_nan
 
 
@@ -41,14 +40,9 @@ def write_json(path: Path, content: Mapping[str, Any]) -> None:
     """
     import json
 
-    from legbench.recording.files import write_whole
+    from legbench.writing import save_whole
 
-    text = json.dumps(null_for_nan(content), indent=1, allow_nan=False)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(path, f"{text}\n".encode())
-    except OSError as error:
-        raise ConfigError(f"{path.parent} cannot be written: {error}") from error
+    save_whole(path, json.dumps(null_for_nan(content), indent=1, allow_nan=False) + "\n")
 
 
 def progress(done: int, total: int) -> None:

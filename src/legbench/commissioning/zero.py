@@ -12,7 +12,7 @@ from legbench.drives.master.session import Session
 from legbench.drives.setup.config import NodeConfig
 from legbench.drives.setup.units import AxisUnits, wrap
 from legbench.errors import ConfigError, RecordingError
-from legbench.recording.files import write_whole
+from legbench.writing import reason, write_whole
 
 READS = 5
 """Number of reads of every encoder, which have to agree."""
@@ -98,5 +98,5 @@ def write(path: Path, zeros: Sequence[Zero], out: Path | None = None) -> Path:
             )
         write_whole(out, "".join(lines).encode())
     except OSError as error:
-        raise RecordingError(f"cannot write offsets to {out}: {error.strerror}") from None
+        raise RecordingError(f"cannot write offsets to {out}: {reason(error)}") from None
     return out

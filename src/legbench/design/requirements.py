@@ -12,6 +12,7 @@ from legbench.design.leg import Limits
 from legbench.design.toml import UNITS, Table, load_tables, tables_to_toml, units_per_si
 from legbench.errors import DesignError
 from legbench.signals import Floats
+from legbench.writing import save_whole
 
 REQUIREMENT_UNITS: dict[str, dict[str, float]] = {
     "mass": UNITS["mass"],
@@ -264,5 +265,9 @@ def load_requirements(path: Path) -> Requirements:
 
 
 def save_requirements(requirements: Requirements, path: Path) -> None:
-    """Write a requirements file in SI units; `load_requirements` gives the same back."""
-    path.write_text(tables_to_toml(requirements_to_mapping(requirements)), encoding="utf-8")
+    """Write a requirements file in SI units; `load_requirements` gives the same back.
+
+    Raises:
+        ConfigError: it cannot be written; an older file is untouched.
+    """
+    save_whole(path, tables_to_toml(requirements_to_mapping(requirements)))

@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 from legbench.design.leg import LegDesign, Limits, Segment
 from legbench.errors import DesignError
 from legbench.reading import UnreadableError, read_toml
+from legbench.writing import save_whole
 
 Built = TypeVar("Built")
 
@@ -195,8 +196,12 @@ def design_to_mapping(design: LegDesign) -> dict[str, Any]:
 
 
 def save_design(design: LegDesign, path: Path | str) -> None:
-    """Write a design file in SI units; `load_design` gives the same design back, bit for bit."""
-    Path(path).write_text(tables_to_toml(design_to_mapping(design)), encoding="utf-8")
+    """Write a design file in SI units; `load_design` gives the same design back, bit for bit.
+
+    Raises:
+        ConfigError: it cannot be written; an older file is untouched.
+    """
+    save_whole(Path(path), tables_to_toml(design_to_mapping(design)))
 
 
 def tables_to_toml(tables: Mapping[str, Any]) -> str:

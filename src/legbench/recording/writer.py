@@ -16,7 +16,7 @@ from legbench.recording.archive import write_archive
 from legbench.recording.description import layout_of
 from legbench.recording.disk import Disk
 from legbench.recording.events import encode_event
-from legbench.recording.files import append_to, lock, reason
+from legbench.recording.files import append_to, lock
 from legbench.recording.layout import (
     CLOSING,
     COMPLETE,
@@ -31,6 +31,7 @@ from legbench.recording.process_disk import ProcessDisk
 from legbench.recording.rows import BATCH_ROWS, Block, RowLayout
 from legbench.recording.stream import WholeBatches, schema_for
 from legbench.signals import Command, Observation
+from legbench.writing import reason
 
 
 @final

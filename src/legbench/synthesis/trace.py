@@ -14,8 +14,8 @@ import numpy as np
 
 from legbench.errors import ConfigError
 from legbench.reading import UnreadableError, parse_json
-from legbench.recording.files import write_whole
 from legbench.signals import Floats, Ints
+from legbench.writing import write_whole
 
 LINE = {"points", "costs"}
 """Keys of a generation's line."""
