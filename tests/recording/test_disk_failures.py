@@ -2,7 +2,6 @@ import fcntl
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -49,19 +48,6 @@ def test_a_file_that_may_not_grow(tmp_path: Path, kind: str) -> None:
     assert (manifest["status"], manifest["cause"]) == ("fault", "recording")
     assert manifest["recording_error"] == "File too large [EFBIG]"
     assert manifest["rows_lost"] == int(appended) - manifest["rows"]
-
-
-@pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Path]:
-    mount = ["mount", "-t", "tmpfs", "-o", "size=256k", "tmpfs", str(tmp_path)]
-    try:
-        refused = subprocess.run(mount, capture_output=True, check=False).returncode
-    except FileNotFoundError:
-        refused = 1
-    if refused:
-        pytest.skip("only root can mount a small disk")
-    yield tmp_path
-    subprocess.run(["umount", str(tmp_path)], check=True)
 
 
 def test_a_full_disk(small_disk: Path, capfd: pytest.CaptureFixture[str]) -> None:

@@ -16,6 +16,7 @@ from legbench.control import JumpConfig
 from legbench.design import LegDesign, load_design
 from legbench.design.statics import Support
 from legbench.errors import ConfigError
+from legbench.kinematics import half_angle
 from legbench.modes.basin import Axis, Fate, Question, map_basin
 from legbench.modes.drive import JumpLaw, Passive
 from legbench.modes.fixed_point import FixedPoint, fixed_point
@@ -156,7 +157,7 @@ def _passive(flags: HopArguments, design: LegDesign) -> dict[str, Any]:
     from legbench.design.setup import SetupKind
 
     scene = make_scene(design, SetupKind.JUMP, flags.rest)
-    half = 0.5 * (scene.motor[1] - scene.motor[0])
+    half = float(half_angle(np.array(scene.motor)))
     leg = TaylorLeg(LegModel.of(design, undamped=True), probe=Passive.probe)
     hops = []
     for depth in depths(leg, half, np.linspace(scene.rest[1], 0.5 * design.limits.knee[1], 150)):

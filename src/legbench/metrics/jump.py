@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from legbench.kinematics import joint_to_polar
+from legbench.kinematics import joint_to_polar, polar_angle
 from legbench.metrics.phases import Gait
 from legbench.metrics.source import Recorded
 from legbench.signals import Floats
@@ -102,7 +102,7 @@ def _limit_cycle(recording: Recorded, gait: Gait, first: int) -> dict[str, float
         "hop_freq": 1.0 / period if period > 0.0 else np.nan,
         "flight_time": _mean(gait.flight.duration[jumps.flight[first:]]),
         "stance_time": _mean(gait.stance.duration[jumps.takeoff[first:]]),
-        "polar_max": _largest(0.5 * np.abs(joint_pos.sum(axis=-1))),
+        "polar_max": _largest(np.abs(polar_angle(joint_pos))),
         "apex_change": _largest(np.abs(np.diff(apex))),
     }
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from legbench.kinematics import polar_angle
 from legbench.metrics.analysis import Analysis, analysed
 from legbench.metrics.caveats import warnings_of
 from legbench.metrics.energy import energy_residual, loop_gap_max
@@ -144,8 +145,8 @@ def _jumping(run: Analysis) -> dict[str, Any]:
     values = asdict(run.jump_figures)
     values["jumps"] = values.pop("count")
     if not run.description.jumps:
-        moved = run["joint_pos"][run.first_action :].sum(axis=-1)
-        values["polar_max"] = 0.5 * float(np.max(np.abs(moved))) if len(moved) else math.nan
+        moved = polar_angle(run["joint_pos"][run.first_action :])
+        values["polar_max"] = float(np.max(np.abs(moved))) if len(moved) else math.nan
     return values
 
 
