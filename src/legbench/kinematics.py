@@ -13,7 +13,7 @@ from legbench.signals import Floats
 
 
 class ModalConvention(StrEnum):
-    """How eq. (15) is read."""
+    """Reading of eq. (15)."""
 
     ORTHONORMAL = "orthonormal"
     """z = [q1 + q2, q2 - q1] / sqrt(2): columns of W of unit length, as the text calls them."""

@@ -17,13 +17,13 @@ from legbench.plant.abstract import AbstractPlant
 from legbench.signals import Command, Floats, Observation
 
 Progress = Callable[[int, int], None]
-"""Called now and then, and at the end, with cycles done and cycles in all."""
+"""Function that is called now and then, and at the end, with cycles done and cycles in all."""
 PROGRESS_EVERY = 250
-"""Cycles between two calls of the progress function."""
+"""Number of cycles between two calls of the progress function."""
 
 
 class RowSink(Protocol):
-    """What the loop needs of a recording."""
+    """Part of a recording that the loop needs."""
 
     def append(
         self, command: Command, observation: Observation, cycle_us: float, late_us: float
@@ -34,17 +34,17 @@ class RowSink(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """How a run ended."""
+    """Outcome of a run: how it ended."""
 
     status: str
-    """`complete`, `interrupted` (^C) or `fault`."""
+    """Status of the run: `complete`, `interrupted` (^C) or `fault`."""
     cause: str | None
     """Short name of the fault, if one ended the run."""
     message: str | None
-    """What to tell the user about it."""
+    """Message for the user about the end; none if there is nothing to say."""
     cycles: int
     wall_time: float
-    """[s]"""
+    """Wall time of all cycles [s]."""
     time: float = 0.0
     """Plant time of the last observation [s]."""
 
@@ -158,7 +158,7 @@ def _cycle(
 
 
 def _ending(fault: PlantFault | None, stop: StopFlag) -> tuple[str, str | None, str | None]:
-    """Status, cause and message of a loop that has ended."""
+    """Return status, cause and message of a loop that has ended."""
     if fault is not None:
         return "fault", fault.cause, str(fault)
     return "interrupted" if stop.is_set else "complete", None, None
@@ -179,7 +179,7 @@ def _to_rest(plant: AbstractPlant, motor_pos: Floats, outcome: Outcome, stop: St
 def _reset(
     plant: AbstractPlant, controller: AbstractController, observation: Observation
 ) -> PlantFault | None:
-    """Show a controller the leg at rest; the fault with which the run ends if it cannot take it."""
+    """Show a controller the leg at rest; returns the fault of the run if that fails."""
     try:
         controller.reset(observation)
     except Exception as error:

@@ -19,21 +19,21 @@ class ModelArguments:
     design: Path = Path("models/optimal.toml")
     """Design file of the leg."""
     setup: SetupKind = SetupKind.JUMP
-    """How the leg is held."""
+    """Setup in which the leg is held."""
     boom_radius: float | None = None
     """Length of the boom that guides the trunk in ffs [m]; by default a plane."""
     linkage: LinkageKind = LinkageKind.BARS
-    """Physical parallel bars, or the constraint they make."""
+    """Linkage of the segments: physical parallel bars, or the constraint that they make."""
     out: Path | None = None
     """MJCF file to write; by default it goes to stdout."""
     view: bool = False
-    """Open it in MuJoCo's viewer."""
+    """Whether to open the model in MuJoCo's viewer."""
     json: bool = False
     """Print one JSON object on stdout: file and SHA-256."""
 
 
 def main(arguments: list[str]) -> int:
-    """Build, then write or view."""
+    """Run `legbench model`: build the model, then write or view it."""
     chosen = parse(ModelArguments, "model", arguments)
     options = BuildOptions(
         setup=Setup(kind=chosen.setup, boom_radius=chosen.boom_radius),

@@ -1,4 +1,4 @@
-"""What commands print: results on stdout, everything else on stderr."""
+"""Output of the commands: results on stdout, everything else on stderr."""
 
 import os
 import select
@@ -12,12 +12,12 @@ from legbench.strict_json import null_for_nan
 
 
 def report_error(message: str) -> None:
-    """One line that begins with `legbench: `."""
+    """Print an error as one line on stderr that begins with `legbench: `."""
     note(f"legbench: {message}")
 
 
 def note(message: str) -> None:
-    """Something that a person may want to know and a script does not.
+    """Print a line on stderr that a person may want to know and a script does not.
 
     Where nobody reads it any more, or stderr was closed before the program began, it is dropped:
     words end no command.

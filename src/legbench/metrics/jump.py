@@ -24,7 +24,7 @@ class JumpFigures:
     """
 
     count: int
-    """Complete jumps in the whole run."""
+    """Number of complete jumps in the whole run."""
     first: int
     """Index of the first jump of the limit cycle, the first that begins `settle` seconds or more
     after the first control action; equal to `count` when none does."""
@@ -40,11 +40,11 @@ class JumpFigures:
     foot_travel_in_hip: float
     """Widest horizontal range of the foot tip seen from the hip [m]; known on a real leg, too."""
     hop_freq: float
-    """Jumps per time, lower apex to lower apex [Hz]."""
+    """Number of jumps per time, lower apex to lower apex [Hz]."""
     flight_time: float
-    """Mean over the jumps' flights [s]."""
+    """Mean duration of the jumps' flights [s]."""
     stance_time: float
-    """Mean over the stances that the jumps take off from [s]."""
+    """Mean duration of the stances that the jumps take off from [s]."""
     polar_max: float
     """Largest |x1| from the first to the last of these jumps [rad]."""
     apex_change: float

@@ -1,4 +1,4 @@
-"""One run in numbers: what tables, reports and searches read."""
+"""Summary of a run in numbers, which tables, reports and searches read."""
 
 import math
 from dataclasses import asdict, dataclass, field
@@ -28,17 +28,17 @@ class Summary:
     setup: str
     controller: str
     status: str | None
-    """How the run ended, as it says itself."""
+    """Status with which the run ended."""
     cause: str | None
-    """Why it ended early."""
+    """Cause of an early end; none if the run came to its end."""
     limited_cycles: int
     """Cycles in which the limits changed the command."""
     limited_max: list[float]
     """Largest change of each motor's command by the limits [rad]."""
     duration: float
-    """First to last row [s]."""
+    """Time from the first row to the last [s]."""
     real_time_factor: float
-    """Duration over the wall time of all cycles [-]."""
+    """Ratio of the duration to the wall time of all cycles [-]."""
     rating_reference: str
     rating_stance: list[float]
     """P^r of each complete stance, eq. (14) [-]."""
@@ -94,7 +94,7 @@ class Summary:
     """[J]"""
 
     warnings: list[str] = field(default_factory=list)
-    """What is not measured although one might expect it, and why."""
+    """Sentences on what is not measured although one might expect it, and why."""
 
     def to_json(self) -> dict[str, Any]:
         """Fields by name for strict JSON: NaN is None, alone and in lists."""

@@ -1,4 +1,4 @@
-"""How a run on drives ends: on the ground and at rest, before its power goes."""
+"""End of a run on drives: on the ground and at rest, before its power goes."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ PATIENCE = 10.0
 
 
 class End(StrEnum):
-    """What follows when a run on drives has lasted its time."""
+    """End of a run on drives that has lasted its time."""
 
     REST = "rest"
     """The motors are led to the controller's rest posture, the leg comes to rest, power goes."""
@@ -26,16 +26,16 @@ class End(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Landing:
-    """What happened between the last row of a run and the end of its power."""
+    """Report of the way to rest, between the last row of a run and the end of its power."""
 
     motor_pos: tuple[float, ...]
     """Motor positions that the leg was led to [rad]."""
     duration: float
-    """How long it took [s]."""
+    """Duration of the way to rest [s]."""
     rested: bool
     """Whether the leg came to rest."""
     interrupted: bool
-    """Whether ^C ended it."""
+    """Whether ^C ended the way to rest."""
 
 
 def towards(wanted: Sequence[float], applied: Sequence[float], step: float) -> tuple[float, ...]:
@@ -54,7 +54,7 @@ def towards(wanted: Sequence[float], applied: Sequence[float], step: float) -> t
 
 @final
 class StillWatch:
-    """Says when links have been still for long enough, however coarse their encoders are."""
+    """Detector of links that have been still for long enough, however coarse their encoders are."""
 
     def __init__(self, period: float) -> None:
         self._needed = round(STILL_TIME / period)
@@ -62,7 +62,7 @@ class StillWatch:
         self._count = 0
 
     def see(self, link_pos: Sequence[float]) -> bool:
-        """Take the link angles of a period [rad]; whether the leg rests by now."""
+        """Take the link angles of a period [rad]; returns whether the leg rests by now."""
         near = len(self._around) == len(link_pos) and all(
             abs(value - middle) <= STILL_RANGE
             for value, middle in zip(link_pos, self._around, strict=True)

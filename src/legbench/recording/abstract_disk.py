@@ -11,7 +11,7 @@ MAX_WAITING = 60_000 // BATCH_ROWS
 
 @dataclass(slots=True)
 class Kept:
-    """What the operating system has of a run, as far as is known."""
+    """Part of a run that has reached the operating system, as far as is known."""
 
     rows: int = 0
     first: float = 0.0

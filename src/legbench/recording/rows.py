@@ -1,4 +1,4 @@
-"""Rows in memory: what the control loop pays for remembering one cycle."""
+"""Rows in memory, into which the control loop copies each cycle."""
 
 from typing import Final, final
 
