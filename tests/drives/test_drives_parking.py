@@ -7,6 +7,7 @@ import can
 import pytest
 from can_rig import Stage, experiment, stage
 from drives_rig import MS, rig
+from file_log import FileLog
 
 from legbench.control import JumpConfig
 from legbench.drives.emulated.bus import LockstepBus
@@ -26,7 +27,7 @@ LEAST = {0x000: 4, SYNC: 400, 0x201: 400, 0x202: 400, 0x77E: 40}
 def recorded(it: Stage, log: Path) -> list[can.Message]:
     """A run, its log from the NMT start to the last frame of `close`."""
     # Before the drives are configured, which no log may hold: it would undo what `close` does.
-    it.session.log_to(log)
+    it.session.log_to(FileLog(log))
     it.plant._lands = False
     assert run(it.plant, it.controller, 250).status == "complete"
     it.plant.close()

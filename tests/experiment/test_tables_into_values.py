@@ -216,7 +216,7 @@ def test_one_entry_is_replaced_and_the_tables_given_stay(tmp_path: Path) -> None
     assert overlaid(tables, "x.y", 9, tmp_path) == {**tables, "x": {"y": 9}}
     assert overlaid(tables, "a.b.d", None, tmp_path) == {"a": {"b": {"c": 1}}, "e": 3}
     assert tables == {"a": {"b": {"c": 1, "d": 2}}, "e": 3}
-    with pytest.raises(ConfigError, match="'e' is 3, no table; 'e.f' leads nowhere"):
+    with pytest.raises(ConfigError, match=r"'e' is 3, no table; 'e\.f' leads nowhere"):
         overlaid(tables, "e.f", 1, tmp_path)
 
 

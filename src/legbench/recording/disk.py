@@ -8,8 +8,9 @@ from typing import final
 
 import pyarrow as pa
 
-from legbench.recording.abstract_disk import AbstractDisk
+from legbench.recording.abstract_disk import AbstractDisk, AbstractLog
 from legbench.recording.files import Appender
+from legbench.recording.logs import LoopLog
 from legbench.recording.rows import Block
 from legbench.recording.store import Store
 from legbench.recording.stream import encode_schema
@@ -17,7 +18,7 @@ from legbench.recording.stream import encode_schema
 
 @final
 class Disk(AbstractDisk):
-    """Writes the blocks and events of one run where it takes them; waits for a slow disk."""
+    """Writes the blocks, events and logs of one run in the loop, which waits for a slow disk."""
 
     def __init__(self, samples: Appender, events: Appender, schema: pa.Schema) -> None:
         """Write the opening of the stream; raises OSError."""
@@ -39,6 +40,10 @@ class Disk(AbstractDisk):
     def event(self, line: bytes) -> None:
         """Write one whole line to the events."""
         self._store.event(line)
+
+    def log(self, file: Appender) -> AbstractLog:
+        """Begin a log in a file, which is the log's from now on."""
+        return LoopLog(self._store.log(file))
 
     def finish(self) -> None:
         """Write the end mark and wait until everything has reached the disk."""

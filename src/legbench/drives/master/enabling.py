@@ -39,6 +39,6 @@ def enable(
     sample = motion.sample(ticks.last)
     motion.check(sample)
     guard.check_start(sample.motor_pos)
-    up.seek(Goal.ENABLED, parts.cycle.axes, ticks.watched, "become enabled")
+    up.enable(ticks.watched)
     motion.begin()
     parts.status.state = LinkState.RUNNING
