@@ -80,6 +80,7 @@ class UnixBus(can.BusABC):
 
     def _connect(self) -> None:
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._readable = (self._socket.fileno(),)
         self._controller = Controller.ACTIVE
         try:
             self._socket.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
@@ -158,11 +159,11 @@ class UnixBus(can.BusABC):
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
         self._check_open()
         try:
-            # Whoever does not want to wait saves the question whether there is something.
-            if timeout != 0.0 and not select.select([self._socket], [], [], timeout)[0]:
+            if not select.select(self._readable, (), (), timeout)[0]:
                 return None, False
             packet, stamps, _, _ = self._socket.recvmsg(SPACE, STAMP_SPACE, socket.MSG_DONTWAIT)
         except BlockingIOError:
+            # Another thread was faster.
             return None, False
         except OSError as error:
             raise can.CanOperationError(f"{self.channel}: {error.strerror}") from error
