@@ -375,6 +375,7 @@ ABORTS = {
     0x06090031: "too high",
     0x06090032: "too low",
     0x08000000: "general error",
+    0x08000020: "transferred or stored",
     0x08000021: "local control",
     0x08000022: "device state",
     0x08000024: "no data",

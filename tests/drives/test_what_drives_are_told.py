@@ -248,7 +248,7 @@ def test_a_data_sheet_describes_objects_as_the_standard_spells_them() -> None:
     # Arrays are of one type, records are not (CiA 301, 7.4.3).
     kinds = {
         name: (found[name]["ObjectType"], found[name]["SubNumber"])
-        for name in ("1003", "1016", "1018", "1400", "1600", "607D", "60C2")
+        for name in ("1003", "1010", "1011", "1016", "1018", "1400", "1600", "607D", "60C2")
     }
     assert kinds == {
         "1003": ("0x8", "2"),
@@ -256,6 +256,8 @@ def test_a_data_sheet_describes_objects_as_the_standard_spells_them() -> None:
         "1018": ("0x9", "5"),
         "1400": ("0x9", "5"),
         "1600": ("0x9", "9"),
+        "1010": ("0x8", "4"),
+        "1011": ("0x8", "4"),
         "607D": ("0x8", "3"),
         "60C2": ("0x9", "3"),
     }

@@ -25,10 +25,14 @@ def register_of(code: int) -> int:
 
 @final
 class Alarms:
-    """Errors of one node; they cannot be reset while the cause of one is present."""
+    """Errors of one node; they cannot be reset while the cause of one is present.
+
+    Attributes:
+        node_id: node id under which they are reported.
+    """
 
     def __init__(self, node_id: int, values: dict[Key, int]) -> None:
-        self._node_id, self._values = node_id, values
+        self.node_id, self._values = node_id, values
         self._standing: set[int] = set()
         self._shown: list[int] = []
 
@@ -80,4 +84,4 @@ class Alarms:
         for shown in self._shown:
             register |= register_of(shown)
         self._values[0x1001, 0] = register
-        return emcy_frame(Emergency(node_id=self._node_id, code=code, register=register))
+        return emcy_frame(Emergency(node_id=self.node_id, code=code, register=register))

@@ -7,12 +7,15 @@ from typing import final
 from legbench.drives.emulated.axis import Axis
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.connection import Connection
-from legbench.drives.emulated.heartbeats import HeartbeatConsumer
-from legbench.drives.emulated.identity import write_identity
+from legbench.drives.emulated.heartbeats import HeartbeatConsumer, HeartbeatProducer
+from legbench.drives.emulated.lss import LssSlave, lss_address
+from legbench.drives.emulated.memory import ALL, Memory
+from legbench.drives.emulated.power import POWERED
 from legbench.drives.emulated.process_data import ProcessData
 from legbench.drives.emulated.reception import RPDO_LATE, Reception
 from legbench.drives.emulated.rules import COMMUNICATION_PROFILE, ERRORS, objection
 from legbench.drives.emulated.store import ObjectStore
+from legbench.drives.protocol import lss
 from legbench.drives.protocol.cia402 import DriveState
 from legbench.drives.protocol.frame import (
     COB_MASK,
@@ -58,12 +61,14 @@ class EmulatedDrive:
         kept: Sequence[Parameter] = (),
     ) -> None:
         """Switch it on; `kept` is what its memory holds instead of the defaults (1010h)."""
-        self._node, self._behaviour, self._kept = node, behaviour or Behaviour(), kept
+        self._node, self._behaviour = node, behaviour or Behaviour()
         self.node_id = node.node_id
+        self._lss = LssSlave(lss_address(node.identity), node.node_id)
         self._random = random.Random(self._behaviour.seed * LAST_NODE + node.node_id)
         self._store = ObjectStore(OBJECTS.values(), self._check, self._written)
         self._values = self._store.values
-        write_identity(self._values, self._node)
+        self._memory = Memory(self._store, node.identity, kept)
+        self._memory.recall(self.node_id)
         self.axis = Axis(node, self._behaviour, self._values)
         self._pdos = ProcessData(self._store)
         self._sdo = SdoServer(self._read, self._store.write)
@@ -71,25 +76,14 @@ class EmulatedDrive:
         self._now_ns = 0
         self._tick_ns = 0
         self._boot_ns = 1000 * self._behaviour.boot_us
-        self._beat_ns = 0
+        self._beats = HeartbeatProducer()
         self._heartbeats = HeartbeatConsumer(self._values)
         self._connection = Connection(self.axis, self._values)
         self._reception = Reception(
-            self._values,
-            self.axis,
-            self._pdos,
-            self._connection,
-            self._behaviour.sync_loss_periods,
+            self._values, self.axis, self._pdos, self._connection, self._behaviour.sync_loss_periods
         )
         self._out: list[tuple[int, Frame]] = []
-        self._mute = False
-        self._recall(range(0x10000))
-
-    def _recall(self, indices: Container[int]) -> None:
-        for parameter in self._kept:
-            entry = self._store.entry(parameter.key)
-            if entry is not None and entry.index in indices:
-                self._store.put(entry, parameter.value)
+        self._pdos.rebuild()
 
     # --- what the wire and the body call -----------------------------------------------------
 
@@ -101,10 +95,15 @@ class EmulatedDrive:
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Receive a frame of another node; whatever it says, nothing is raised."""
         self._now_ns = now_ns
-        if frame.error or frame.extended or frame.remote or self.state is NmtState.BOOT_UP:
+        booting = self.state is NmtState.BOOT_UP and self.node_id != lss.UNCONFIGURED
+        if frame.error or frame.extended or frame.remote or booting:
             return
         cob_id, data = frame.cob_id, frame.data
-        if cob_id == self._values[SYNC] & COB_MASK:
+        if cob_id == lss.REQUEST_ID:
+            self._layer_setting(data)
+        elif self.node_id == lss.UNCONFIGURED:
+            return
+        elif cob_id == self._values[SYNC] & COB_MASK:
             if self._reception.is_sync(data, now_ns) and self.state is NmtState.OPERATIONAL:
                 for sample in self._reception.sync(now_ns):
                     self._send(sample)
@@ -131,7 +130,7 @@ class EmulatedDrive:
             return self.axis.motion.angle
         booting = self.state is NmtState.BOOT_UP
         running = self.axis.power.state is not DriveState.NOT_READY_TO_SWITCH_ON
-        if booting and now_ns >= self._boot_ns:
+        if booting and now_ns >= self._boot_ns and self.node_id != lss.UNCONFIGURED:
             self._boot()
         angle = self.axis.tick(now_ns, step_ns) if running else self.axis.motion.angle
         if not booting:
@@ -150,18 +149,18 @@ class EmulatedDrive:
     # --- faults to inject --------------------------------------------------------------------
 
     def reset(self, now_ns: int) -> None:
-        """Start over, as after a brown-out: configuration and state are lost."""
+        """Start over, as after a brown-out: what is not stored is lost, a node id, too."""
         self._now_ns = now_ns
         self._connection.outlet.clear()
         self.axis.restart()
-        self._restart(range(0x10000))
+        self._restart(ALL, cold=True)
 
-    def _restart(self, indices: Container[int]) -> None:
-        """Set objects among some indices back and boot, without a connection."""
-        self._store.load_defaults(indices)
-        write_identity(self._values, self._node)
+    def _restart(self, indices: Container[int], *, cold: bool = False) -> None:
+        """Set objects among some indices back and boot; the node id is that set last over LSS."""
+        self.node_id = self._lss.begin(cold=cold)
+        self.axis.address(self.node_id)
+        self._memory.recall(self.node_id, indices)
         self._pdos.rebuild()
-        self._recall(indices)
         self._heartbeats.clear()
         self._out.clear()
         self._connection.outlet.mute()
@@ -200,11 +199,21 @@ class EmulatedDrive:
 
     def mute_heartbeat(self, mute: bool = True) -> None:
         """Stop producing heartbeats, while everything else goes on."""
-        self._mute = mute
+        self._beats.mute = mute
 
     # --- CiA 301 -----------------------------------------------------------------------------
 
+    def _layer_setting(self, data: bytes) -> None:
+        """Answer LSS (CiA 305); a drive that has got its first node id boots."""
+        answer = self._lss.feed(data)
+        if answer is not None:
+            self._send(Frame(lss.ANSWER_ID, answer))
+        if self._lss.released:
+            self._restart(ALL)
+
     def _check(self, key: Key, value: int) -> Abort | None:
+        if Memory.owns(key):
+            return Memory.check(key, value, powered=self.axis.power.state in POWERED)
         if ProcessData.owns(key):
             return self._pdos.check(key, value)
         refusal = objection(key, value, self._values)
@@ -221,6 +230,8 @@ class EmulatedDrive:
         if ProcessData.owns(key):
             if key[0] & 0x200 or key[1] in (1, 2, 5):
                 self._pdos.rebuild()
+        elif Memory.owns(key):
+            self._memory.obey(key)
         elif key[0] == 0x1016:
             self._heartbeats.clear()
         elif key == ERROR_COUNT:
@@ -234,8 +245,8 @@ class EmulatedDrive:
         self.state = NmtState.PRE_OPERATIONAL
         self._pdos.rebuild()
         if self.axis.power.state is DriveState.NOT_READY_TO_SWITCH_ON:
-            self.axis.power.boot()
-        self._beat_ns = self._now_ns
+            self.axis.boot(self._now_ns)
+        self._beats.since_ns = self._now_ns
         self._out.append((self._now_ns, heartbeat_frame(self.node_id, NmtState.BOOT_UP)))
         self._connection.outlet.unmute(self._now_ns)
 
@@ -263,11 +274,8 @@ class EmulatedDrive:
 
     def _timers(self) -> None:
         now_ns, values = self._now_ns, self._values
-        beat_ns = 1_000_000 * values[0x1017, 0]
-        if beat_ns and now_ns - self._beat_ns >= beat_ns:
-            self._beat_ns = now_ns
-            if not self._mute:
-                self._out.append((now_ns, heartbeat_frame(self.node_id, self.state)))
+        if self._beats.due(1_000_000 * values[0x1017, 0], now_ns):
+            self._out.append((now_ns, heartbeat_frame(self.node_id, self.state)))
         if self._heartbeats.lost(now_ns):
             self._heartbeats.clear()
             self._connection_lost(HEARTBEAT_LOST)

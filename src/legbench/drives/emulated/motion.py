@@ -47,7 +47,12 @@ class Motion:
     @property
     def angle(self) -> float:
         """True motor position, independent of the zero set by homing [rad]."""
-        return (self.actual - self._true_zero) / self._units.counts_per_rad
+        return self.travel / self._units.counts_per_rad
+
+    @property
+    def travel(self) -> float:
+        """Distance of the motor from its true zero, independent of homing [counts]."""
+        return self.actual - self._true_zero
 
     @property
     def sign(self) -> int:

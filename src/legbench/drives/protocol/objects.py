@@ -57,6 +57,14 @@ _TABLE = """
 1006 0 u32 rw 0 - Communication cycle period [us]
 1007 0 u32 rw 0 - Synchronous window length [us]
 1008 0 str const legbench-drive - Manufacturer device name
+1010 0 u8 const 3 - Store parameters count
+1010 1 u32 rw 1 - Store all parameters
+1010 2 u32 rw 1 - Store communication parameters
+1010 3 u32 rw 1 - Store application parameters
+1011 0 u8 const 3 - Restore default parameters count
+1011 1 u32 rw 1 - Restore all default parameters
+1011 2 u32 rw 1 - Restore communication default parameters
+1011 3 u32 rw 1 - Restore application default parameters
 1014 0 u32 ro 0x80 - COB-ID EMCY
 1015 0 u16 rw 0 - Inhibit time EMCY [100 us]
 1016 0 u8 const 2 - Consumer heartbeat time count
