@@ -58,7 +58,7 @@ def status(session: Session) -> list[NodeStatus]:
 def _status(sdo: SdoPort, node: NodeConfig) -> NodeStatus:
     motor, link = _counts(sdo, node)
     mode = sdo.get_int(0x6061, 0, DataType.INTEGER8)
-    code = sdo.get_int(0x603F, 0, DataType.UNSIGNED16)
+    code = sdo.find_int(0x603F, 0, DataType.UNSIGNED16)
     heat = node.temperature_object
     celsius = None
     if heat is not None:
@@ -70,10 +70,17 @@ def _status(sdo: SdoPort, node: NodeConfig) -> NodeStatus:
         node_id=node.node_id,
         statusword=describe_statusword(sdo.get_int(0x6041, 0, DataType.UNSIGNED16)),
         mode=MODES.get(mode, f"mode {mode}"),
-        error="none" if code == 0 else f"{code:04X}h {MEANINGS.get(code, 'see the drive manual')}",
+        error=_error(code),
         motor_pos=motor_pos,
         link_pos=node.link.to_rad(unwrap(link, near, node.link.bits)),
         motor_counts=motor,
         link_counts=link,
         temperature=celsius,
     )
+
+
+def _error(code: int | None) -> str:
+    """Error code 603Fh in words; none stands for a drive that has no such object."""
+    if code is None:
+        return "not told"
+    return f"{code:04X}h {MEANINGS.get(code, 'see the drive manual')}" if code else "none"
