@@ -1,10 +1,12 @@
 """The CiA 402 half of an emulated drive: controlword, modes, motion, statusword; pure."""
 
 from collections import deque
+from collections.abc import Sequence
 from typing import final
 
 from legbench.drives.emulated.alarms import Alarms
 from legbench.drives.emulated.behaviour import Behaviour
+from legbench.drives.emulated.dictionary import USUAL_LINKS
 from legbench.drives.emulated.homing import Homing, HomingState
 from legbench.drives.emulated.motion import Motion
 from legbench.drives.emulated.power import HALT, PowerStage
@@ -18,6 +20,7 @@ from legbench.drives.setup.units import wrap
 
 MODES = (Mode.NONE, Mode.HOMING, Mode.CYCLIC_SYNCHRONOUS_POSITION)
 FOLLOWING_ERROR, SETPOINTS_MISSING, SYNC_MISSING = 0x8611, 0xFF10, 0xFF11
+SHORT = (LINK_SHORT, 0)
 _ENABLED = DriveState.OPERATION_ENABLED
 _STATUS = int(StatusBit.REMOTE)
 
@@ -34,7 +37,15 @@ class Axis:
         warning: whether bit 7 of the statusword is set.
     """
 
-    def __init__(self, node: NodeConfig, behaviour: Behaviour, values: dict[Key, int]) -> None:
+    def __init__(
+        self,
+        node: NodeConfig,
+        behaviour: Behaviour,
+        values: dict[Key, int],
+        links: Sequence[Key] = USUAL_LINKS,
+    ) -> None:
+        """Turn the numbers of an object dictionary; `links` show the position of the link."""
+        self._links = tuple(links)
         self._node, self._behaviour, self._values = node, behaviour, values
         self.power = PowerStage(values)
         self.motion = Motion(node.motor, behaviour, values)
@@ -173,8 +184,8 @@ class Axis:
         values[0x6064, 0] = wrap(actual)
         values[0x6062, 0] = wrap(round(motion.demand))
         values[0x60F4, 0] = wrap(round(motion.demand) - actual)
-        values[0x60E4, 1] = wrap(link)
-        values[LINK_SHORT, 0] = wrap(link, 16)
+        for key in self._links:
+            values[key] = wrap(link, 16 if key == SHORT else 32)
         values[0x6077, 0] = min(max(self._torque, -32768), 32767)
         self._status()
 

@@ -2,14 +2,16 @@
 
 import random
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import final
 
 from legbench.drives.emulated.axis import SYNC_MISSING, Axis
 from legbench.drives.emulated.behaviour import Behaviour
+from legbench.drives.emulated.dictionary import Dictionary, dictionary_of
 from legbench.drives.emulated.heartbeats import HeartbeatConsumer
-from legbench.drives.emulated.identity import write_identity
 from legbench.drives.emulated.process_data import LAST_SYNCHRONOUS, ProcessData
 from legbench.drives.emulated.store import ObjectStore
+from legbench.drives.errors import SdoAbortError
 from legbench.drives.protocol.cia402 import DriveState
 from legbench.drives.protocol.frame import (
     HEARTBEAT_BASE,
@@ -21,14 +23,14 @@ from legbench.drives.protocol.frame import (
     Frame,
 )
 from legbench.drives.protocol.nmt import NmtCommand, NmtState, decode_nmt, heartbeat_frame
-from legbench.drives.protocol.objects import OBJECTS, TEMPERATURE, Key
+from legbench.drives.protocol.objects import Access, Key
 from legbench.drives.protocol.sdo import Abort
 from legbench.drives.protocol.sdo_server import SdoServer
 from legbench.drives.setup.config import NodeConfig, Parameter
 
 UNDER_VOLTAGE, OVER_TEMPERATURE = 0x3220, 0x4310
 HEARTBEAT_LOST, PDO_SHORT, PDO_LONG, SYNC_LENGTH, RPDO_LATE = 0x8130, 0x8210, 0x8220, 0x8240, 0x8250
-TARGET = (0x607A, 0)
+TARGET, HOT = (0x607A, 0), 90.0
 _ORDERS = {
     NmtCommand.START: NmtState.OPERATIONAL,
     NmtCommand.STOP: NmtState.STOPPED,
@@ -51,15 +53,16 @@ class EmulatedDrive:
         node: NodeConfig,
         behaviour: Behaviour | None = None,
         kept: Sequence[Parameter] = (),
+        dictionary: Dictionary | None = None,
     ) -> None:
         """Switch it on; `kept` is what its memory holds instead of the defaults (1010h)."""
         self._node, self._behaviour, self._kept = node, behaviour or Behaviour(), kept
         self.node_id = node.node_id
         self._random = random.Random(self._behaviour.seed * LAST_NODE + node.node_id)
-        self._store = ObjectStore(OBJECTS.values(), self._check, self._written)
+        self._dictionary = shown = dictionary or dictionary_of(node)
+        self._store = ObjectStore(shown.entries, self._check, self._written, shown.hidden)
         self._values = self._store.values
-        write_identity(self._values, self._node)
-        self.axis = Axis(node, self._behaviour, self._values)
+        self.axis = Axis(node, self._behaviour, self._values, shown.links)
         self._pdos = ProcessData(self._store)
         self._sdo = SdoServer(self._store.read, self._store.write)
         self.state = NmtState.BOOT_UP
@@ -77,8 +80,9 @@ class EmulatedDrive:
     def _recall(self) -> None:
         for parameter in self._kept:
             entry = self._store.entry(parameter.key)
-            if entry is not None:
-                self._store.put(entry, parameter.value)
+            if entry is not None and entry.access is Access.RW:
+                with suppress(SdoAbortError):
+                    self._store.put(entry, parameter.value)
 
     # --- what the wire and the body call -----------------------------------------------------
 
@@ -138,7 +142,6 @@ class EmulatedDrive:
         """Start over, as after a brown-out: configuration and state are lost."""
         self._now_ns = now_ns
         self._store.load_defaults()
-        write_identity(self._values, self._node)
         self.axis.restart()
         self._pdos.rebuild()
         self._recall()
@@ -151,8 +154,8 @@ class EmulatedDrive:
         """Bring on the lasting cause of an error, such as `UNDER_VOLTAGE`."""
         self._now_ns = now_ns
         self.axis.alarms.hold(code)
-        if code == OVER_TEMPERATURE:
-            self._values[TEMPERATURE, 0] = 900
+        if code == OVER_TEMPERATURE and self._dictionary.temperature is not None:
+            self._values[self._dictionary.temperature] = round(HOT / self._node.temperature_scale)
         self.axis.fault(code)
         self._forward()
 
@@ -177,6 +180,9 @@ class EmulatedDrive:
     # --- CiA 301 -----------------------------------------------------------------------------
 
     def _check(self, key: Key, value: int) -> Abort | None:
+        low, high = self._dictionary.limits.get(key, (value, value))
+        if not low <= value <= high:
+            return Abort.TOO_LOW if value < low else Abort.TOO_HIGH
         if ProcessData.owns(key):
             return self._pdos.check(key, value)
         if key == (0x1019, 0) and self._values[0x1006, 0]:

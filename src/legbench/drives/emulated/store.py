@@ -1,10 +1,17 @@
 """The object dictionary inside a drive: values, and access to them by SDO."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import final
 
 from legbench.drives.errors import CodecError
-from legbench.drives.protocol.datatypes import Value, pack, range_of, size_of, unpack
+from legbench.drives.protocol.datatypes import (
+    DataType,
+    Value,
+    pack,
+    range_of,
+    size_of,
+    unpack,
+)
 from legbench.drives.protocol.objects import Access, Key, ObjectEntry
 from legbench.drives.protocol.sdo import Abort, abort_error
 
@@ -21,7 +28,15 @@ class ObjectStore:
         values: the numbers, for the drive's own use.
     """
 
-    def __init__(self, entries: Iterable[ObjectEntry], check: Check, written: Written) -> None:
+    def __init__(
+        self,
+        entries: Iterable[ObjectEntry],
+        check: Check,
+        written: Written,
+        hidden: Mapping[Key, int] | None = None,
+    ) -> None:
+        """Hold objects; `hidden` are numbers for the drive's own use that no SDO reaches."""
+        self._hidden = hidden or {}
         self._entries = {entry.key: entry for entry in entries}
         self._indices = {index for index, _ in self._entries}
         self._check, self._written = check, written
@@ -31,11 +46,17 @@ class ObjectStore:
 
     def load_defaults(self) -> None:
         """Set every object to its power-on default."""
+        self.values.update(self._hidden)
         for key, entry in self._entries.items():
             if isinstance(entry.default, int):
                 self.values[key] = entry.default
             else:
                 self._texts[key] = entry.default
+
+    @property
+    def keys(self) -> tuple[Key, ...]:
+        """Index and sub-index of every object that an SDO reaches, in order."""
+        return tuple(self._entries)
 
     def entry(self, key: Key) -> ObjectEntry | None:
         """Description of an object, if there is one."""
@@ -46,8 +67,9 @@ class ObjectStore:
         entry = self._known(index, sub)
         if entry.access is Access.WO:
             raise abort_error(Abort.WRITE_ONLY, index, sub)
-        key = entry.key
-        return pack(entry.kind, self.values[key] if key in self.values else self._texts[key])
+        if size_of(entry.kind) is None:
+            return pack(entry.kind, self._texts[entry.key])
+        return pack(entry.kind, fit(entry.kind, self.values[entry.key]))
 
     def write(self, index: int, sub: int, data: bytes) -> None:
         """Take the bytes of an object, all or nothing; raises SdoAbortError."""
@@ -86,3 +108,9 @@ class ObjectStore:
             known = index in self._indices
             raise abort_error(Abort.NO_SUB_INDEX if known else Abort.NO_OBJECT, index, sub)
         return entry
+
+
+def fit(kind: DataType, value: int) -> int:
+    """Return a number as an object of a type shows it, wrapped as its bits are."""
+    low, high = range_of(kind)
+    return value if low <= value <= high else (value - low) % (high - low + 1) + low

@@ -2,11 +2,12 @@
 
 import math
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 from legbench.drives.errors import CodecError
 from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.frame import LAST_NODE, RPDO_BASES, TPDO_BASES
-from legbench.drives.protocol.objects import LINK_SHORT, PDO_COUNT
+from legbench.drives.protocol.objects import LAST_PDO, LINK_SHORT, PDO_COUNT
 from legbench.drives.protocol.pdo import Mapped, PdoMap
 from legbench.drives.setup.bus_numbers import BUS_NUMBERS, LONG, WORD, check_bus_numbers
 from legbench.drives.setup.cob_ids import check_cob_id, check_distinct
@@ -55,7 +56,7 @@ class PdoConfig:
     """
 
     number: int
-    """Number of the RPDO or TPDO, 1 to 4."""
+    """Number of the RPDO or TPDO; beyond 4 it needs a `cob_id`."""
     objects: tuple[Mapped, ...]
     cob_id: int | None = None
     """COB-ID of the PDO; by default that of the predefined connection set."""
@@ -64,8 +65,13 @@ class PdoConfig:
     which not every drive has, alone."""
 
     def __post_init__(self) -> None:
-        if not 1 <= self.number <= PDO_COUNT:
-            raise ConfigError(f"PDO number {self.number}; a drive has 1 to {PDO_COUNT}")
+        if not 1 <= self.number <= LAST_PDO:
+            raise ConfigError(f"PDO number {self.number}; a drive has 1 to {LAST_PDO}")
+        if self.number > PDO_COUNT and self.cob_id is None:
+            raise ConfigError(
+                f"PDO number {self.number} has no COB-ID by the standard, as 1 to {PDO_COUNT} "
+                "have; give it a 'cob_id'"
+            )
         try:
             PdoMap(self.objects)
         except CodecError as error:
@@ -106,6 +112,8 @@ class NodeConfig:
     heartbeat_consumer: bool = True
     """Whether the drive has 1016h, and so stops when its master's heartbeat is missing; some have
     not, and must be given a `deadline_ms` of their commands instead."""
+    eds: Path | None = None
+    """Electronic data sheet of the drive, relative to the bus file; an emulated one wears it."""
     soft_limits: Range | None = None
     """Motor range to which the drive itself clamps targets (607Dh) [rad]; none sets no range."""
 
