@@ -3,8 +3,9 @@
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
-from legbench.drives.protocol.datatypes import DataType
+from legbench.drives.protocol.datatypes import DataType, pack, size_of
 from legbench.drives.protocol.objects import LINK_SHORT, OBJECTS, TEMPERATURE, Key, ObjectEntry
+from legbench.drives.protocol.sdo import Abort
 from legbench.drives.setup.config import NodeConfig
 from legbench.drives.sheet.data_sheet import DataSheet
 
@@ -13,6 +14,8 @@ USUAL_LINKS: tuple[Key, ...] = ((0x60E4, 1), (LINK_SHORT, 0))
 RELATIVE = {(base + number, 1) for base in (0x1400, 0x1800) for number in range(4)}
 """Objects of the usual drive whose default is added to its node id, besides that of EMCY."""
 EMCY = (0x1014, 0)
+MAX_SPEED = (0x6080, 0)
+"""Max motor speed, whose unit is the maker's own: a data sheet's default would stop the motor."""
 OWN_WAY: Mapping[Key, int] = {(0x60C2, 1): 1, (0x60C2, 2): -3}
 """What a drive works with that lacks the object: it interpolates over the usual cycle of 1 ms."""
 MODE_OF_ITS_OWN: Mapping[Key, int] = {(0x6060, 0): 8, (0x6061, 0): 8}
@@ -34,6 +37,13 @@ class Dictionary:
     temperature: Key | None = (TEMPERATURE, 0)
     """Object that shows the temperature of the power stage, if any does."""
 
+    def refusal(self, key: Key, value: int) -> Abort | None:
+        """Abort code of a value beyond the limits of its object; none if it lies within."""
+        low, high = self.limits.get(key, (value, value))
+        if low <= value <= high:
+            return None
+        return Abort.TOO_LOW if value < low else Abort.TOO_HIGH
+
 
 def dictionary_of(node: NodeConfig, sheet: DataSheet | None = None) -> Dictionary:
     """Return the objects of one node: those of a data sheet, else those of the usual drive."""
@@ -44,7 +54,11 @@ def dictionary_of(node: NodeConfig, sheet: DataSheet | None = None) -> Dictionar
     for key in sheet.relative:
         entry = sheet.objects[key]
         own.setdefault(key, _number(entry) + node.node_id)
-    entries = tuple(_with(sheet.objects.values(), own))
+    written = {parameter.key for parameter in node.parameters}
+    entries = tuple(
+        _shown_only(entry) if entry.key == MAX_SPEED and MAX_SPEED not in written else entry
+        for entry in _with(sheet.objects.values(), own)
+    )
     shown = {entry.key for entry in entries if isinstance(entry.default, int)}
     hidden = {key: _number(entry) for key, entry in OBJECTS.items() if key not in shown}
     for other in (OWN_WAY, {} if (0x6060, 0) in shown else MODE_OF_ITS_OWN):
@@ -71,6 +85,13 @@ def _with(entries: Iterable[ObjectEntry], own: Mapping[Key, int]) -> Iterator[Ob
     for entry in entries:
         number = entry.kind not in (DataType.VISIBLE_STRING, DataType.OCTET_STRING)
         yield replace(entry, default=own[entry.key]) if number and entry.key in own else entry
+
+
+def _shown_only(entry: ObjectEntry) -> ObjectEntry:
+    """Return an object that holds its value for the bus, and acts on nothing."""
+    if size_of(entry.kind) is None or isinstance(entry.default, bytes):
+        return entry
+    return replace(entry, kind=DataType.OCTET_STRING, default=pack(entry.kind, entry.default))
 
 
 def _number(entry: ObjectEntry) -> int:

@@ -64,6 +64,8 @@ class Outcome:
         wanted = self.parameter.value
         if self.code is None:
             return f"wrote {wanted}, reads {self.there}; the drive does not take this value"
+        if self.missing:
+            return f"the drive has no such object (abort {self.code:08X}h)"
         known = {int(abort): text for abort, text in MEANINGS.items()}
         refusal = f"{known.get(self.code, 'aborted')} (abort {self.code:08X}h)"
         held = "" if self.there is None else f", holds {self.there}, wanted {wanted}"

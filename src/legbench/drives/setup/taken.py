@@ -65,12 +65,15 @@ def _deadline(entry: Outcome) -> bool:
 
 
 def unprotected(outcomes: Outcomes) -> tuple[str, ...]:
-    """Return one line for every object that a drive lacks or holds otherwise, and what it costs."""
+    """Return one line for every object that drives lack or hold otherwise, and what it costs."""
+    told: dict[str, list[str]] = {}
+    for name, entries in outcomes.items():
+        for entry in entries:
+            if entry.line is not None:
+                told.setdefault(entry.line, []).append(f"'{name}'")
     return tuple(
-        f"drive '{name}', {entry.line}"
-        for name, entries in outcomes.items()
-        for entry in entries
-        if entry.line is not None
+        f"{'drive' if len(names) == 1 else 'drives'} {', '.join(names)}, {line}"
+        for line, names in told.items()
     )
 
 
