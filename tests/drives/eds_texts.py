@@ -102,8 +102,6 @@ def stranger() -> Sheet:
         default = str(known.default)
         if key == (0x1014, 0):
             default = "$NODEID+0x80"
-        elif key[1] == 1 and key[0] & ~0x403 == 0x1000 | 0x400 & key[0] and 0x1400 <= key[0] < 0x1A00:
-            default = str(known.default)
         if key[1] == 1 and (0x1400 <= key[0] < 0x1404 or 0x1800 <= key[0] < 0x1804):
             default = f"$NODEID+0x{known.default:X}"
         sheet.entries[key] = Entry(

@@ -169,7 +169,7 @@ def _bytes(number_of: int, default: object) -> bytes | None:
 def _profile(key: Key, kind: DataType, number_of: int) -> Value:
     """Return what an object holds whose data sheet tells no default."""
     known = profile_default(key, kind)
-    if known is not None:
+    if known is not None and size_of(kind) is not None:
         low, high = range_of(kind)
         return known if low <= known <= high else 0
     return "" if kind is DataType.VISIBLE_STRING else bytes(BYTES.get(number_of, 0))
