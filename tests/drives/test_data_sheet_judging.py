@@ -207,7 +207,6 @@ def test_a_proposed_bus_is_what_the_drive_can_do(tmp_path: Path) -> None:
         assert one.link_object == LINK_POSITION
         assert [pdo.objects for pdo in one.rpdos] == [(CONTROLWORD, TARGET_POSITION)]
         assert one.rpdos[0].deadline_ms == 20
-        assert not one.heartbeat_consumer
         assert [hex(entry.index) for entry in one.parameters] == ["0x6065", "0x6084"]
         assert one.eds == tmp_path / "it.eds"
     assert bus.waive == ()

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
+from legbench.drives.protocol.cia402 import Mode
 from legbench.drives.protocol.datatypes import DataType, pack, size_of
 from legbench.drives.protocol.objects import LINK_SHORT, OBJECTS, TEMPERATURE, Key, ObjectEntry
 from legbench.drives.protocol.sdo import Abort
@@ -16,10 +17,10 @@ RELATIVE = {(base + number, 1) for base in (0x1400, 0x1800) for number in range(
 EMCY = (0x1014, 0)
 MAX_SPEED = (0x6080, 0)
 """Max motor speed, whose unit is the maker's own: a data sheet's default would stop the motor."""
-OWN_WAY: Mapping[Key, int] = {(0x60C2, 1): 1, (0x60C2, 2): -3}
-"""What a drive works with that lacks the object: it interpolates over the usual cycle of 1 ms."""
-MODE_OF_ITS_OWN: Mapping[Key, int] = {(0x6060, 0): 8, (0x6061, 0): 8}
-"""Mode of a drive whose mode cannot be chosen (6060h): cyclic synchronous position."""
+MODE, MODE_DISPLAY, CYCLIC = (0x6060, 0), (0x6061, 0), int(Mode.CYCLIC_SYNCHRONOUS_POSITION)
+OWN_WAY: Mapping[Key, int] = {(0x60C2, 1): 1, (0x60C2, 2): -3, MODE: CYCLIC, MODE_DISPLAY: CYCLIC}
+"""What a drive works with that lacks the object: it interpolates over the usual cycle of 1 ms, in
+the only mode that it has."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,6 +52,8 @@ def dictionary_of(node: NodeConfig, sheet: DataSheet | None = None) -> Dictionar
     if sheet is None:
         own |= {key: _number(OBJECTS[key]) + node.node_id for key in (*RELATIVE, EMCY)}
         return Dictionary(entries=tuple(_with(OBJECTS.values(), own)))
+    if not sheet.has(MODE):
+        own[MODE_DISPLAY] = CYCLIC
     for key in sheet.relative:
         entry = sheet.objects[key]
         own.setdefault(key, _number(entry) + node.node_id)
@@ -61,8 +64,7 @@ def dictionary_of(node: NodeConfig, sheet: DataSheet | None = None) -> Dictionar
     )
     shown = {entry.key for entry in entries if isinstance(entry.default, int)}
     hidden = {key: _number(entry) for key, entry in OBJECTS.items() if key not in shown}
-    for other in (OWN_WAY, {} if (0x6060, 0) in shown else MODE_OF_ITS_OWN):
-        hidden |= {key: value for key, value in other.items() if key not in shown}
+    hidden |= {key: value for key, value in OWN_WAY.items() if key not in shown}
     warmth = node.temperature_object
     return Dictionary(
         entries=entries,

@@ -1,6 +1,7 @@
 """Configuration of a bus: nodes, their identity, process data and units, as frozen values."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -163,15 +164,16 @@ class NodeConfig:
 
     def rpdo_id(self, pdo: PdoConfig) -> int:
         """COB-ID of an RPDO."""
-        return _given(pdo, RPDO_BASES[pdo.number - 1] + self.node_id)
+        return _identifier(pdo, RPDO_BASES, self.node_id)
 
     def tpdo_id(self, pdo: PdoConfig) -> int:
         """COB-ID of a TPDO."""
-        return _given(pdo, TPDO_BASES[pdo.number - 1] + self.node_id)
+        return _identifier(pdo, TPDO_BASES, self.node_id)
 
 
-def _given(pdo: PdoConfig, predefined: int) -> int:
-    return predefined if pdo.cob_id is None else pdo.cob_id
+def _identifier(pdo: PdoConfig, bases: Sequence[int], node_id: int) -> int:
+    """Return the COB-ID that is given, else that of the predefined connection set."""
+    return bases[pdo.number - 1] + node_id if pdo.cob_id is None else pdo.cob_id
 
 
 NOT_IN_FILES = "not in files"

@@ -88,9 +88,7 @@ class Outcome:
         if not self.agrees:
             if not row.instead and self.missing:
                 return None
-            lost = "not protected by " if row.need is Need.PROTECTION else "without "
-            instead = f"; instead: {row.instead}" if row.instead else ""
-            return f"{self.name}: {self.why}; {lost}{row.purpose}{instead}"
+            return f"{self.name}: {self.why}; {row.loss}"
         if self.there in (None, self.parameter.value) or not row.instead:
             return None
         return f"{self.name}: wanted {self.parameter.value}, the drive holds {self.there}"

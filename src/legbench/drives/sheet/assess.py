@@ -5,12 +5,13 @@ from dataclasses import dataclass
 from enum import Enum
 
 from legbench.drives.protocol.datatypes import SHORT_NAMES, DataType
-from legbench.drives.protocol.objects import Access, name_of
+from legbench.drives.protocol.objects import Access, Key, name_of
 from legbench.drives.protocol.pdo import Mapped
 from legbench.drives.setup.config import BusConfig, NodeConfig, PdoConfig
 from legbench.drives.setup.master_watch import Means, means_of
 from legbench.drives.setup.needs import MAPPINGS, Need
 from legbench.drives.setup.outcome import Outcome, held_by
+from legbench.drives.setup.taken import not_given
 from legbench.drives.sheet.data_sheet import DataSheet
 from legbench.drives.sheet.predict import predict
 
@@ -75,13 +76,14 @@ def assess(
     """
     outcomes = predict(sheet, bus, node)
     written = [entry for entry in outcomes if not _is_mapping(entry)]
+    unused = tuple(_unused(sheet, {entry.parameter.key for entry in outcomes}))
     lost = [entry.line for entry in outcomes if entry.passes and entry.line is not None]
     reads = [finding for finding in _reads(sheet) if finding.state is State.LACKS]
     return Assessment(
         node=node.name,
-        findings=(*_cyclic(sheet), *_reads(sheet), *map(_finding, written)),
+        findings=(*_cyclic(sheet), *_reads(sheet), *map(_finding, written), *unused),
         problems=tuple(_problems(sheet, node, outcomes)),
-        unprotected=(*lost, *(f"{one.object}: {one.remark}" for one in reads)),
+        unprotected=(*lost, *(f"{one.object}: {one.remark}" for one in (*reads, *unused))),
         means=means_of(bus, node, speed=speed, held=held_by(outcomes)),
         outcomes=outcomes,
     )
@@ -108,6 +110,19 @@ def _finding(entry: Outcome) -> Finding:
 
 def _nothing_lost(entry: Outcome) -> str:
     return "may be missing, nothing is lost" if entry.missing and entry.passes else ""
+
+
+def _unused(sheet: DataSheet, written: set[Key]) -> Iterator[Finding]:
+    """Yield the protections that the bus file gives no value for: whether the drive has them."""
+    for key, row in not_given(written):
+        has = sheet.has(key)
+        why = "the bus file gives no value" if has else "the drive has no such object"
+        yield Finding(
+            object=name_of(*key),
+            need=row.need.value,
+            state=State.HAS if has else State.LACKS,
+            remark=f"{why}; {row.loss}",
+        )
 
 
 def _cyclic(sheet: DataSheet) -> Iterator[Finding]:

@@ -148,8 +148,6 @@ def _node(proposal: Proposal, place: int, node_id: int) -> Iterator[str]:
         entry = format_object(proposal.temperature)
         yield f'# temperature_object = "{entry}"  # {MARK}: its scale and its place'
         yield f"# temperature_scale = 0.1  # {MARK} [deg C a count]"
-    if not sheet.writable((0x1016, 1)):
-        yield "heartbeat_consumer = false  # no 1016h: a deadline_ms stops it, if it has one"
     if place < len(SOFT_LIMITS) and all(sheet.writable((0x607D, sub)) for sub in (1, 2)):
         low, high = SOFT_LIMITS[place]
         yield f"soft_limits = [{low}, {high}]  # {MARK}: of the motor, in the drive itself [rad]"
