@@ -196,7 +196,7 @@ class Theatre:
 
         with (
             mock.patch.object(can_open, "emulate", bench),
-            mock.patch.object(can_plant, "STILL_PATIENCE", STILL_CYCLES),
+            mock.patch.object(can_plant, "STILL_PATIENCE_MS", STILL_CYCLES),
             mock.patch.object(landing, "STILL_TIME", STILL_TIME),
             mock.patch.object(landing, "PATIENCE", PATIENCE),
             mock.patch.object(loop, "_cycle", cycling),

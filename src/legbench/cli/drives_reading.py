@@ -80,7 +80,8 @@ class Scan:
             for node in found:
                 print(
                     f"node {node.node_id:3d}  vendor {node.vendor:#010x}  product "
-                    f"{node.product:#010x}  serial {node.serial}  revision {node.revision}  "
+                    f"{node.product:#010x}  serial {_told(node.serial)}  revision "
+                    f"{_told(node.revision)}  "
                     f"{node.verdict}"
                 )
         missing = sorted(names - {node.verdict for node in found})
@@ -109,10 +110,10 @@ class Status:
             heat = "" if node.temperature is None else f", {node.temperature:.1f} deg C"
             print(f"{node.name} (node {node.node_id}): {node.statusword}")
             print(f"  mode {node.mode}, error {node.error}{heat}")
-            print(
-                f"  motor {node.motor_pos:+.4f} rad ({node.motor_counts} counts), "
-                f"link {node.link_pos:+.4f} rad ({node.link_counts} counts)"
-            )
+            second = ", no second encoder"
+            if node.link_pos is not None:
+                second = f", link {node.link_pos:+.4f} rad ({node.link_counts} counts)"
+            print(f"  {node.side} {node.motor_pos:+.4f} rad ({node.motor_counts} counts){second}")
         return 0
 
 
@@ -167,3 +168,8 @@ class Budget:
         check_load(config)
         check_together(config, limits, stops=joint_ranges(bench.leg()))
         return 0
+
+
+def _told(number: int | None) -> str:
+    """A number of the identity object, or that a drive tells none."""
+    return "not told" if number is None else str(number)

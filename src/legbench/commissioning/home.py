@@ -111,7 +111,7 @@ def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20
         master.await_end(timeout)
     up.lookout.rest()
     sdo.put(0x6060, 0, I8, Mode.CYCLIC_SYNCHRONOUS_POSITION)
-    after = sdo.get_int(0x6064, 0, I32)
+    after = up.position(node)
     return Homed(node=node.name, method=method, before_counts=before, after_counts=after)
 
 

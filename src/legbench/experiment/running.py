@@ -16,7 +16,7 @@ from legbench.interrupts import StopFlag, shielded
 from legbench.loop import Outcome, Progress, run
 from legbench.mjcf import model_text
 from legbench.onlooker import Onlooker
-from legbench.plant.start import PERIOD, Start
+from legbench.plant.start import Start
 from legbench.plants import Leg, OpenPlant, open_plant
 from legbench.recording.memory import MemoryRun
 from legbench.recording.reader import Recording
@@ -50,7 +50,8 @@ class Prepared:
 
     def manifest(self, folder: Path | None) -> dict[str, Any]:
         """What the run has to say of itself in `folder`; raises as `manifest_of`."""
-        return manifest_of(self.experiment, self.start, self.xml, self.opened.facts, folder)
+        period = self.opened.plant.period
+        return manifest_of(self.experiment, self.start, self.xml, period, self.opened.facts, folder)
 
 
 def record(
@@ -148,7 +149,7 @@ def _driven(
         outcome = run(
             opened.plant,
             ready.controller,
-            round(ready.experiment.duration / PERIOD),
+            max(1, round(ready.experiment.duration / opened.plant.period)),
             clock=clock or opened.clock,
             sink=writer,
             stop=stop,
@@ -156,7 +157,7 @@ def _driven(
         )
     except BaseException as error:
         opened.plant.close()
-        _tell(writer, opened, onlookers, writer.rows * PERIOD)
+        _tell(writer, opened, onlookers, writer.rows * opened.plant.period)
         _add_trouble(error, opened.trouble())
         raise
     return _end(writer, opened, onlookers, outcome)

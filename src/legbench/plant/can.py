@@ -18,10 +18,10 @@ VELOCITY_BANDWIDTH = 200.0
 """Corner frequency of the velocity estimate [Hz]."""
 STILL_SPEED = 0.05
 """A leg at rest moves slower than this [rad/s]."""
-STILL_CYCLES = 100
-"""Number of cycles for which the leg must rest before a run begins."""
-STILL_PATIENCE = 5000
-"""Number of cycles after which a run begins anyway; a leg that swings for long is no fault."""
+STILL_TIME_MS = 100
+"""Time for which the leg must rest before a run begins [ms]."""
+STILL_PATIENCE_MS = 5000
+"""Time after which a run begins anyway [ms]; a leg that swings for long is no fault."""
 
 
 @final
@@ -91,11 +91,11 @@ class CanPlant(AbstractPlant):
         if not self._read_only:
             sample = self.link.move_to(self._start.motor_pos.tolist(), self._speed)
         self._velocity.reset(sample.time_ns, sample.link_pos)
-        still = 0
-        for _ in range(STILL_PATIENCE):
+        still, cycles_in = 0, self._session.config.cycles_in
+        for _ in range(cycles_in(STILL_PATIENCE_MS)):
             seen = self._observe(self._exchange(self._start.motor_pos))
             still = still + 1 if np.max(np.abs(seen.joint_vel)) < STILL_SPEED else 0
-            if still >= STILL_CYCLES:
+            if still >= cycles_in(STILL_TIME_MS):
                 break
         sample = self._exchange(self._start.motor_pos)
         self.link.shortfall.restart()

@@ -12,8 +12,8 @@ from legbench.drives.master.session import Session
 from legbench.drives.setup.bus_file import load_bus
 from legbench.drives.setup.checks import check_together
 from legbench.drives.setup.config import BusConfig
+from legbench.drives.setup.exchange import check_budget
 from legbench.drives.setup.waivers import describe_waivers
-from legbench.drives.setup.wire import check_load
 from legbench.drives.transport.lock import ChannelLock
 from legbench.drives.transport.open_bus import adapter_of, open_bus
 from legbench.drives.transport.realtime import Granted
@@ -31,6 +31,10 @@ from legbench.plant.opening import Leg, OpenPlant
 from legbench.plant.start import PERIOD
 from legbench.servo import ServoConfig
 
+LEG_PERIOD_NS = round(1e9 * PERIOD)
+"""Period of the leg on the shafts of emulated drives [ns]."""
+RUN_PERIODS_US = (1000, 2000, 4000)
+"""Periods with which a leg is led [us]: whole periods of the simulated leg, which moves each."""
 IDLE_POS = (-0.3, 0.3)
 """Motors of emulated drives that nothing hangs on: a knee that every leg can have [rad]."""
 
@@ -66,9 +70,12 @@ def open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
     config = load_bus(choice.bus)
     if len(config.nodes) != 2:
         raise ConfigError(f"{choice.bus}: {len(config.nodes)} nodes; a leg has 2")
-    if config.period != PERIOD:
-        raise ConfigError(f"{choice.bus}: period_us is {config.period_us}; runs need 1000")
-    check_load(config.at(choice.bitrate))
+    if config.period_us not in RUN_PERIODS_US:
+        raise ConfigError(
+            f"{choice.bus}: period_us is {config.period_us} us; a run needs "
+            f"{', '.join(map(str, RUN_PERIODS_US))} us"
+        )
+    check_budget(config.at(choice.bitrate))
     if choice.limits is None:
         limits = limits_for(choice.bus.parent / LIMITS_NAME, leg.design)
     else:
@@ -170,6 +177,7 @@ def _emulated(config: BusConfig, choice: CanChoice, leg: Leg | None) -> Network:
         config,
         [Behaviour(start_pos=motor) for motor in motors],
         body=EmulatedLeg(leg.design, leg.options, leg.start),
+        body_period_ns=LEG_PERIOD_NS,
         faults=choice.faults,
         configured=choice.read_only,
     )

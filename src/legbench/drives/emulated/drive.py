@@ -6,6 +6,7 @@ from typing import final
 
 from legbench.drives.emulated.axis import SYNC_MISSING, Axis
 from legbench.drives.emulated.behaviour import Behaviour
+from legbench.drives.emulated.dictionary import dictionary_of
 from legbench.drives.emulated.heartbeats import HeartbeatConsumer
 from legbench.drives.emulated.identity import write_identity
 from legbench.drives.emulated.process_data import LAST_SYNCHRONOUS, ProcessData
@@ -26,9 +27,10 @@ from legbench.drives.protocol.sdo import Abort
 from legbench.drives.protocol.sdo_server import SdoServer
 from legbench.drives.setup.config import NodeConfig, Parameter
 
+WARM, HOT = 25.0, 90.0
+"""Temperatures of a drive that is well, and of one that is not [deg C]."""
 UNDER_VOLTAGE, OVER_TEMPERATURE = 0x3220, 0x4310
 HEARTBEAT_LOST, PDO_SHORT, PDO_LONG, SYNC_LENGTH, RPDO_LATE = 0x8130, 0x8210, 0x8220, 0x8240, 0x8250
-TARGET = (0x607A, 0)
 _ORDERS = {
     NmtCommand.START: NmtState.OPERATIONAL,
     NmtCommand.STOP: NmtState.STOPPED,
@@ -56,12 +58,19 @@ class EmulatedDrive:
         self._node, self._behaviour, self._kept = node, behaviour or Behaviour(), kept
         self.node_id = node.node_id
         self._random = random.Random(self._behaviour.seed * LAST_NODE + node.node_id)
-        self._store = ObjectStore(OBJECTS.values(), self._check, self._written)
+        self._store = ObjectStore(
+            dictionary_of(node, self._behaviour),
+            self._check,
+            self._written,
+            internal=OBJECTS.values(),
+            lacking=self._behaviour.lacking,
+        )
         self._values = self._store.values
         write_identity(self._values, self._node)
         self.axis = Axis(node, self._behaviour, self._values)
-        self._pdos = ProcessData(self._store)
-        self._sdo = SdoServer(self._store.read, self._store.write)
+        self._pdos = ProcessData(self._store, self._behaviour)
+        self._target = node.target_object.key
+        self._sdo = SdoServer(self._store.read, self._store.write, self._behaviour.sdo_answers)
         self.state = NmtState.BOOT_UP
         self._now_ns = 0
         self._tick_ns = 0
@@ -75,6 +84,7 @@ class EmulatedDrive:
         self._recall()
 
     def _recall(self) -> None:
+        self._warm(WARM)
         for parameter in self._kept:
             entry = self._store.entry(parameter.key)
             if entry is not None:
@@ -152,9 +162,16 @@ class EmulatedDrive:
         self._now_ns = now_ns
         self.axis.alarms.hold(code)
         if code == OVER_TEMPERATURE:
-            self._values[TEMPERATURE, 0] = 900
+            self._warm(HOT)
         self.axis.fault(code)
         self._forward()
+
+    def _warm(self, celsius: float) -> None:
+        """Show a temperature [deg C], in the object that the bus file names, too."""
+        self._values[TEMPERATURE, 0] = round(10.0 * celsius)
+        entry = self._node.temperature_object
+        if entry is not None:
+            self._store.show(entry.key, celsius / self._node.temperature_scale)
 
     def untrip(self, code: int) -> None:
         """Remove the cause of an error; a fault reset is possible again."""
@@ -189,8 +206,8 @@ class EmulatedDrive:
                 self._pdos.rebuild()
         elif key[0] == 0x1016:
             self._heartbeats.clear()
-        elif key[0] >= 0x6000:
-            if key == TARGET:
+        elif key[0] >= 0x6000 or key == self._target:
+            if key == self._target:
                 self._fresh = True
             self.axis.written(key, self._now_ns)
 

@@ -12,6 +12,6 @@ def write_identity(values: MutableMapping[Key, int], node: NodeConfig) -> None:
     values[0x1018, 1], values[0x1018, 2] = identity.vendor, identity.product
     values[0x1018, 3], values[0x1018, 4] = identity.revision or 0, identity.serial or 0
     values[0x1014, 0] = 0x80 + node_id
-    for base in (0x1400, 0x1800):
-        for number in range(4):
-            values[base + number, 1] += node_id
+    for index, sub in tuple(values):
+        if sub == 1 and any(base <= index < base + 0x200 for base in (0x1400, 0x1800)):
+            values[index, sub] += node_id

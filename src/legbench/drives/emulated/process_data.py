@@ -2,14 +2,17 @@
 
 from typing import final
 
+from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.store import ObjectStore
 from legbench.drives.errors import CodecError, SdoAbortError
 from legbench.drives.protocol.frame import COB_INVALID, COB_MASK, Frame
-from legbench.drives.protocol.objects import MAX_MAPPED, PDO_COUNT, Access, Key
+from legbench.drives.protocol.objects import MAX_MAPPED, Access, Key
 from legbench.drives.protocol.pdo import Mapped, PdoMap, split_word
 from legbench.drives.protocol.sdo import Abort
 
 RPDO, TPDO = 0x1400, 0x1800
+LAST_PDO_OBJECT = 0x1C00
+"""First index beyond the objects of the PDOs (CiA 301, table 70)."""
 LAST_SYNCHRONOUS = 240
 _EVENT_TYPES = (254, 255)
 
@@ -40,8 +43,10 @@ class ProcessData:
         repeats: whether every TPDO repeats itself bit for bit.
     """
 
-    def __init__(self, store: ObjectStore) -> None:
-        self._store = store
+    def __init__(self, store: ObjectStore, behaviour: Behaviour | None = None) -> None:
+        how = behaviour or Behaviour()
+        self._store, self._fixed = store, how.fixed_mapping
+        self._counts = {RPDO: how.rpdos, TPDO: how.tpdos}
         self.rpdos: dict[int, Pdo] = {}
         self.tpdos: list[Pdo] = []
         self.repeats = False
@@ -49,7 +54,7 @@ class ProcessData:
     @staticmethod
     def owns(key: Key) -> bool:
         """Whether an object describes a PDO."""
-        return RPDO <= key[0] < TPDO + 0x200 + PDO_COUNT
+        return RPDO <= key[0] < LAST_PDO_OBJECT
 
     def check(self, key: Key, value: int) -> Abort | None:
         """Abort code that refuses a value for a PDO's object, if any (CiA 301, 7.5.2.36)."""
@@ -59,6 +64,8 @@ class ProcessData:
         exists = not self._store.values[comm, 1] & COB_INVALID
         if not mapping:
             return self._check_comm(comm, sub, value, exists)
+        if self._fixed:
+            return None if value == self._store.values[key] else Abort.UNSUPPORTED_ACCESS
         if exists:
             return Abort.DEVICE_STATE
         if sub == 0:
@@ -105,9 +112,9 @@ class ProcessData:
     def rebuild(self) -> None:
         """Read the PDOs' objects again, after one of them was written."""
         old = {pdo.cob_id: pdo for pdo in (*self.rpdos.values(), *self.tpdos)}
-        found = [self._build(RPDO + number, old) for number in range(PDO_COUNT)]
+        found = [self._build(RPDO + number, old) for number in range(self._counts[RPDO])]
         self.rpdos = {pdo.cob_id: pdo for pdo in found if pdo is not None}
-        found = [self._build(TPDO + number, old) for number in range(PDO_COUNT)]
+        found = [self._build(TPDO + number, old) for number in range(self._counts[TPDO])]
         self.tpdos = [pdo for pdo in found if pdo is not None]
 
     def _build(self, comm: int, old: dict[int, Pdo]) -> Pdo | None:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable
 from typing import final
 
 from legbench.drives.errors import CodecError
-from legbench.drives.protocol.datatypes import Value, pack, range_of, size_of, unpack
+from legbench.drives.protocol.datatypes import DataType, Value, pack, range_of, size_of, unpack
 from legbench.drives.protocol.objects import Access, Key, ObjectEntry
 from legbench.drives.protocol.sdo import Abort, abort_error
 
@@ -21,8 +21,27 @@ class ObjectStore:
         values: the numbers, for the drive's own use.
     """
 
-    def __init__(self, entries: Iterable[ObjectEntry], check: Check, written: Written) -> None:
+    def __init__(
+        self,
+        entries: Iterable[ObjectEntry],
+        check: Check,
+        written: Written,
+        *,
+        internal: Iterable[ObjectEntry] = (),
+        lacking: Abort = Abort.NO_OBJECT,
+    ) -> None:
+        """Hold the power-on values.
+
+        Args:
+            entries: objects that there are.
+            check: asked before a value is taken.
+            written: told of every value that was taken.
+            internal: objects whose values the drive itself uses, whether others see them or not.
+            lacking: code that refuses what is not there; that of the standard for a sub-index.
+        """
         self._entries = {entry.key: entry for entry in entries}
+        self._internal = {entry.key: entry for entry in internal} | self._entries
+        self._lacking = lacking
         self._indices = {index for index, _ in self._entries}
         self._check, self._written = check, written
         self.values: dict[Key, int] = {}
@@ -31,7 +50,7 @@ class ObjectStore:
 
     def load_defaults(self) -> None:
         """Set every object to its power-on default."""
-        for key, entry in self._entries.items():
+        for key, entry in self._internal.items():
             if isinstance(entry.default, int):
                 self.values[key] = entry.default
             else:
@@ -75,14 +94,20 @@ class ObjectStore:
         self.values[entry.key] = value
         self._written(entry.key)
 
-    def show(self, key: Key, value: int) -> None:
-        """Publish an actual value, saturated to what its object holds."""
-        low, high = range_of(self._entries[key].kind)
-        self.values[key] = min(max(value, low), high)
+    def show(self, key: Key, value: float) -> None:
+        """Publish a measured value, rounded and saturated to what its object holds."""
+        kind = self._internal[key].kind
+        if kind is DataType.REAL32:
+            self._texts[key] = float(value)
+            self.values.pop(key, None)
+            return
+        low, high = range_of(kind)
+        self.values[key] = min(max(round(value), low), high)
 
     def _known(self, index: int, sub: int) -> ObjectEntry:
         entry = self._entries.get((index, sub))
         if entry is None:
             known = index in self._indices
-            raise abort_error(Abort.NO_SUB_INDEX if known else Abort.NO_OBJECT, index, sub)
+            usual = known and self._lacking is Abort.NO_OBJECT
+            raise abort_error(Abort.NO_SUB_INDEX if usual else self._lacking, index, sub)
         return entry

@@ -67,7 +67,7 @@ class Ending(Lead):
             if self._read_only or (not self._leads and self._led_by_another(shield)):
                 self.state = LinkState.STOPPED
             else:
-                self._note(StopLadder(self.cycle, shield.hold).run())
+                self._note(StopLadder(self.cycle, shield.hold, self._config.cycles_in).run())
 
     def close(self) -> None:
         """Stop, leave the drives parked in pre-operational, release the channel; raises no error.

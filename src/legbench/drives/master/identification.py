@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 
-from legbench.drives.errors import DriveError
+from legbench.drives.errors import DriveError, SdoAbortError
 from legbench.drives.master.sdo_port import SdoPort
 from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.setup.config import BusConfig, Identity, NodeConfig
@@ -15,9 +15,21 @@ U32 = DataType.UNSIGNED32
 
 
 def read_identity(sdo: SdoPort) -> Identity:
-    """Read the identity object of a node (1018h); raises as `SdoPort.read` does."""
-    vendor, product, revision, serial = (sdo.get_int(0x1018, sub, U32) for sub in range(1, 5))
-    return Identity(vendor=vendor, product=product, revision=revision, serial=serial)
+    """Read the identity object of a node (1018h), as far as it has one (CiA 301, 7.5.2.20).
+
+    Raises:
+        NoAnswerError, BusError: as `SdoPort.read`.
+    """
+    vendor, product, revision, serial = (_number(sdo, sub) for sub in range(1, 5))
+    return Identity(vendor=vendor or 0, product=product or 0, revision=revision, serial=serial)
+
+
+def _number(sdo: SdoPort, sub: int) -> int | None:
+    """One number of the identity object, none where the drive refuses it."""
+    try:
+        return sdo.get_int(0x1018, sub, U32)
+    except SdoAbortError:
+        return None
 
 
 def identify(
@@ -59,6 +71,12 @@ def _compare(node: NodeConfig, found: Mapping[int, Identity], bus: BusConfig) ->
         value, real = getattr(wanted, name), getattr(there, name)
         if value is None or value == real:
             continue
+        if real is None:
+            raise DriveError(
+                f"node {node.node_id} ('{node.name}') tells no {name} (1018h), expected is "
+                f"{value:#x}; leave {name} out of the bus file: two drives alike are then told "
+                "apart by their node id alone"
+            )
         hint = "correct the bus file if this is the right drive"
         for other in bus.nodes:
             at = found.get(other.node_id)

@@ -26,7 +26,7 @@ from legbench.drives.master.sample import Sample, sample_of
 from legbench.drives.master.tick import Tick
 from legbench.drives.protocol.cia402 import Goal
 from legbench.drives.setup.config import BusConfig, check_start_speed
-from legbench.drives.setup.wire import check_load
+from legbench.drives.setup.exchange import check_budget
 from legbench.drives.transport.lock import ChannelLock
 from legbench.drives.transport.open_bus import timebase_of
 from legbench.drives.transport.timebase import Timebase
@@ -76,7 +76,7 @@ class Link(Opening):
         Raises:
             ConfigError: the bus cannot carry the schedule.
         """
-        check_load(config)
+        check_budget(config)
         port = Port(bus, timebase or timebase_of(bus), listener)
         lock = lock or ChannelLock(str(bus.channel_info))
         super().__init__(port, config, limits or SafetyLimits(), lock, read_only=read_only)

@@ -19,10 +19,10 @@ from legbench.drives.protocol.nmt import NmtCommand, nmt_frame
 from legbench.drives.setup.config import BusConfig
 from legbench.errors import PlantFault
 
-SETTLE_PATIENCE = 2000
-"""Number of cycles within which process data has to become regular."""
-ENABLE_PATIENCE = 2000
-"""Number of cycles within which all drives have to be enabled."""
+SETTLE_PATIENCE_MS = 2000
+"""Time within which process data has to become regular [ms]."""
+ENABLE_PATIENCE_MS = 2000
+"""Time within which all drives have to be enabled [ms]."""
 STILL_RANGE = 0.02
 """Largest motion of a motor while it is enabled; beyond it the start-up ends [rad]."""
 IGNORE_PATIENCE = 5
@@ -46,7 +46,7 @@ class StartUp:
                 self._port.send_frame(nmt_frame(NmtCommand.START, node.node_id))
         self._cycle.begin()
         regular = 0
-        for _ in range(SETTLE_PATIENCE):
+        for _ in range(self._config.cycles_in(SETTLE_PATIENCE_MS)):
             last = tick()
             regular = regular + 1 if last.complete else 0
             self.idle()
@@ -55,7 +55,7 @@ class StartUp:
                 return last
         missing = [axis.node.name for axis in self._cycle.axes if not axis.fresh]
         raise DriveError(
-            f"no regular process data within {SETTLE_PATIENCE} cycles; missing: "
+            f"no regular process data within {SETTLE_PATIENCE_MS} ms; missing: "
             f"{', '.join(missing) or 'now and then'}; look at the bus load and the mapping"
         )
 
@@ -98,12 +98,12 @@ class StartUp:
         refused: list[AxisLink] = []
         stood = [axis.motor_pos for axis in axes]
         ignored = 0
-        for _ in range(ENABLE_PATIENCE):
+        for _ in range(self._config.cycles_in(_patience_ms(axes))):
             last = tick()
             if goal is Goal.ENABLED:
                 ignored = ignored + 1 if any(map(_ignores, axes)) else 0
                 _check_still(axes, stood, ignored)
-            if all(_there(axis.machine.goal, axis.statusword) for axis in axes):
+            if all(map(_there, axes)):
                 if goal is not Goal.ENABLED:
                     for axis in axes:
                         axis.machine.seek(Goal.DISABLED)
@@ -113,18 +113,34 @@ class StartUp:
             refused = [axis for axis in axes if axis.machine.refused]
             if refused:
                 break
-        behind = [axis for axis in axes if not _there(axis.machine.goal, axis.statusword)]
+        behind = [axis for axis in axes if not _there(axis)]
         slow = (refused or behind or list(axes))[0]
         raise DriveError(
             f"drive '{slow.node.name}' (node {slow.node.node_id}) does not {words}: "
-            f"{describe_statusword(slow.statusword)}"
+            f"{describe_statusword(slow.statusword)}{_why_not(slow)}"
         )
+
+
+def _patience_ms(axes: Sequence[AxisLink]) -> int:
+    """Time within which drives have to reach a goal, that of showing their mode included [ms]."""
+    waits = [axis.node.quirks.mode_patience_ms for axis in axes if not axis.in_mode]
+    return ENABLE_PATIENCE_MS + max(waits, default=0)
+
+
+def _why_not(axis: AxisLink) -> str:
+    """What else is missing of an enabled drive: it has not shown its mode."""
+    if axis.in_mode or decode_state(axis.statusword) is not DriveState.OPERATION_ENABLED:
+        return ""
+    return (
+        f"; mode 8 is not shown in 6061h within {axis.node.quirks.mode_patience_ms} ms: raise "
+        "mode_patience_ms in [node.quirks]"
+    )
 
 
 def _ignores(axis: AxisLink) -> bool:
     """Whether a drive is enabled but does not follow its target."""
     enabled = decode_state(axis.statusword) is DriveState.OPERATION_ENABLED
-    return enabled and not axis.statusword & StatusBit.FOLLOWS_COMMAND
+    return enabled and axis.in_mode and axis.statusword & axis.follows != axis.follows
 
 
 def _check_still(axes: Sequence[AxisLink], stood: Sequence[float], ignored: int) -> None:
@@ -148,9 +164,10 @@ def _check_still(axes: Sequence[AxisLink], stood: Sequence[float], ignored: int)
             )
 
 
-def _there(goal: Goal, statusword: int) -> bool:
-    state = decode_state(statusword)
-    if goal is Goal.ENABLED:
-        following = bool(statusword & StatusBit.FOLLOWS_COMMAND)
-        return state is DriveState.OPERATION_ENABLED and following
+def _there(axis: AxisLink) -> bool:
+    """Whether a drive has reached its goal."""
+    state = decode_state(axis.statusword)
+    if axis.machine.goal is Goal.ENABLED:
+        following = axis.statusword & axis.follows == axis.follows
+        return state is DriveState.OPERATION_ENABLED and following and axis.in_mode
     return state is DriveState.SWITCH_ON_DISABLED

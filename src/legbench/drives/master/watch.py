@@ -16,7 +16,7 @@ class NodeWatch:
 
     Attributes:
         state: its NMT state, as last heard.
-        emergency: the first one since `arm`.
+        emergency: the first one since `arm` that is no warning.
         history: every emergency ever heard, the all-clear included.
         missed: cycles without process data since two in a row had theirs: every second answer is
             no answer, and may be an old one.
@@ -59,7 +59,8 @@ class NodeWatch:
         if emergency is None:
             return
         self.history.append(emergency)
-        if emergency.code != 0 and self.emergency is None:
+        warns = emergency.code in self._node.quirks.warnings
+        if emergency.code != 0 and not warns and self.emergency is None:
             self.emergency = emergency
 
     def cycle(self, *, complete: bool) -> None:

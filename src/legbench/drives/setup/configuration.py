@@ -41,7 +41,7 @@ def interpolation_time(period_us: int) -> tuple[int, int]:
 def configuration(bus: BusConfig, node: NodeConfig) -> Iterator[Parameter]:
     """Return all objects that a drive is sent in pre-operational, default values included."""
     value, exponent = interpolation_time(bus.period_us)
-    watched = bus.master_id << 16 | HEARTBEATS_MISSED * bus.master_heartbeat_ms
+    watched = bus.master_id << 16 | HEARTBEATS_MISSED * bus.beat_ms
     yield _parameter(0x1005, 0, U32, SYNC_ID)  # bit 30 clear: the drive is no SYNC producer
     yield _parameter(0x1006, 0, U32, bus.period_us)
     if node.heartbeat_consumer:

@@ -61,7 +61,7 @@ def means_of(
     late_ms = 1e-3 * config.period_us
     found: list[tuple[str, float]] = []
     if node.heartbeat_consumer:
-        time_ms = HEARTBEATS_MISSED * config.master_heartbeat_ms
+        time_ms = HEARTBEATS_MISSED * config.beat_ms
         found.append(("heartbeat consumer 1016h", time_ms))
     for pdo in node.rpdos if commands else ():
         leads = CONTROLWORD in pdo.objects or TARGET_POSITION in pdo.objects
