@@ -28,6 +28,7 @@ from legbench.drives.protocol.nmt import NmtCommand, NmtState, heartbeat_frame, 
 from legbench.drives.protocol.objects import name_of
 from legbench.drives.setup.config import NodeConfig
 from legbench.drives.setup.master_watch import check_master_watch
+from legbench.drives.setup.taken import check_taken
 from legbench.errors import ConfigError
 from legbench.interrupts import shielded
 
@@ -94,7 +95,7 @@ def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20
     up.unpower()
     up.glance()
     up.pre_operational()
-    up.configure(node)
+    check_taken(session.config, {node.name: up.configure(node)}, speed=FASTEST, commands=False)
     sdo = up.sdo(node)
     if method not in IN_PLACE:
         _check_speed(sdo, node)

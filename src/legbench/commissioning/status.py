@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 
-from legbench.drives.errors import SdoAbortError
 from legbench.drives.master.sdo_port import SdoPort
 from legbench.drives.master.session import Session
 from legbench.drives.protocol.cia402 import Mode, describe_statusword
@@ -66,6 +65,7 @@ def status(session: Session) -> list[NodeStatus]:
 def _status(sdo: SdoPort, node: NodeConfig) -> NodeStatus:
     motor, link = _counts(sdo, node)
     mode = sdo.get_int(0x6061, 0, DataType.INTEGER8)
+    code = sdo.find_int(0x603F, 0, DataType.UNSIGNED16)
     heat = node.temperature_object
     celsius = None
     if heat is not None:
@@ -79,7 +79,7 @@ def _status(sdo: SdoPort, node: NodeConfig) -> NodeStatus:
         node_id=node.node_id,
         statusword=describe_statusword(sdo.get_int(0x6041, 0, DataType.UNSIGNED16)),
         mode=MODES.get(mode, f"mode {mode}"),
-        error=_error(sdo),
+        error=_error(code),
         side=node.side.value,
         motor_pos=motor_pos,
         link_pos=link_pos,
@@ -89,10 +89,8 @@ def _status(sdo: SdoPort, node: NodeConfig) -> NodeStatus:
     )
 
 
-def _error(sdo: SdoPort) -> str:
-    """Error code 603Fh in words; not every drive has that object."""
-    try:
-        code = sdo.get_int(0x603F, 0, DataType.UNSIGNED16)
-    except SdoAbortError:
-        return "not told (no 603Fh)"
-    return "none" if code == 0 else f"{code:04X}h {MEANINGS.get(code, 'see the drive manual')}"
+def _error(code: int | None) -> str:
+    """Error code 603Fh in words; none stands for a drive that has no such object."""
+    if code is None:
+        return "not told"
+    return f"{code:04X}h {MEANINGS.get(code, 'see the drive manual')}" if code else "none"

@@ -62,6 +62,7 @@ def record(
     stop: StopFlag | None = None,
     progress: Progress | None = None,
     on_started: Callable[[Path], None] | None = None,
+    on_note: Callable[[str], None] | None = None,
 ) -> Finished:
     """Run an experiment, in virtual time by default, and leave a run folder under `out`.
 
@@ -77,6 +78,7 @@ def record(
         progress: told now and then how far the run is.
         on_started: told the run folder before the first cycle. Neither can end the run: the first
             failure of each is an event of the run, and it is not called again.
+        on_note: called with each line that a person should know before anything moves.
 
     Raises:
         ConfigError: settings that the leg or the plant refuses; nothing is written.
@@ -87,12 +89,15 @@ def record(
             written by then stays readable.
     """
     watching, starting = Onlooker("progress", progress), Onlooker("on_started", on_started)
+    noting = Onlooker("on_note", on_note)
     with _prepared(experiment) as ready:
+        for line in ready.opened.notes:
+            noting(line)
         manifest, realtime = ready.manifest(out / "run"), ready.opened.realtime
         with _recording(out, manifest, ready.name, realtime=realtime) as writer:
             _begin(writer, ready)
             starting(writer.path)
-            outcome = _driven(ready, writer, (starting, watching), clock, stop)
+            outcome = _driven(ready, writer, (noting, starting, watching), clock, stop)
     return Finished(path=writer.path, outcome=outcome)
 
 

@@ -41,6 +41,8 @@ class OpenPlant:
     """What paces it if nobody asks for another pace."""
     facts: dict[str, Any] = field(default_factory=dict)
     """What a run has to say of it."""
+    notes: tuple[str, ...] = ()
+    """What a person should know before anything moves, such as what does not protect the leg."""
     start_log: Callable[[Path], None] = _no_log
     """Begin to log into a run folder, such as raw frames."""
     events: Callable[[], dict[str, dict[str, Any]]] = dict

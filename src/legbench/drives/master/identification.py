@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 
-from legbench.drives.errors import DriveError, SdoAbortError
+from legbench.drives.errors import DriveError
 from legbench.drives.master.sdo_port import SdoPort
 from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.setup.config import BusConfig, Identity, NodeConfig
@@ -15,21 +15,11 @@ U32 = DataType.UNSIGNED32
 
 
 def read_identity(sdo: SdoPort) -> Identity:
-    """Read the identity object of a node (1018h), as far as it has one (CiA 301, 7.5.2.20).
-
-    Raises:
-        NoAnswerError, BusError: as `SdoPort.read`.
-    """
-    vendor, product, revision, serial = (_number(sdo, sub) for sub in range(1, 5))
-    return Identity(vendor=vendor or 0, product=product or 0, revision=revision, serial=serial)
-
-
-def _number(sdo: SdoPort, sub: int) -> int | None:
-    """One number of the identity object, none where the drive refuses it."""
-    try:
-        return sdo.get_int(0x1018, sub, U32)
-    except SdoAbortError:
-        return None
+    """Read the identity object of a node (1018h); raises as `SdoPort.read` does."""
+    vendor = sdo.get_int(0x1018, 1, U32)
+    # CiA 301 (7.5.2.19) demands the vendor alone; 0 stands for a product that is not told.
+    product, revision, serial = (sdo.find_int(0x1018, sub, U32) for sub in (2, 3, 4))
+    return Identity(vendor=vendor, product=product or 0, revision=revision, serial=serial)
 
 
 def identify(
@@ -59,7 +49,9 @@ def identify(
     for node in nodes:
         _compare(node, found, bus)
     for node in nodes:
-        if not sdo_of(node).get_int(0x6502, 0, U32) & CSP_BIT:
+        modes = sdo_of(node).find_int(0x6502, 0, U32)
+        # A drive that does not tell its modes is asked for this one, and has to show it (6061h).
+        if modes is not None and not modes & CSP_BIT:
             raise DriveError(
                 f"node {node.node_id} ('{node.name}') knows no cyclic synchronous position mode"
             )
@@ -73,9 +65,8 @@ def _compare(node: NodeConfig, found: Mapping[int, Identity], bus: BusConfig) ->
             continue
         if real is None:
             raise DriveError(
-                f"node {node.node_id} ('{node.name}') tells no {name} (1018h), expected is "
-                f"{value:#x}; leave {name} out of the bus file: two drives alike are then told "
-                "apart by their node id alone"
+                f"node {node.node_id} ('{node.name}') does not tell its {name} (1018h), expected "
+                f"is {value:#x}; leave {name} out of the bus file if this is the right drive"
             )
         hint = "correct the bus file if this is the right drive"
         for other in bus.nodes:

@@ -9,6 +9,7 @@ from legbench.drives.master.start_up import StartUp
 from legbench.drives.master.supervisor import Supervisor
 from legbench.drives.setup.config import BusConfig
 from legbench.drives.setup.master_watch import check_master_watch
+from legbench.drives.setup.taken import Outcomes, tells_heartbeat, unprotected
 from legbench.drives.transport.lock import ChannelLock
 from legbench.limits.safety import SafetyLimits
 
@@ -17,7 +18,11 @@ LISTEN_NS = 100_000_000
 
 
 class Opening(Ending):
-    """Base class of a link: what it does before process data begins and before anything moves."""
+    """Base class of a link: what it does before process data begins and before anything moves.
+
+    Attributes:
+        unprotected: what the drives lack or hold otherwise, a line each, once it is open.
+    """
 
     def __init__(
         self,
@@ -42,6 +47,7 @@ class Opening(Ending):
         self._supervisor = Supervisor(self.cycle, config, limits, port.timebase)
         self._start_up = StartUp(port, self.cycle, config, read_only=read_only)
         self._told: Listener | None = None
+        self.unprotected: tuple[str, ...] = ()
 
     def tell(self, listener: Listener) -> None:
         """Show every frame to a listener from now on, or from when the drives are configured.
@@ -66,8 +72,8 @@ class Opening(Ending):
         Raises:
             ConfigError: a drive would go on for too long without its master.
             BusError: the channel has a master, or the interface does not work.
-            DriveError: a drive is missing, is another one, or refuses its configuration; or, in
-                read-only, is not configured.
+            DriveError: a drive is missing, is another one, refuses what is required of it, or would
+                not be protected; or, in read-only, is not configured.
             PlantFault: in read-only, somebody else is about to lead the drives.
         """
         if self.state is not LinkState.NEW:
@@ -78,7 +84,8 @@ class Opening(Ending):
             else:
                 check_master_watch(self._config, speed=self._limits.command_speed)
                 self._hold()
-                prepare_to_move(self.bring_up, self._config)
+                speed = self._limits.command_speed
+                self._took(prepare_to_move(self.bring_up, self._config, speed=speed))
             read_temperatures(self.bring_up, self.cycle, self._config)
         except BaseException:
             self._let_go()
@@ -86,6 +93,12 @@ class Opening(Ending):
         self.state = LinkState.CONFIGURED
         if self._told is not None:
             self._port.listener = self._told
+
+    def _took(self, outcomes: Outcomes) -> None:
+        """Keep what drives lack, and watch for no heartbeat that a drive does not produce."""
+        self.unprotected = unprotected(outcomes)
+        for node, watch in zip(self._config.nodes, self.cycle.watches, strict=True):
+            watch.expects_heartbeat = tells_heartbeat(outcomes[node.name])
 
     def _prepare_to_look(self) -> None:
         """Prepare a read-only link: listen to another master's SYNC, or send SYNC if there is none.
@@ -105,7 +118,7 @@ class Opening(Ending):
             self._hold()
             self.bring_up.listen()
         self.bring_up.identify()
-        self.bring_up.refuse_differences()
+        self._took(self.bring_up.refuse_differences())
         if self.listening:
             return
         refuse_led(self.bring_up, self.cycle, self._config)

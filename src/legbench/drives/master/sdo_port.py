@@ -79,6 +79,19 @@ class SdoPort:
             raise DriveError(f"node {self.node_id}, {name_of(index, sub)} is no number")
         return value
 
+    def find_int(self, index: int, sub: int, kind: DataType) -> int | None:
+        """Value of a numeric object that a drive may do without; none where it cannot be read.
+
+        Raises:
+            NoAnswerError: the drive does not answer.
+            BusError: the bus does not work.
+            DriveError: the object has another type.
+        """
+        try:
+            return self.get_int(index, sub, kind)
+        except SdoAbortError:
+            return None
+
     def put(self, index: int, sub: int, kind: DataType, value: int) -> None:
         """Write the value of an object; raises as `read` does."""
         self.write(index, sub, pack(kind, value))

@@ -22,6 +22,7 @@ class NodeWatch:
             no answer, and may be an old one.
         lost_total: all cycles without process data.
         bad_total: process data of a wrong length.
+        expects_heartbeat: whether the drive produces one (1017h), which then must come.
     """
 
     def __init__(self, bus: BusConfig, node: NodeConfig, now_ns: int) -> None:
@@ -33,6 +34,7 @@ class NodeWatch:
         self.missed = 0
         self.lost_total = 0
         self.bad_total = 0
+        self.expects_heartbeat = True
         self._rebooted = False
         self._well = True
 
@@ -86,7 +88,7 @@ class NodeWatch:
                 "process data lost",
                 f"{who} sent no process data for {self.missed} cycles, the limit is {lost_frames}",
             )
-        if self._beat.lost(now_ns):
+        if self.expects_heartbeat and self._beat.lost(now_ns):
             late_ms = (now_ns - self._beat.last_ns) / 1e6
             return "heartbeat lost", f"{who}: no heartbeat for {late_ms:.0f} ms"
         state = self.state

@@ -5,7 +5,7 @@ import math
 from legbench.drives.setup.config import BusConfig
 from legbench.drives.setup.master_watch import stop_ms
 from legbench.limits.safety import SafetyLimits
-from legbench.limits.upper_ends import LIMIT_ENDS, MASTER_WATCH
+from legbench.limits.upper_ends import LIMIT_ENDS, MASTER_WATCH, QUICK_STOP_RAMP
 
 
 def describe_waivers(config: BusConfig | None, limits: SafetyLimits | None) -> tuple[str, ...]:
@@ -25,6 +25,8 @@ def describe_waivers(config: BusConfig | None, limits: SafetyLimits | None) -> t
 def _of_bus(name: str, config: BusConfig | None) -> str:
     if config is None:
         return ""
+    if name == QUICK_STOP_RAMP:
+        return "a drive may run on beyond the springs before a quick stop has ended"
     if name != MASTER_WATCH:
         return f"drives tell that they live every {config.heartbeat_ms} ms"
     latest = stop_ms(config)
