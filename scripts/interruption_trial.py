@@ -175,6 +175,7 @@ class Theatre:
             behaviours: list[Behaviour] | None = None,
             *,
             body: Callable[..., Any] = stiff_body,
+            body_period_ns: int | None = None,
             faults: tuple[Any, ...] = (),
             configured: bool = False,
         ) -> Network:
@@ -190,7 +191,14 @@ class Theatre:
                 Behaviour(start_pos=start, hard_stop=(start - reach, start + reach))
                 for start in starts
             ]
-            network = emulate(config, drives_, body=seen, faults=faults, configured=configured)
+            network = emulate(
+                config,
+                drives_,
+                body=seen,
+                body_period_ns=body_period_ns,
+                faults=faults,
+                configured=configured,
+            )
             witness.network = network
             return network
 

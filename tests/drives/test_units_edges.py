@@ -20,7 +20,7 @@ def axis(**changes: Any) -> AxisUnits:
         ("gear", (1e-4, 1e4), (0.99e-4, 1.01e4, 0.0, -1.0, math.nan)),
         ("offset_counts", (1 - (1 << 31), (1 << 31) - 1), (-(1 << 31), 1 << 31)),
         ("sign", (-1, 1), (0, 2, -2)),
-        ("bits", (16, 32), (8, 15, 17, 31, 33, 64)),
+        ("bits", (8, 16, 32, 64), (7, 15, 17, 31, 33, 63, 65, 128)),
     ],
 )
 def test_an_axis_takes_its_numbers_up_to_their_ends(

@@ -12,6 +12,7 @@ from legbench.drives.emulated.identity import write_identity
 from legbench.drives.emulated.process_data import LAST_SYNCHRONOUS, ProcessData
 from legbench.drives.emulated.store import ObjectStore
 from legbench.drives.protocol.cia402 import DriveState
+from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.frame import (
     HEARTBEAT_BASE,
     LAST_NODE,
@@ -23,12 +24,15 @@ from legbench.drives.protocol.frame import (
 )
 from legbench.drives.protocol.nmt import NmtCommand, NmtState, decode_nmt, heartbeat_frame
 from legbench.drives.protocol.objects import OBJECTS, TEMPERATURE, Key
+from legbench.drives.protocol.pdo import Mapped
 from legbench.drives.protocol.sdo import Abort
 from legbench.drives.protocol.sdo_server import SdoServer
 from legbench.drives.setup.config import NodeConfig, Parameter
 
 WARM, HOT = 25.0, 90.0
 """Temperatures of a drive that is well, and of one that is not [deg C]."""
+OWN_TEMPERATURE = Mapped(TEMPERATURE, 0, DataType.INTEGER16)
+"""Temperature in tenths of a degree, whatever a bus file takes them for."""
 UNDER_VOLTAGE, OVER_TEMPERATURE = 0x3220, 0x4310
 HEARTBEAT_LOST, PDO_SHORT, PDO_LONG, SYNC_LENGTH, RPDO_LATE = 0x8130, 0x8210, 0x8220, 0x8240, 0x8250
 _ORDERS = {
@@ -170,7 +174,7 @@ class EmulatedDrive:
         """Show a temperature [deg C], in the object that the bus file names, too."""
         self._values[TEMPERATURE, 0] = round(10.0 * celsius)
         entry = self._node.temperature_object
-        if entry is not None:
+        if entry is not None and entry != OWN_TEMPERATURE:
             self._store.show(entry.key, celsius / self._node.temperature_scale)
 
     def untrip(self, code: int) -> None:

@@ -62,7 +62,8 @@ def check_exchange(bus: BusConfig) -> None:
     """
     for one in exchanges(bus):
         where = "" if len(bus.channels) == 1 else f" on {one.channel}"
-        rate = f"{bus.bitrate} bit/s"
+        stated = "" if bus.stated_bitrate is None else f" ({bus.bitrate_text})"
+        rate = f"{bus.bitrate} bit/s{stated}"
         if one.answers_us > bus.deadline_us:
             raise ConfigError(
                 f"the last answer{where} may come {one.answers_us:.0f} us after SYNC at {rate}, "
