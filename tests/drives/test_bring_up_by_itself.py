@@ -233,7 +233,9 @@ def test_a_mode_that_lags_is_waited_for_50_times_10_ms(place: int) -> None:
             up.configure(node(place))
             assert lag_ms * MS <= it.time_ns - began[0] <= (lag_ms + 11) * MS
             continue
-        with pytest.raises(DriveError, match=r"stays in mode 6 .6061h. for 500 ms, asked for was 8"):
+        with pytest.raises(
+            DriveError, match=r"stays in mode 6 .6061h. for 500 ms, asked for was 8"
+        ):
             up.configure(node(place))
         # A look and a rest, fifty times, and the look that comes too late.
         assert it.time_ns - began[0] == 50 * (10 * MS + MS // 10) + MS // 10

@@ -8,6 +8,7 @@ from typing import Any
 
 from legbench.clock import AbstractClock
 from legbench.control import AbstractController, make_controller
+from legbench.control.needs import needs_of, run_on
 from legbench.errors import ConfigError, RecordingError
 from legbench.experiment.data import Experiment
 from legbench.experiment.manifest import guests_of, manifest_of
@@ -16,6 +17,7 @@ from legbench.interrupts import StopFlag, shielded
 from legbench.loop import Outcome, Progress, run
 from legbench.mjcf import model_text
 from legbench.onlooker import Onlooker
+from legbench.plant.opening import Needs
 from legbench.plant.start import Start
 from legbench.plants import Leg, OpenPlant, open_plant
 from legbench.recording.memory import MemoryRun
@@ -130,7 +132,15 @@ def _prepared(experiment: Experiment) -> Iterator[Prepared]:
     """Build the controller and open the plant of an experiment; it is closed in the end."""
     start = start_of(experiment)
     leg = Leg(
-        design=experiment.design, options=experiment.options, start=start, servo=experiment.servo
+        design=experiment.design,
+        options=experiment.options,
+        start=start,
+        servo=experiment.servo,
+        needs=Needs(
+            controller=experiment.controller.kind,
+            signals=needs_of(experiment.controller),
+            run_on=run_on,
+        ),
     )
     controller = make_controller(experiment.controller, targets_of(experiment))
     xml = model_text(experiment.design, experiment.options)

@@ -8,6 +8,7 @@ import numpy as np
 from legbench.drives.master.link import Link, LinkState, Sample
 from legbench.drives.master.session import Session
 from legbench.plant.abstract import AbstractPlant
+from legbench.plant.can_needs import known_of
 from legbench.plant.gone_drive import gone_drive
 from legbench.plant.landing import PATIENCE, STILL_RANGE, Landing, land
 from legbench.plant.start import Start
@@ -35,7 +36,9 @@ class CanPlant(AbstractPlant):
     the encoders' difference over the time between two SYNCs behind a first-order low-pass of
     200 Hz, 0.8 ms late; a drive whose answer is missing keeps its velocity. `applied_pos` is what
     the limits let through; in read-only, where nothing is commanded, it is where the motors are.
-    There is no truth. A command is seen two observations later: one cycle more than in `SimPlant`.
+    There is no truth. What a drive with one encoder does not tell is not a number, see
+    `drives.setup.encoders`. A command is seen two observations later: one cycle more than in
+    `SimPlant`.
 
     Attributes:
         link: the cyclic link.
@@ -132,6 +135,11 @@ class CanPlant(AbstractPlant):
         )
         if landing.rested or landing.interrupted:
             return None
+        if "joint_pos" not in known_of(self._session.config):
+            return (
+                "whether the leg rests is not known, as a link has no encoder; its power went "
+                f"{PATIENCE:g} s after it had been led to its rest posture"
+            )
         return (
             f"the leg still swung by more than {STILL_RANGE:g} rad after {PATIENCE:g} s in its "
             "rest posture; its power went then"

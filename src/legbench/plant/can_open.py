@@ -22,6 +22,7 @@ from legbench.limits.safety import SafetyLimits
 from legbench.plant.can import CanPlant
 from legbench.plant.can_choice import BUS_LOG, LIMITS_NAME, CanChoice
 from legbench.plant.can_events import bus_events
+from legbench.plant.can_needs import check_needs
 from legbench.plant.design_limits import joint_ranges, limits_events, limits_within
 from legbench.plant.emulated_leg import EmulatedLeg
 from legbench.plant.gone_drive import gone_drive
@@ -75,6 +76,8 @@ def open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
             f"{choice.bus}: period_us is {config.period_us} us; a run needs "
             f"{', '.join(map(str, RUN_PERIODS_US))} us"
         )
+    if not choice.read_only:
+        check_needs(config, leg.needs)
     check_budget(config.at(choice.bitrate))
     if choice.limits is None:
         limits = limits_for(choice.bus.parent / LIMITS_NAME, leg.design)

@@ -1,6 +1,6 @@
 """What a plant is opened with, and what belongs to a run on it besides the plant."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, runtime_checkable
@@ -13,6 +13,23 @@ from legbench.plant.start import Start
 from legbench.servo import ServoConfig
 
 
+def _nobody(known: Collection[str]) -> tuple[str, ...]:
+    """Nobody runs on a plant whose controllers are not known."""
+    return ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Needs:
+    """What the controller of a run needs of the plant."""
+
+    controller: str = ""
+    """Kind of the controller."""
+    signals: frozenset[str] = frozenset()
+    """Names of the measured signals that it cannot do without."""
+    run_on: Callable[[Collection[str]], tuple[str, ...]] = _nobody
+    """Kinds of the controllers that can run where only some signals are known."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Leg:
     """The leg that the plant is to be."""
@@ -21,6 +38,8 @@ class Leg:
     options: BuildOptions
     start: Start
     servo: ServoConfig
+    needs: Needs = field(default_factory=Needs)
+    """What its controller needs; by default nothing is asked for."""
 
 
 def _no_log(run: Path) -> None:

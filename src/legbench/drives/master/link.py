@@ -81,7 +81,12 @@ class Link(Opening):
         lock = lock or ChannelLock(str(bus.channel_info))
         super().__init__(port, config, limits or SafetyLimits(), lock, read_only=read_only)
         self._stiffness = tuple(float(value) for value in stiffness)
-        self._guard = Guard(self._limits, config.period)
+        self._guard = Guard(
+            self._limits,
+            config.period,
+            known=[node.knows for node in config.nodes],
+            two_encoders=self.cycle.two_encoders,
+        )
         self.skipped_total = 0
         self._last = Tick(0, 0, 0, 0, False)
         self._expected: list[tuple[float, ...]] = []
@@ -130,7 +135,7 @@ class Link(Opening):
             )
         sample = self._sample()
         self._check(sample)
-        self._guard.check_start(sample.motor_pos)
+        self._guard.check_start(self.led_pos)
         up.seek(Goal.ENABLED, self.cycle.axes, self._watched_tick, "become enabled")
         # The guard begins from the targets that the drives hold, not from their encoders.
         held = tuple(axis.target_pos for axis in self.cycle.axes)
@@ -273,7 +278,13 @@ class Link(Opening):
             temperature=sample.temperature,
             fresh=sample.fresh,
             elapsed=1 + sample.skipped,
+            led_pos=None if self.cycle.two_encoders else self.led_pos,
         )
+
+    @property
+    def led_pos(self) -> tuple[float, ...]:
+        """Positions of the encoders that the drives' loops are closed over [rad]."""
+        return tuple(axis.motor_pos for axis in self.cycle.axes)
 
     def _refuse_ended(self) -> None:
         if self.fault is not None:

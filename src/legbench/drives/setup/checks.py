@@ -6,6 +6,7 @@ from legbench.drives.setup.config import BusConfig
 from legbench.drives.setup.field_ranges import check_field_ranges
 from legbench.drives.setup.master_watch import check_master_watch
 from legbench.drives.setup.stopping import check_stopping
+from legbench.drives.setup.unknown import check_springs
 from legbench.errors import ConfigError
 from legbench.limits.safety import Range, SafetyLimits
 
@@ -40,6 +41,7 @@ def check_together(
     check_stopping(config, limits)
     check_field_ranges(config, limits, stops)
     if leads:
+        check_springs(config)
         check_master_watch(config, speed=limits.command_speed)
 
 

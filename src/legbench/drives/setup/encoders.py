@@ -23,16 +23,17 @@ def known_signals(side: Side, *, second: bool, torque: bool) -> frozenset[str]:
 
     With a second encoder the spring's torque is stiffness times the difference of both. With the
     drive's torque in its place it is that torque, and the side without an encoder lies beside the
-    other one by torque over stiffness.
+    other one by torque over stiffness. A drive whose position loop is closed over the link leads
+    no motor: its position is not among them.
 
     Args:
         side: side of the encoder of the position loop.
         second: there is another encoder on the other side.
         torque: the drive sends its torque.
     """
-    if second or torque:
-        return frozenset((MOTOR_POS, JOINT_POS, SPRING_TORQUE))
-    return frozenset((MOTOR_POS if side is Side.MOTOR else JOINT_POS,))
+    if side is Side.LINK:
+        return frozenset((JOINT_POS, SPRING_TORQUE) if torque else (JOINT_POS,))
+    return frozenset((MOTOR_POS, JOINT_POS, SPRING_TORQUE) if second or torque else (MOTOR_POS,))
 
 
 def check_encoder(name: str, axis: str, units: AxisUnits, entry: Mapped) -> None:
