@@ -1,10 +1,12 @@
 """The CiA 402 half of an emulated drive: controlword, modes, motion, statusword; pure."""
 
 from collections import deque
+from collections.abc import Sequence
 from typing import final
 
 from legbench.drives.emulated.alarms import Alarms
 from legbench.drives.emulated.behaviour import Behaviour
+from legbench.drives.emulated.dictionary import USUAL_LINKS
 from legbench.drives.emulated.homing import Homing, HomingState
 from legbench.drives.emulated.motion import Motion
 from legbench.drives.emulated.power import HALT, PowerStage
@@ -21,6 +23,7 @@ from legbench.drives.setup.units import wrap
 
 MODES = (Mode.NONE, Mode.HOMING, Mode.CYCLIC_SYNCHRONOUS_POSITION)
 FOLLOWING_ERROR, SETPOINTS_MISSING, SYNC_MISSING = 0x8611, 0xFF10, 0xFF11
+SHORT = (LINK_SHORT, 0)
 _ENABLED = DriveState.OPERATION_ENABLED
 _STATUS = int(StatusBit.REMOTE)
 
@@ -37,7 +40,15 @@ class Axis:
         warning: whether bit 7 of the statusword is set.
     """
 
-    def __init__(self, node: NodeConfig, behaviour: Behaviour, values: dict[Key, int]) -> None:
+    def __init__(
+        self,
+        node: NodeConfig,
+        behaviour: Behaviour,
+        values: dict[Key, int],
+        links: Sequence[Key] = USUAL_LINKS,
+    ) -> None:
+        """Turn the numbers of an object dictionary; `links` show the position of the link."""
+        self._links = tuple(links)
         self._node, self._behaviour, self._values = node, behaviour, values
         self.power = PowerStage(values)
         self.motion = Motion(node.motor, behaviour, values)
@@ -196,9 +207,10 @@ class Axis:
         values[0x60F4, 0] = wrap(round(motion.demand) - actual)
         if node.link is not None:
             link = self.sensors.link.show(self._link_counts)
-            values[0x60E4, 1] = wrap(link)
-            values[LINK_SHORT, 0] = wrap(link, 16)
-            values[node.link_object.key] = node.link.show(link)
+            for key in self._links:
+                own = key == node.link_object.key
+                short = 16 if key == SHORT else 32
+                values[key] = node.link.show(link) if own else wrap(link, short)
         rated = self._behaviour.rated_torque
         values[0x6077, 0] = _saturated(1000.0 * self._torque / rated, DataType.INTEGER16)
         if node.torque_object is not None:

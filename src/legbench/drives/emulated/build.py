@@ -3,12 +3,14 @@
 from collections.abc import Sequence
 
 from legbench.drives.emulated.behaviour import Behaviour
+from legbench.drives.emulated.dictionary import dictionary_of
 from legbench.drives.emulated.drive import EmulatedDrive
 from legbench.drives.emulated.faults import Fault
 from legbench.drives.emulated.network import Body, Network, stiff_body
 from legbench.drives.emulated.stuffing import Stuffing
 from legbench.drives.setup.config import BusConfig
 from legbench.drives.setup.configuration import configuration
+from legbench.drives.sheet.load import load_sheet
 from legbench.errors import ConfigError
 
 
@@ -25,6 +27,8 @@ def emulate(
 ) -> Network:
     """Build the emulated bus that a bus file describes, at its bitrate.
 
+    A drive whose node names a data sheet wears that dictionary.
+
     Args:
         bus: the bus.
         behaviours: one a drive; by default ordinary drives at position 0.
@@ -36,13 +40,20 @@ def emulate(
         configured: the drives have kept, over their last power-off, what the bus file says.
 
     Raises:
-        ConfigError: not one behaviour a drive.
+        ConfigError: not one behaviour a drive, or a data sheet that cannot be read.
+        MissingExtraError: a drive has a data sheet, and canopen is not installed.
     """
     chosen = [Behaviour() for _ in bus.nodes] if behaviours is None else list(behaviours)
     if len(chosen) != len(bus.nodes):
         raise ConfigError(f"{len(chosen)} behaviours for {len(bus.nodes)} drives")
+    sheets = {path: load_sheet(path) for path in {node.eds for node in bus.nodes} if path}
     drives = [
-        EmulatedDrive(node, how, tuple(configuration(bus, node)) if configured else ())
+        EmulatedDrive(
+            node,
+            how,
+            tuple(configuration(bus, node)) if configured else (),
+            dictionary_of(node, None if node.eds is None else sheets[node.eds]),
+        )
         for node, how in zip(bus.nodes, chosen, strict=True)
     ]
     return Network(

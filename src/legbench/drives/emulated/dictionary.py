@@ -1,72 +1,77 @@
-"""Object dictionary of an emulated drive: what it has, lacks, or holds in other types; pure."""
+"""Objects of an emulated drive: those of the profile, or those that a data sheet gives it."""
 
-from collections.abc import Iterable, Iterator
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 
-from legbench.drives.emulated.behaviour import Behaviour
-from legbench.drives.protocol.objects import OBJECTS, PDO_COUNT, Access, Key, ObjectEntry
-from legbench.drives.protocol.pdo import Mapped
+from legbench.drives.protocol.datatypes import DataType
+from legbench.drives.protocol.objects import LINK_SHORT, OBJECTS, TEMPERATURE, Key, ObjectEntry
 from legbench.drives.setup.config import NodeConfig
+from legbench.drives.sheet.data_sheet import DataSheet
 
-PDO_BASES = (0x1400, 0x1800)
-"""First communication objects of RPDOs and TPDOs; their mappings lie 200h above."""
+USUAL_LINKS: tuple[Key, ...] = ((0x60E4, 1), (LINK_SHORT, 0))
+"""Objects in which the usual drive shows the position of its link, in 32 and in 16 bits."""
+RELATIVE = {(base + number, 1) for base in (0x1400, 0x1800) for number in range(4)}
+"""Objects of the usual drive whose default is added to its node id, besides that of EMCY."""
+EMCY = (0x1014, 0)
+OWN_WAY: Mapping[Key, int] = {(0x60C2, 1): 1, (0x60C2, 2): -3}
+"""What a drive works with that lacks the object: it interpolates over the usual cycle of 1 ms."""
+MODE_OF_ITS_OWN: Mapping[Key, int] = {(0x6060, 0): 8, (0x6061, 0): 8}
+"""Mode of a drive whose mode cannot be chosen (6060h): cyclic synchronous position."""
 
 
-def dictionary_of(
-    node: NodeConfig, behaviour: Behaviour, base: Iterable[ObjectEntry] = OBJECTS.values()
-) -> tuple[ObjectEntry, ...]:
-    """Return the objects of a drive.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Dictionary:
+    """Object dictionary of one emulated drive."""
 
-    Args:
-        node: its configuration, which names objects and types of its positions and temperature.
-        behaviour: which objects it lacks, how many PDOs it has, and what it holds at power-on.
-        base: objects of the drive that these change.
-    """
-    entries = {entry.key: entry for entry in base}
-    _count(entries, behaviour)
-    for entry, access in _named(node):
-        name = f"Object {entry.index:04X}h of the drive"
-        there = entries.get(entry.key) or OBJECTS.get(entry.key)
-        entries[entry.key] = ObjectEntry(
-            entry.index,
-            entry.sub,
-            name if there is None else there.name,
-            entry.kind,
-            access,
-            0,
-            True,
-        )
-    for key, value in behaviour.defaults:
-        if key in entries:
-            entries[key] = replace(entries[key], default=value)
-    lacks = behaviour.lacks
-    return tuple(
-        entry
-        for key, entry in sorted(entries.items())
-        if key not in lacks and entry.index not in lacks
+    entries: tuple[ObjectEntry, ...]
+    """Objects that the bus sees, with the values that this very drive has at power-on."""
+    hidden: Mapping[Key, int] = field(default_factory=dict)
+    """Values that the drive works with and the bus does not see."""
+    limits: Mapping[Key, tuple[int, int]] = field(default_factory=dict)
+    """Lowest and highest value that an object takes."""
+    links: tuple[Key, ...] = USUAL_LINKS
+    """Objects that show the position of the link."""
+    temperature: Key | None = (TEMPERATURE, 0)
+    """Object that shows the temperature of the power stage, if any does."""
+
+
+def dictionary_of(node: NodeConfig, sheet: DataSheet | None = None) -> Dictionary:
+    """Return the objects of one node: those of a data sheet, else those of the usual drive."""
+    own = dict(_identity(node))
+    if sheet is None:
+        own |= {key: _number(OBJECTS[key]) + node.node_id for key in (*RELATIVE, EMCY)}
+        return Dictionary(entries=tuple(_with(OBJECTS.values(), own)))
+    for key in sheet.relative:
+        entry = sheet.objects[key]
+        own.setdefault(key, _number(entry) + node.node_id)
+    entries = tuple(_with(sheet.objects.values(), own))
+    shown = {entry.key for entry in entries if isinstance(entry.default, int)}
+    hidden = {key: _number(entry) for key, entry in OBJECTS.items() if key not in shown}
+    for other in (OWN_WAY, {} if (0x6060, 0) in shown else MODE_OF_ITS_OWN):
+        hidden |= {key: value for key, value in other.items() if key not in shown}
+    warmth = node.temperature_object
+    return Dictionary(
+        entries=entries,
+        hidden=hidden,
+        limits=sheet.limits,
+        links=(node.link_object.key,),
+        temperature=None if warmth is None else warmth.key,
     )
 
 
-def _named(node: NodeConfig) -> Iterator[tuple[Mapped, Access]]:
-    yield node.motor_object, Access.RO
-    yield node.target_object, Access.RW
-    if node.link is not None:
-        yield node.link_object, Access.RO
-    for entry in (node.torque_object, node.temperature_object):
-        if entry is not None:
-            yield entry, Access.RO
+def _identity(node: NodeConfig) -> Iterator[tuple[Key, int]]:
+    """Yield the numbers of the identity (1018h) that the bus file gives."""
+    one = node.identity
+    for sub, value in enumerate((one.vendor, one.product, one.revision, one.serial), start=1):
+        if value is not None:
+            yield (0x1018, sub), value
 
 
-def _count(entries: dict[Key, ObjectEntry], behaviour: Behaviour) -> None:
-    """Give the dictionary as many PDOs as the drive has, each way."""
-    for base, count in zip(PDO_BASES, (behaviour.rpdos, behaviour.tpdos), strict=True):
-        for number in range(max(count, PDO_COUNT)):
-            for comm in (base + number, base + 0x200 + number):
-                like = [entry for key, entry in entries.items() if key[0] == comm]
-                if number >= count:
-                    for entry in like:
-                        del entries[entry.key]
-                elif not like:
-                    first = base + (comm & 0x200)
-                    copied = [entry for key, entry in entries.items() if key[0] == first]
-                    entries |= {(comm, one.sub): replace(one, index=comm) for one in copied}
+def _with(entries: Iterable[ObjectEntry], own: Mapping[Key, int]) -> Iterator[ObjectEntry]:
+    for entry in entries:
+        number = entry.kind not in (DataType.VISIBLE_STRING, DataType.OCTET_STRING)
+        yield replace(entry, default=own[entry.key]) if number and entry.key in own else entry
+
+
+def _number(entry: ObjectEntry) -> int:
+    return entry.default if isinstance(entry.default, int) else 0

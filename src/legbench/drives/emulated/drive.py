@@ -2,15 +2,17 @@
 
 import random
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import final
 
 from legbench.drives.emulated.axis import SYNC_MISSING, Axis
 from legbench.drives.emulated.behaviour import Behaviour
-from legbench.drives.emulated.dictionary import dictionary_of
+from legbench.drives.emulated.dictionary import Dictionary, dictionary_of
 from legbench.drives.emulated.heartbeats import HeartbeatConsumer
-from legbench.drives.emulated.identity import write_identity
+from legbench.drives.emulated.oddities import changed
 from legbench.drives.emulated.process_data import LAST_SYNCHRONOUS, ProcessData
 from legbench.drives.emulated.store import ObjectStore
+from legbench.drives.errors import SdoAbortError
 from legbench.drives.protocol.cia402 import DriveState
 from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.frame import (
@@ -23,7 +25,7 @@ from legbench.drives.protocol.frame import (
     Frame,
 )
 from legbench.drives.protocol.nmt import NmtCommand, NmtState, decode_nmt, heartbeat_frame
-from legbench.drives.protocol.objects import OBJECTS, TEMPERATURE, Key
+from legbench.drives.protocol.objects import TEMPERATURE, Access, Key
 from legbench.drives.protocol.pdo import Mapped
 from legbench.drives.protocol.sdo import Abort
 from legbench.drives.protocol.sdo_server import SdoServer
@@ -57,22 +59,24 @@ class EmulatedDrive:
         node: NodeConfig,
         behaviour: Behaviour | None = None,
         kept: Sequence[Parameter] = (),
+        dictionary: Dictionary | None = None,
     ) -> None:
         """Switch it on; `kept` is what its memory holds instead of the defaults (1010h)."""
         self._node, self._behaviour, self._kept = node, behaviour or Behaviour(), kept
         self.node_id = node.node_id
         self._random = random.Random(self._behaviour.seed * LAST_NODE + node.node_id)
+        shown = changed(dictionary or dictionary_of(node), node, self._behaviour)
+        self._dictionary = shown
         self._store = ObjectStore(
-            dictionary_of(node, self._behaviour),
+            shown.entries,
             self._check,
             self._written,
-            internal=OBJECTS.values(),
+            shown.hidden,
             lacking=self._behaviour.lacking,
         )
         self._values = self._store.values
-        write_identity(self._values, self._node)
-        self.axis = Axis(node, self._behaviour, self._values)
-        self._pdos = ProcessData(self._store, self._behaviour)
+        self.axis = Axis(node, self._behaviour, self._values, shown.links)
+        self._pdos = ProcessData(self._store)
         self._target = node.target_object.key
         self._sdo = SdoServer(self._store.read, self._store.write, self._behaviour.sdo_answers)
         self.state = NmtState.BOOT_UP
@@ -91,8 +95,9 @@ class EmulatedDrive:
         self._warm(WARM)
         for parameter in self._kept:
             entry = self._store.entry(parameter.key)
-            if entry is not None:
-                self._store.put(entry, parameter.value)
+            if entry is not None and entry.access is Access.RW:
+                with suppress(SdoAbortError):
+                    self._store.put(entry, parameter.value)
 
     # --- what the wire and the body call -----------------------------------------------------
 
@@ -152,7 +157,6 @@ class EmulatedDrive:
         """Start over, as after a brown-out: configuration and state are lost."""
         self._now_ns = now_ns
         self._store.load_defaults()
-        write_identity(self._values, self._node)
         self.axis.restart()
         self._pdos.rebuild()
         self._recall()
@@ -172,10 +176,10 @@ class EmulatedDrive:
 
     def _warm(self, celsius: float) -> None:
         """Show a temperature [deg C], in the object that the bus file names, too."""
-        self._values[TEMPERATURE, 0] = round(10.0 * celsius)
-        entry = self._node.temperature_object
-        if entry is not None and entry != OWN_TEMPERATURE:
-            self._store.show(entry.key, celsius / self._node.temperature_scale)
+        key, entry = self._dictionary.temperature, self._node.temperature_object
+        if key is not None and self._store.entry(key) is not None:
+            tenths = entry in (None, OWN_TEMPERATURE)
+            self._store.show(key, celsius / (0.1 if tenths else self._node.temperature_scale))
 
     def untrip(self, code: int) -> None:
         """Remove the cause of an error; a fault reset is possible again."""
@@ -198,6 +202,9 @@ class EmulatedDrive:
     # --- CiA 301 -----------------------------------------------------------------------------
 
     def _check(self, key: Key, value: int) -> Abort | None:
+        low, high = self._dictionary.limits.get(key, (value, value))
+        if not low <= value <= high:
+            return Abort.TOO_LOW if value < low else Abort.TOO_HIGH
         if ProcessData.owns(key):
             return self._pdos.check(key, value)
         if key == (0x1019, 0) and self._values[0x1006, 0]:

@@ -1,10 +1,17 @@
 """The object dictionary inside a drive: values, and access to them by SDO."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import final
 
 from legbench.drives.errors import CodecError
-from legbench.drives.protocol.datatypes import DataType, Value, pack, range_of, size_of, unpack
+from legbench.drives.protocol.datatypes import (
+    DataType,
+    Value,
+    pack,
+    range_of,
+    size_of,
+    unpack,
+)
 from legbench.drives.protocol.objects import Access, Key, ObjectEntry
 from legbench.drives.protocol.sdo import Abort, abort_error
 
@@ -26,8 +33,8 @@ class ObjectStore:
         entries: Iterable[ObjectEntry],
         check: Check,
         written: Written,
+        hidden: Mapping[Key, int] | None = None,
         *,
-        internal: Iterable[ObjectEntry] = (),
         lacking: Abort = Abort.NO_OBJECT,
     ) -> None:
         """Hold the power-on values.
@@ -36,11 +43,11 @@ class ObjectStore:
             entries: objects that there are.
             check: asked before a value is taken.
             written: told of every value that was taken.
-            internal: objects whose values the drive itself uses, whether others see them or not.
-            lacking: code that refuses what is not there; that of the standard for a sub-index.
+            hidden: numbers for the drive's own use that no SDO reaches.
+            lacking: code that refuses what is not there; that of the standard by default.
         """
+        self._hidden = hidden or {}
         self._entries = {entry.key: entry for entry in entries}
-        self._internal = {entry.key: entry for entry in internal} | self._entries
         self._lacking = lacking
         self._indices = {index for index, _ in self._entries}
         self._check, self._written = check, written
@@ -50,11 +57,17 @@ class ObjectStore:
 
     def load_defaults(self) -> None:
         """Set every object to its power-on default."""
-        for key, entry in self._internal.items():
+        self.values.update(self._hidden)
+        for key, entry in self._entries.items():
             if isinstance(entry.default, int):
                 self.values[key] = entry.default
             else:
                 self._texts[key] = entry.default
+
+    @property
+    def keys(self) -> tuple[Key, ...]:
+        """Index and sub-index of every object that an SDO reaches, in order."""
+        return tuple(self._entries)
 
     def entry(self, key: Key) -> ObjectEntry | None:
         """Description of an object, if there is one."""
@@ -65,8 +78,9 @@ class ObjectStore:
         entry = self._known(index, sub)
         if entry.access is Access.WO:
             raise abort_error(Abort.WRITE_ONLY, index, sub)
-        key = entry.key
-        return pack(entry.kind, self.values[key] if key in self.values else self._texts[key])
+        if size_of(entry.kind) is None:
+            return pack(entry.kind, self._texts[entry.key])
+        return pack(entry.kind, fit(entry.kind, self.values[entry.key]))
 
     def write(self, index: int, sub: int, data: bytes) -> None:
         """Take the bytes of an object, all or nothing; raises SdoAbortError."""
@@ -96,7 +110,7 @@ class ObjectStore:
 
     def show(self, key: Key, value: float) -> None:
         """Publish a measured value, rounded and saturated to what its object holds."""
-        kind = self._internal[key].kind
+        kind = self._entries[key].kind
         if kind is DataType.REAL32:
             self._texts[key] = float(value)
             self.values.pop(key, None)
@@ -111,3 +125,9 @@ class ObjectStore:
             usual = known and self._lacking is Abort.NO_OBJECT
             raise abort_error(Abort.NO_SUB_INDEX if usual else self._lacking, index, sub)
         return entry
+
+
+def fit(kind: DataType, value: int) -> int:
+    """Return a number as an object of a type shows it, wrapped as its bits are."""
+    low, high = range_of(kind)
+    return value if low <= value <= high else (value - low) % (high - low + 1) + low

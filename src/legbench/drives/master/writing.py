@@ -42,7 +42,7 @@ def write_configuration(
         BusError: the bus does not work.
     """
     codes: dict[Key, int] = {}
-    written = [*parameters, *unknown_process_data(sdo)]
+    written = [*parameters, *unknown_process_data(sdo, parameters)]
     wanted = {parameter.key: parameter.value for parameter in written}
     for parameter in written:
         if parameter.key == CYCLE and CYCLE_INDEX in codes:
@@ -65,7 +65,7 @@ def read_configuration(sdo: SdoPort, parameters: Sequence[Parameter]) -> tuple[O
         BusError: the bus does not work.
     """
     codes: dict[Key, int] = {}
-    wanted = [*parameters, *unknown_process_data(sdo)]
+    wanted = [*parameters, *unknown_process_data(sdo, parameters)]
     held = dict(_held(sdo, wanted, codes))
     return judge(wanted, held, codes)
 
@@ -88,18 +88,20 @@ def check_outcomes(node: NodeConfig, outcomes: Iterable[Outcome]) -> None:
         raise error
 
 
-def unknown_process_data(sdo: SdoPort) -> Iterator[Parameter]:
+def unknown_process_data(sdo: SdoPort, parameters: Iterable[Parameter]) -> Iterator[Parameter]:
     """Find process data beyond the fourth object each way that is switched on, to switch it off.
 
-    CiA 301 numbers them in a row; the first that is missing ends the search.
+    CiA 301 numbers them in a row; the first that is missing ends the search. Those that the
+    configuration names are left to it.
     """
+    known = {parameter.index for parameter in parameters}
     for indices in (RPDOS, TPDOS):
         for index in indices[PDO_COUNT:]:
             try:
                 there = sdo.get_int(index, 1, DataType.UNSIGNED32)
             except SdoAbortError:
                 break
-            if not there & COB_INVALID:
+            if not there & COB_INVALID and index not in known:
                 value = COB_INVALID | there & COB_MASK
                 yield Parameter(index=index, sub=1, kind=DataType.UNSIGNED32, value=value)
 

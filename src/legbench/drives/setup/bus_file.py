@@ -56,7 +56,7 @@ def load_bus(path: Path) -> BusConfig:
     Raises:
         ConfigError: it is missing, no TOML, or describes no bus; the message starts with the path.
     """
-    return _load(path, bus_from_mapping)
+    return _load(path, lambda content: bus_from_mapping(content, path.parent))
 
 
 def load_limits(path: Path) -> SafetyLimits:
@@ -97,11 +97,13 @@ def limits_from_mapping(content: Mapping[str, Any]) -> SafetyLimits:
     return _build(SafetyLimits, "limits", given, converted=done)
 
 
-def bus_from_mapping(content: Mapping[str, Any]) -> BusConfig:
-    """A bus from the tables of a file; raises ConfigError."""
+def bus_from_mapping(content: Mapping[str, Any], folder: Path = Path()) -> BusConfig:
+    """A bus from the tables of a file in `folder`; raises ConfigError."""
     given = dict(content)
     tables = _list("node", given.pop("node", []))
-    given["nodes"] = tuple(_node(table) for table in tables)
+    # A data sheet of the bus is that of every node which names none.
+    usual = {"eds": given.pop("eds")} if "eds" in given else {}
+    given["nodes"] = tuple(_node(usual | _table("node", table), folder) for table in tables)
     _waive(given)
     return _build(BusConfig, "bus", given, converted=("nodes", "waive"))
 
@@ -115,13 +117,16 @@ def _waive(given: dict[str, Any]) -> None:
         given["waive"] = tuple(names)
 
 
-def _node(table: object) -> NodeConfig:
-    given = _table("node", table)
+def _node(given: dict[str, Any], folder: Path) -> NodeConfig:
     name = str(given.get("name", "?"))
     where = f"node '{name}'"
     identity = {key: given.pop(key) for key in _IDENTITY if key in given}
     given["identity"] = _build(Identity, where, identity)
     _encoders(where, given)
+    if "eds" in given:
+        if not isinstance(given["eds"], str):
+            raise ConfigError(f"{where}: eds is {given['eds']!r}; it must be the path of a file")
+        given["eds"] = folder / given["eds"]
     if "id" in given:
         given["node_id"] = given.pop("id")
     for key in OBJECT_KEYS:
@@ -137,7 +142,7 @@ def _node(table: object) -> NodeConfig:
     for key in keys:
         if keys.count(key) > 1:
             raise ConfigError(f"{where} gives parameter {name_of(*key)} twice")
-    done = ("identity", "motor", "link", "side", "quirks", "rpdos", "tpdos", *OBJECT_KEYS)
+    done = ("identity", "motor", "link", "side", "quirks", "rpdos", "tpdos", "eds", *OBJECT_KEYS)
     return _build(NodeConfig, where, given, converted=(*done, "parameters", "soft_limits"))
 
 

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 from legbench.drives.protocol.frame import LAST_NODE, RPDO_BASES, TPDO_BASES
 from legbench.drives.protocol.pdo import Mapped
@@ -69,6 +70,8 @@ class NodeConfig:
     heartbeat_consumer: bool = True
     """Whether the drive has 1016h, and so stops when its master's heartbeat is missing; some have
     not, and must be given a `deadline_ms` of their commands instead."""
+    eds: Path | None = None
+    """Electronic data sheet of the drive, relative to the bus file; an emulated one wears it."""
     soft_limits: Range | None = None
     """Motor range to which the drive itself clamps targets (607Dh) [rad]; none sets no range."""
     quirks: Quirks = field(default_factory=Quirks)

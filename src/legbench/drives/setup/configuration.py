@@ -86,7 +86,7 @@ def configuration(bus: BusConfig, node: NodeConfig) -> Iterator[Parameter]:
         (node.tpdos, 0x1800, node.tpdo_id, COB_NO_REMOTE),
     ):
         used = {pdo.number: pdo for pdo in pdos}
-        for number in range(1, PDO_COUNT + 1):
+        for number in sorted({*range(1, PDO_COUNT + 1), *used}):
             pdo = used.get(number)
             if pdo is None:
                 yield _parameter(

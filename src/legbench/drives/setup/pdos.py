@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from legbench.drives.errors import CodecError
 from legbench.drives.protocol.datatypes import DataType
-from legbench.drives.protocol.objects import LINK_SHORT, PDO_COUNT
+from legbench.drives.protocol.objects import LAST_PDO, LINK_SHORT, PDO_COUNT
 from legbench.drives.protocol.pdo import MAX_BYTES, Mapped, PdoMap
 from legbench.drives.setup.bus_numbers import WORD
 from legbench.drives.setup.cob_ids import check_cob_id
@@ -29,7 +29,7 @@ class PdoConfig:
     """
 
     number: int
-    """Number of the RPDO or TPDO, 1 to 4."""
+    """Number of the RPDO or TPDO; beyond 4 it needs a `cob_id`."""
     objects: tuple[Mapped, ...]
     cob_id: int | None = None
     """COB-ID of the PDO; by default that of the predefined connection set."""
@@ -38,8 +38,13 @@ class PdoConfig:
     which not every drive has, alone."""
 
     def __post_init__(self) -> None:
-        if not 1 <= self.number <= PDO_COUNT:
-            raise ConfigError(f"PDO number {self.number}; a drive has 1 to {PDO_COUNT}")
+        if not 1 <= self.number <= LAST_PDO:
+            raise ConfigError(f"PDO number {self.number}; a drive has 1 to {LAST_PDO}")
+        if self.number > PDO_COUNT and self.cob_id is None:
+            raise ConfigError(
+                f"PDO number {self.number} has no COB-ID by the standard, as 1 to {PDO_COUNT} "
+                "have; give it a 'cob_id'"
+            )
         try:
             PdoMap(self.objects)
         except CodecError as error:
