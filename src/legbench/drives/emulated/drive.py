@@ -8,13 +8,13 @@ from typing import final
 from legbench.drives.emulated.axis import SYNC_MISSING, Axis
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.dictionary import Dictionary, dictionary_of
-from legbench.drives.emulated.heartbeats import HeartbeatConsumer
+from legbench.drives.emulated.heartbeats import HeartbeatConsumer, HeartbeatProducer
 from legbench.drives.emulated.oddities import changed
-from legbench.drives.emulated.process_data import LAST_SYNCHRONOUS, ProcessData
+from legbench.drives.emulated.process_data import ProcessData
 from legbench.drives.emulated.store import ObjectStore
+from legbench.drives.emulated.warmth import HOT, WARM, show_temperature
 from legbench.drives.errors import SdoAbortError
 from legbench.drives.protocol.cia402 import DriveState
-from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.frame import (
     HEARTBEAT_BASE,
     LAST_NODE,
@@ -25,16 +25,11 @@ from legbench.drives.protocol.frame import (
     Frame,
 )
 from legbench.drives.protocol.nmt import NmtCommand, NmtState, decode_nmt, heartbeat_frame
-from legbench.drives.protocol.objects import TEMPERATURE, Access, Key
-from legbench.drives.protocol.pdo import Mapped
+from legbench.drives.protocol.objects import Access, Key
 from legbench.drives.protocol.sdo import Abort
 from legbench.drives.protocol.sdo_server import SdoServer
 from legbench.drives.setup.config import NodeConfig, Parameter
 
-WARM, HOT = 25.0, 90.0
-"""Temperatures of a drive that is well, and of one that is not [deg C]."""
-OWN_TEMPERATURE = Mapped(TEMPERATURE, 0, DataType.INTEGER16)
-"""Temperature in tenths of a degree, whatever a bus file takes them for."""
 UNDER_VOLTAGE, OVER_TEMPERATURE = 0x3220, 0x4310
 HEARTBEAT_LOST, PDO_SHORT, PDO_LONG, SYNC_LENGTH, RPDO_LATE = 0x8130, 0x8210, 0x8220, 0x8240, 0x8250
 _ORDERS = {
@@ -65,34 +60,29 @@ class EmulatedDrive:
         self._node, self._behaviour, self._kept = node, behaviour or Behaviour(), kept
         self.node_id = node.node_id
         self._random = random.Random(self._behaviour.seed * LAST_NODE + node.node_id)
-        shown = changed(dictionary or dictionary_of(node), node, self._behaviour)
-        self._dictionary = shown
+        how = self._behaviour
+        self._dictionary = shown = changed(dictionary or dictionary_of(node), node, how)
         self._store = ObjectStore(
-            shown.entries,
-            self._check,
-            self._written,
-            shown.hidden,
-            lacking=self._behaviour.lacking,
+            shown.entries, self._check, self._written, shown.hidden, lacking=how.lacking
         )
         self._values = self._store.values
-        self.axis = Axis(node, self._behaviour, self._values, shown.links)
+        self.axis = Axis(node, how, self._values, shown.links)
         self._pdos = ProcessData(self._store)
         self._target = node.target_object.key
-        self._sdo = SdoServer(self._store.read, self._store.write, self._behaviour.sdo_answers)
+        self._sdo = SdoServer(self._store.read, self._store.write, how.sdo_answers)
         self.state = NmtState.BOOT_UP
         self._now_ns = 0
         self._tick_ns = 0
-        self._boot_ns = 1000 * self._behaviour.boot_us
-        self._beat_ns = 0
+        self._boot_ns = 1000 * how.boot_us
+        self._beats = HeartbeatProducer()
         self._sync_ns: int | None = None
         self._fresh = False
         self._heartbeats = HeartbeatConsumer(self._values)
         self._out: list[tuple[int, Frame]] = []
-        self._mute = False
         self._recall()
 
     def _recall(self) -> None:
-        self._warm(WARM)
+        show_temperature(self._store, self._dictionary, self._node, WARM)
         for parameter in self._kept:
             entry = self._store.entry(parameter.key)
             if entry is not None and entry.access is Access.RW:
@@ -170,16 +160,9 @@ class EmulatedDrive:
         self._now_ns = now_ns
         self.axis.alarms.hold(code)
         if code == OVER_TEMPERATURE:
-            self._warm(HOT)
+            show_temperature(self._store, self._dictionary, self._node, HOT)
         self.axis.fault(code)
         self._forward()
-
-    def _warm(self, celsius: float) -> None:
-        """Show a temperature [deg C], in the object that the bus file names, too."""
-        key, entry = self._dictionary.temperature, self._node.temperature_object
-        if key is not None and self._store.entry(key) is not None:
-            tenths = entry in (None, OWN_TEMPERATURE)
-            self._store.show(key, celsius / (0.1 if tenths else self._node.temperature_scale))
 
     def untrip(self, code: int) -> None:
         """Remove the cause of an error; a fault reset is possible again."""
@@ -197,7 +180,7 @@ class EmulatedDrive:
 
     def mute_heartbeat(self, mute: bool = True) -> None:
         """Stop producing heartbeats, while everything else goes on."""
-        self._mute = mute
+        self._beats.mute = mute
 
     # --- CiA 301 -----------------------------------------------------------------------------
 
@@ -226,7 +209,7 @@ class EmulatedDrive:
         self.state = NmtState.PRE_OPERATIONAL
         self._pdos.rebuild()
         self.axis.power.boot()
-        self._beat_ns = self._now_ns
+        self._beats.since_ns = self._now_ns
         self._out.append((self._now_ns, heartbeat_frame(self.node_id, NmtState.BOOT_UP)))
 
     def _obey(self, command: NmtCommand) -> None:
@@ -264,29 +247,21 @@ class EmulatedDrive:
     def _rpdo(self, cob_id: int, data: bytes) -> None:
         if self.state is not NmtState.OPERATIONAL:
             return
-        pdo = self._pdos.rpdos[cob_id]
-        size = pdo.layout.size
+        size = self._pdos.rpdos[cob_id].layout.size
         if len(data) < size:
             self._send_now(self.axis.alarms.raise_(PDO_SHORT))
             return
         if len(data) > size:
             self._send_now(self.axis.alarms.raise_(PDO_LONG))
-        pdo.seen_ns = self._now_ns
         self._send_now(self.axis.alarms.clear(RPDO_LATE))
         window_ns = 1000 * self._values[0x1007, 0]
-        values = pdo.layout.unpack(data[:size])
-        if pdo.kind > LAST_SYNCHRONOUS:
-            self._pdos.apply(pdo, values)
-        elif not (window_ns and self._sync_ns and self._now_ns - self._sync_ns > window_ns):
-            pdo.waiting = values
+        late = bool(window_ns and self._sync_ns and self._now_ns - self._sync_ns > window_ns)
+        self._pdos.receive(cob_id, data[:size], self._now_ns, late=late)
 
     def _timers(self) -> None:
         now_ns, values = self._now_ns, self._values
-        beat_ns = 1_000_000 * values[0x1017, 0]
-        if beat_ns and now_ns - self._beat_ns >= beat_ns:
-            self._beat_ns = now_ns
-            if not self._mute:
-                self._out.append((now_ns, heartbeat_frame(self.node_id, self.state)))
+        if self._beats.due(1_000_000 * values[0x1017, 0], now_ns):
+            self._out.append((now_ns, heartbeat_frame(self.node_id, self.state)))
         if self._heartbeats.lost(now_ns):
             self._heartbeats.clear()
             self._connection_lost(HEARTBEAT_LOST)

@@ -12,12 +12,11 @@ import can
 
 from legbench.drives.errors import BusError
 from legbench.drives.master.axis_link import AxisLink
-from legbench.drives.master.mode_poll import EVERY_MS as MODE_EVERY_MS
-from legbench.drives.master.mode_poll import ModePoll
+from legbench.drives.master.mode_poll import mode_polls
 from legbench.drives.master.notices import Notices
 from legbench.drives.master.outgoing import Outgoing
 from legbench.drives.master.port import Port
-from legbench.drives.master.temperature import EVERY_MS, TemperaturePoll
+from legbench.drives.master.temperature import temperature_polls
 from legbench.drives.master.tick import Tick
 from legbench.drives.master.watch import NodeWatch
 from legbench.drives.protocol.frame import (
@@ -49,7 +48,6 @@ class Cycle:
         late_frames: process data that came after its deadline.
         silent_total: ticks that were left out to find late answers.
         notices: irregularities that end no run.
-        two_encoders: whether every drive has an encoder on both sides of its spring.
         stopping: whether a stop is under way, for which SYNC goes out at every tick.
     """
 
@@ -58,8 +56,7 @@ class Cycle:
         self._port, self._config = port, config
         self.axes = tuple(AxisLink(node) for node in config.nodes)
         self.watches = tuple(NodeWatch(config, node, now_ns) for node in config.nodes)
-        every = config.cycles_in(EVERY_MS)
-        self.polls = tuple(TemperaturePoll(node, every) for node in config.nodes)
+        self.polls = temperature_polls(config)
         self.bus_error: BusError | None = None
         self.bus_off = False
         self.stranger: int | None = None
@@ -67,7 +64,6 @@ class Cycle:
         self.late_frames = 0
         self.silent_total = 0
         self.notices = Notices()
-        self.two_encoders = all(node.link is not None for node in config.nodes)
         self.stopping = False
         self._tpdos = {cob: axis for axis in self.axes for cob in axis.tpdo_ids}
         self._expected = len(self._tpdos)
@@ -85,7 +81,7 @@ class Cycle:
         self._owed: set[int] = set()
         """COB-IDs of process data that has not come, and still may."""
         self._sync = port.message(SYNC_ID)
-        modes = [ModePoll(axis, config.cycles_in(MODE_EVERY_MS)) for axis in self.axes]
+        modes = mode_polls(self.axes, config)
         both = zip(config.nodes, self.polls, modes, strict=True)
         self._polls = {node.node_id: polls for node, *polls in both}
         self._outgoing = Outgoing(port, config, self.axes, (*self.polls, *modes), self._failed)

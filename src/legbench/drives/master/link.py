@@ -81,11 +81,12 @@ class Link(Opening):
         lock = lock or ChannelLock(str(bus.channel_info))
         super().__init__(port, config, limits or SafetyLimits(), lock, read_only=read_only)
         self._stiffness = tuple(float(value) for value in stiffness)
+        self._two_encoders = config.two_encoders
         self._guard = Guard(
             self._limits,
             config.period,
             known=[node.knows for node in config.nodes],
-            two_encoders=self.cycle.two_encoders,
+            two_encoders=self._two_encoders,
         )
         self.skipped_total = 0
         self._last = Tick(0, 0, 0, 0, False)
@@ -267,7 +268,13 @@ class Link(Opening):
         return tick
 
     def _sample(self) -> Sample:
-        return sample_of(self.cycle, self._last, self._stiffness, self._guard.applied)
+        return sample_of(
+            self.cycle,
+            self._last,
+            self._stiffness,
+            self._guard.applied,
+            two_encoders=self._two_encoders,
+        )
 
     def _check(self, sample: Sample) -> None:
         self._guard.check(
@@ -278,7 +285,7 @@ class Link(Opening):
             temperature=sample.temperature,
             fresh=sample.fresh,
             elapsed=1 + sample.skipped,
-            led_pos=None if self.cycle.two_encoders else self.led_pos,
+            led_pos=None if self._two_encoders else self.led_pos,
         )
 
     @property

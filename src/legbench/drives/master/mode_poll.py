@@ -1,5 +1,6 @@
 """The mode of a drive that shows it only once it is enabled, read by SDO beside the cycle; pure."""
 
+from collections.abc import Sequence
 from typing import final
 
 from legbench.drives.errors import CodecError, SdoAbortError
@@ -8,6 +9,7 @@ from legbench.drives.protocol.cia402 import DriveState, Mode, decode_state
 from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.frame import SDO_REQUEST_BASE, Frame
 from legbench.drives.protocol.sdo_client import Progress, Upload
+from legbench.drives.setup.config import BusConfig
 
 EVERY_MS = 20
 """Time between two requests [ms]: within it a drive answers, and an answer that is lost is asked
@@ -49,3 +51,9 @@ class ModePoll:
             mode = None
         self._upload = None
         self._axis.in_mode = mode == Mode.CYCLIC_SYNCHRONOUS_POSITION
+
+
+def mode_polls(axes: Sequence[AxisLink], config: BusConfig) -> tuple[ModePoll, ...]:
+    """Make the polls of all drives of a bus, in their order."""
+    every_cycles = config.cycles_in(EVERY_MS)
+    return tuple(ModePoll(axis, every_cycles) for axis in axes)

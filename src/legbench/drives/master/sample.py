@@ -41,11 +41,24 @@ class Sample(NamedTuple):
 
 
 def sample_of(
-    cycle: Cycle, tick: Tick, stiffness: Sequence[float], applied_pos: tuple[float, ...]
+    cycle: Cycle,
+    tick: Tick,
+    stiffness: Sequence[float],
+    applied_pos: tuple[float, ...],
+    *,
+    two_encoders: bool = True,
 ) -> Sample:
-    """The state of a cycle after a tick; stiffness of the series springs [N m/rad]."""
+    """The state of a cycle after a tick.
+
+    Args:
+        cycle: cycle of the drives.
+        tick: its last tick.
+        stiffness: of the series springs [N m/rad].
+        applied_pos: command as it was last let through [rad].
+        two_encoders: every drive has an encoder on both sides of its spring.
+    """
     axes = cycle.axes
-    if cycle.two_encoders:
+    if two_encoders:
         motor, links = tuple(map(_MOTOR, axes)), tuple(map(_LINK, axes))
         torque = tuple([k * (a - b) for k, a, b in zip(stiffness, motor, links, strict=True)])
     else:

@@ -6,7 +6,7 @@ from typing import final
 from legbench.drives.errors import CodecError, SdoAbortError
 from legbench.drives.protocol.frame import SDO_REQUEST_BASE, Frame
 from legbench.drives.protocol.sdo_client import Progress, Upload
-from legbench.drives.setup.config import NodeConfig
+from legbench.drives.setup.config import BusConfig, NodeConfig
 
 EVERY_MS = 200
 """Time between two requests of a temperature [ms]."""
@@ -60,3 +60,9 @@ class TemperaturePoll:
         """Take a reading of the temperature object [counts]."""
         self.celsius = self._scale * value
         self._waiting, self.unanswered = False, 0
+
+
+def temperature_polls(config: BusConfig) -> tuple[TemperaturePoll, ...]:
+    """Make the polls of all drives of a bus, in their order."""
+    every_cycles = config.cycles_in(EVERY_MS)
+    return tuple(TemperaturePoll(node, every_cycles) for node in config.nodes)

@@ -265,6 +265,11 @@ class BusConfig:
         return tuple(node for node in self.nodes if self.channel_of(node) == channel)
 
     @property
+    def two_encoders(self) -> bool:
+        """Whether every drive has an encoder on both sides of its spring."""
+        return all(node.link is not None for node in self.nodes)
+
+    @property
     def deadline_us(self) -> int:
         """Deadline of the TPDOs after SYNC [us]."""
         given = self.tpdo_deadline_us
