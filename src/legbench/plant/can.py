@@ -10,7 +10,7 @@ from legbench.drives.master.session import Session
 from legbench.plant.abstract import AbstractPlant
 from legbench.plant.can_needs import known_of
 from legbench.plant.gone_drive import gone_drive
-from legbench.plant.landing import PATIENCE, STILL_RANGE, Landing, land
+from legbench.plant.landing import PATIENCE, Landing, land
 from legbench.plant.start import Start
 from legbench.plant.velocity import VelocityEstimate
 from legbench.signals import Command, Floats, Observation
@@ -133,17 +133,12 @@ class CanPlant(AbstractPlant):
             period=self.period,
             interrupted=interrupted,
         )
-        if landing.rested or landing.interrupted:
-            return None
-        if "joint_pos" not in known_of(self._session.config):
+        if landing.trouble is not None and "joint_pos" not in known_of(self._session.config):
             return (
                 "whether the leg rests is not known, as a link has no encoder; its power went "
                 f"{PATIENCE:g} s after it had been led to its rest posture"
             )
-        return (
-            f"the leg still swung by more than {STILL_RANGE:g} rad after {PATIENCE:g} s in its "
-            "rest posture; its power went then"
-        )
+        return landing.trouble
 
     def _lead(self, motor_pos: Sequence[float]) -> tuple[Sequence[float], Sequence[float]]:
         sample = self._exchange(np.array(motor_pos))
