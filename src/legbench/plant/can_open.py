@@ -5,8 +5,9 @@ from typing import Any, final
 
 from legbench.clock import AbstractClock
 from legbench.drives.emulated.behaviour import Behaviour
-from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.build import emulate, emulate_channels
 from legbench.drives.emulated.bus import LockstepBus
+from legbench.drives.emulated.channels_bus import ChannelsBus
 from legbench.drives.emulated.network import Network
 from legbench.drives.master.session import Session
 from legbench.drives.setup.bus_file import load_bus
@@ -14,8 +15,7 @@ from legbench.drives.setup.checks import check_together
 from legbench.drives.setup.config import BusConfig
 from legbench.drives.setup.exchange import check_budget
 from legbench.drives.setup.waivers import describe_waivers
-from legbench.drives.transport.lock import ChannelLock
-from legbench.drives.transport.open_bus import adapter_of, open_bus
+from legbench.drives.transport.open_channels import adapters_of, open_channels
 from legbench.drives.transport.realtime import Granted
 from legbench.errors import ConfigError
 from legbench.limits.safety import SafetyLimits
@@ -119,7 +119,7 @@ def _facts(
         "bus": {
             "file": str(choice.bus),
             "interface": choice.interface or config.interface,
-            "channel": choice.channel or config.channel,
+            "channel": choice.channel or "+".join(filter(None, config.channels)) or None,
             "bitrate": choice.bitrate or config.bitrate,
             "read_only": choice.read_only,
             "end": choice.end.value,
@@ -139,9 +139,6 @@ def open_session(
 ) -> Session:
     """Open the bus of a choice; with interface `legbench` the emulated leg in this process.
 
-    The channel is locked before its adapter is touched: opening a serial one resets it under a
-    program that uses it. Whoever only reads locks no channel that others may share.
-
     Args:
         config: the bus file.
         choice: which bus.
@@ -152,32 +149,32 @@ def open_session(
         BusError: the interface is not there, is down, or has a master.
     """
     if not choice.is_virtual(config):
-        adapter = adapter_of(config, interface=choice.interface, channel=choice.channel)
-        lock = ChannelLock.of_channel(adapter.interface, adapter.channel)
-        if leads or not adapter.shared:
-            lock.acquire()
-        try:
-            bus = open_bus(config.at(choice.bitrate), adapter)
-        except BaseException:
-            lock.release()
-            raise
+        adapters = adapters_of(config, interface=choice.interface, channel=choice.channel)
+        bus, lock = open_channels(config.at(choice.bitrate), adapters, leads=leads)
         return Session(bus, config.at(choice.bitrate), lock=lock)
-    network = _emulated(config, choice, leg)
-    bus = LockstepBus("leg", network=network, bitrate=choice.bitrate)
+    networks = _emulated(config, choice, leg)
+    if len(networks) > 1:
+        bus = ChannelsBus(networks, config, choice.bitrate)
+    else:
+        bus = LockstepBus("leg", network=networks[0], bitrate=choice.bitrate)
     return Session(bus, config.at(choice.bitrate))
 
 
-def _emulated(config: BusConfig, choice: CanChoice, leg: Leg | None) -> Network:
+def _emulated(config: BusConfig, choice: CanChoice, leg: Leg | None) -> tuple[Network, ...]:
     """The emulated leg; its drives run at the bitrate of the bus file, whatever is asked for.
 
     For those who only look its drives have kept their configuration: nobody may write it.
     """
+    split = len(config.channels) > 1
     if leg is None:
         idle = [Behaviour(start_pos=start) for start in IDLE_POS]
-        fits = len(config.nodes) == len(idle)
-        return emulate(config, idle if fits else None, configured=choice.read_only)
+        found = idle if len(config.nodes) == len(idle) else None
+        if split:
+            return emulate_channels(config, found, configured=choice.read_only)
+        return (emulate(config, found, configured=choice.read_only),)
     motors = [float(value) for value in leg.start.motor_pos]
-    return emulate(
+    one_or_more = emulate_channels if split else emulate
+    made = one_or_more(
         config,
         [Behaviour(start_pos=motor) for motor in motors],
         body=EmulatedLeg(leg.design, leg.options, leg.start),
@@ -185,3 +182,4 @@ def _emulated(config: BusConfig, choice: CanChoice, leg: Leg | None) -> Network:
         faults=choice.faults,
         configured=choice.read_only,
     )
+    return made if isinstance(made, tuple) else (made,)
