@@ -24,7 +24,7 @@ class Found:
     device_type: int
     """1000h."""
     vendor: int
-    product: int
+    product: int | None
     revision: int | None
     serial: int | None
     """None where the drive tells none."""
@@ -66,7 +66,8 @@ def scan(session: Session, last: int = LAST_NODE) -> Iterator[Found]:
 def _verdict(config: BusConfig, node_id: int, there: Identity) -> str:
     for node in config.nodes:
         wanted = node.identity
-        same = (wanted.vendor, wanted.product) == (there.vendor, there.product)
+        same = wanted.vendor == there.vendor
+        same = same and wanted.product in (None, there.product)
         same = same and wanted.serial in (None, there.serial)
         if node.node_id == node_id and same:
             return f"'{node.name}' of the bus file"

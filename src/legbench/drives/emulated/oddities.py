@@ -27,9 +27,11 @@ def changed(dictionary: Dictionary, node: NodeConfig, behaviour: Behaviour) -> D
     """
     entries = {entry.key: entry for entry in dictionary.entries}
     _count(entries, behaviour)
-    heat = dictionary.temperature
+    heat, links = dictionary.temperature, dictionary.links
     if node.eds is None:
         entries |= {entry.key: entry for entry in _named(node, entries)}
+        if node.link is not None and node.link_object.key not in links:
+            links = (*links, node.link_object.key)
         heat = heat if node.temperature_object is None else node.temperature_object.key
     if behaviour.fixed_mapping:
         entries |= {entry.key: entry for entry in _fixed(node, entries)}
@@ -45,6 +47,7 @@ def changed(dictionary: Dictionary, node: NodeConfig, behaviour: Behaviour) -> D
         dictionary,
         entries=tuple(entry for _, entry in sorted(entries.items())),
         hidden=hidden,
+        links=links,
         temperature=heat,
     )
 

@@ -5,6 +5,7 @@ from typing import final
 
 from legbench.drives.errors import CodecError
 from legbench.drives.protocol.datatypes import (
+    FORMATS,
     DataType,
     Value,
     pack,
@@ -78,8 +79,9 @@ class ObjectStore:
         entry = self._known(index, sub)
         if entry.access is Access.WO:
             raise abort_error(Abort.WRITE_ONLY, index, sub)
-        if size_of(entry.kind) is None:
-            return pack(entry.kind, self._texts[entry.key])
+        if entry.kind not in FORMATS:
+            there = self._texts.get(entry.key)
+            return pack(entry.kind, self.values[entry.key] if there is None else there)
         return pack(entry.kind, fit(entry.kind, self.values[entry.key]))
 
     def write(self, index: int, sub: int, data: bytes) -> None:
@@ -113,7 +115,6 @@ class ObjectStore:
         kind = self._entries[key].kind
         if kind is DataType.REAL32:
             self._texts[key] = float(value)
-            self.values.pop(key, None)
             return
         low, high = range_of(kind)
         self.values[key] = min(max(round(value), low), high)

@@ -67,7 +67,8 @@ class EnableWatch:
             raise PlantFault(
                 "command ignored",
                 f"{_who(axis)} does not follow its target on enabling: "
-                f"{describe_statusword(axis.statusword)}",
+                f"{describe_statusword(axis.statusword)}; look at its software limits (607Dh), or "
+                "give follows_bit = false in [node.quirks] if it never shows bit 12 of 6041h",
             )
 
     def _check_together(self) -> None:

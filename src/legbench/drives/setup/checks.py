@@ -13,6 +13,8 @@ from legbench.limits.safety import Range, SafetyLimits
 LONGEST_MS = 50
 """Longest time that a limit in cycles may last where it is not waived [ms]: half of the time in
 which drives stop that have lost their master."""
+FEWEST_PERIODS = 3
+"""Fewest periods without a command after which a drive may fault."""
 IN_CYCLES = ("following_cycles", "overrun_cycles", "lost_frames")
 """Limits that are a number of cycles, whatever the period."""
 
@@ -46,7 +48,15 @@ def check_together(
 
 
 def _check_cycles(config: BusConfig, limits: SafetyLimits) -> None:
-    """Refuse limits in cycles that last for too long with the period of the bus."""
+    """Refuse limits in cycles, and deadlines in time, that do not fit the period of the bus."""
+    for node in config.nodes:
+        for pdo in node.rpdos:
+            if 0 < 1000 * pdo.deadline_ms < FEWEST_PERIODS * config.period_us:
+                raise ConfigError(
+                    f"deadline_ms of RPDO{pdo.number} of '{node.name}' is {pdo.deadline_ms} ms, "
+                    f"with period_us = {config.period_us} one late command ends the run: raise it "
+                    f"to {-(-FEWEST_PERIODS * config.period_us // 1000)} or more"
+                )
     for name in IN_CYCLES:
         cycles = getattr(limits, name)
         lasts_ms = 1e-3 * cycles * config.period_us

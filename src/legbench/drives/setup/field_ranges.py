@@ -48,13 +48,13 @@ def _check_motor(node: NodeConfig, motor: Range) -> None:
         _check_lap(node, motor)
         return
     ends = sorted(units.to_counts(end) for end in (motor[0] - SLACK, motor[1] + SLACK))
-    half = 1 << (units.bits - 1)
-    if ends[0] < -half or ends[1] >= half:
+    low, high = units.lowest, units.lowest + units.modulus - 1
+    if ends[0] < low or ends[1] > high:
         raise ConfigError(
             f"motor of '{node.name}': its range [{motor[0]:g}, {motor[1]:g}] rad and {SLACK:g} rad "
             f"either way are {ends[0]} to {ends[1]} counts, but position (6064h) and target "
-            f"(607Ah) of {units.bits} bits hold {-half} to {half - 1}: zero the encoder, or map "
-            "fewer counts per turn"
+            f"(607Ah) of {units.bits} bits hold {low} to {high}: zero the encoder, or map fewer "
+            "counts per turn"
         )
 
 

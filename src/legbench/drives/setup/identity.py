@@ -15,7 +15,7 @@ class Identity:
     """
 
     vendor: int
-    product: int
+    product: int | None = None
     serial: int | None = None
     revision: int | None = None
 
