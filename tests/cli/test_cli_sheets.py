@@ -48,7 +48,7 @@ def test_learn_says_what_a_drive_lacks_and_writes_a_file_that_fits(
         "protection fixed 1017h:00 Producer heartbeat time [ms]: wanted 20, the drive" in done.out
     )
     assert "1018h:04 Serial number: not known is the serial number" in done.out
-    assert "without master it reacts after 21 ms by deadline of RPDO1 1400h:05" in done.out
+    assert "without master it reacts after 22 ms by deadline of RPDO1 1400h:05" in done.out
     assert "lines of the bus file are still to be measured; each says MEASURE" in done.err
     again = learnt(call, folder)
     assert again.status == 1

@@ -142,7 +142,7 @@ def test_types_beyond_whole_numbers_keep_their_length() -> None:
     sheet.add((0x2003, 0), 0x16).add((0x2004, 0), 0x09, default="g\u00fct").add((0x2005, 0), 0xA0)
     sheet.add((0x00A0, 1), 0x05, default="0x06").add((0x2006, 0), 0x99)
     found = sheet_of(sheet.text().encode(), "it.eds")
-    assert found.objects[0x2001, 0].default == b"\x00\x00\xc0\x3f"
+    assert found.objects[0x2001, 0].default == 1.5
     assert found.objects[0x2002, 0].default == bytes(8)
     assert found.objects[0x2003, 0].default == bytes(3)
     assert found.objects[0x2004, 0].default == "gt"

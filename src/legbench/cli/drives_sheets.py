@@ -26,14 +26,16 @@ class Learn:
     node: UseAppendAction[tuple[int, ...]] = ()
     """Node id of a drive, once for each, in the order of the joints; 1 and 2 if none is given."""
     link: str | None = None
-    """Object that shows the position of the link, such as "60E4:01 i32"; else the likeliest."""
+    """Object that shows the position of the link, such as "60E4:01 i32", or none for a drive with
+    one encoder; else the likeliest."""
 
     def run(self, bench: Bench) -> int:
         """Print what is there, fixed or missing; 1 if the drives cannot be used."""
         from legbench.commissioning.learn import learn, write_bus
         from legbench.drives.setup.bus_file import parse_object
+        from legbench.drives.sheet.propose import ONE_ENCODER
 
-        link = None if self.link is None else parse_object(self.link)
+        link = self.link if self.link in (None, ONE_ENCODER) else parse_object(self.link)
         learned = learn(self.eds, self.out, self.node, link)
         if not learned.problems:
             write_bus(learned, self.out)
@@ -51,11 +53,11 @@ class Check:
     def run(self, bench: Bench) -> int:
         """Print what is there, fixed or missing; 1 if the drives cannot be used."""
         from legbench.commissioning.learn import check
-        from legbench.drives.setup.wire import check_load
+        from legbench.drives.setup.exchange import check_budget
 
         learned = check(bench.bus, self.eds)
         _print(learned, as_json=bench.json, out=None)
-        check_load(bench.config().at(bench.bitrate))
+        check_budget(bench.config().at(bench.bitrate))
         return _ended(learned)
 
 

@@ -8,13 +8,15 @@ from pathlib import Path
 from legbench.drives.errors import DriveError
 from legbench.drives.protocol.pdo import Mapped
 from legbench.drives.setup.bus_file import bus_from_mapping, load_bus
+from legbench.drives.setup.bus_numbers import RUN_PERIODS_US
 from legbench.drives.setup.config import BusConfig
 from legbench.drives.setup.configuration import quick_stop_ramp
+from legbench.drives.setup.exchange import check_budget
 from legbench.drives.setup.taken import check_taken
 from legbench.drives.sheet.assess import Assessment, assess
 from legbench.drives.sheet.data_sheet import DataSheet
 from legbench.drives.sheet.load import load_sheet
-from legbench.drives.sheet.propose import bus_text, marked_lines, propose, waivers_for
+from legbench.drives.sheet.propose import Proposal, bus_text, marked_lines, propose, waivers_for
 from legbench.errors import ConfigError
 from legbench.reading import LARGEST_TOML, UnreadableError, parse_toml, read_file
 from legbench.recording.files import write_whole
@@ -39,15 +41,16 @@ class Learned:
 
 
 def learn(
-    eds: Path, out: Path, node_ids: Sequence[int] = (), link: Mapped | None = None
+    eds: Path, out: Path, node_ids: Sequence[int] = (), link: Mapped | str | None = None
 ) -> Learned:
     """Read a data sheet and propose a bus file for drives of its kind; writes nothing.
 
     Args:
         eds: the data sheet.
         out: where the bus file is going to be, from which the data sheet is named.
-        node_ids: ids of the drives; by default that of a configured sheet (DCF), else 1 and 2.
-        link: object that shows the position of the link; by default the likeliest one.
+        node_ids: ids of the drives; 1 and 2 by default.
+        link: object that shows the position of the link, or `ONE_ENCODER`; by default the likeliest
+            one, or none where no object looks like it.
 
     Raises:
         ConfigError: the file is no data sheet, or its drives cannot be used; the message names the
@@ -56,21 +59,39 @@ def learn(
     """
     sheet = load_sheet(eds)
     relative = os.path.relpath(eds.absolute(), out.parent.absolute())
-    proposal = propose(sheet, relative, link)
-    ids = tuple(node_ids) or USUAL_NODES
-    text = bus_text(proposal, ids, (*waivers_for(watched=False, braked=False),))
-    config = _parsed(text, out.parent)
-    assessments = tuple(assess(sheet, config, node) for node in config.nodes)
+    proposal, ids = propose(sheet, relative, link), tuple(node_ids) or USUAL_NODES
+    period_us = _period_us(proposal, ids, out.parent)
+
+    def text_with(waive: Sequence[str]) -> str:
+        return bus_text(proposal, ids, waive, period_us=period_us)
+
+    config = _parsed(text_with(waivers_for(watched=False, braked=False)), out.parent)
+    found = [assess(sheet, config, node) for node in config.nodes]
     waive = waivers_for(
-        watched=all(one.means for one in assessments),
+        watched=all(one.means for one in found),
         braked=all(
             any(entry.parameter.key == quick_stop_ramp(node) for entry in one.outcomes)
-            for node, one in zip(config.nodes, assessments, strict=True)
+            for node, one in zip(config.nodes, found, strict=True)
         ),
     )
-    text = bus_text(proposal, ids, waive)
+    text = text_with(waive)
     config = _parsed(text, out.parent)
     return _judged(config, {node.name: sheet for node in config.nodes}, text)
+
+
+def _period_us(proposal: Proposal, ids: Sequence[int], folder: Path) -> int:
+    """Return the shortest period in which all frames are exchanged; raises ConfigError for none."""
+    everything = waivers_for(watched=False, braked=False)
+    for period_us in RUN_PERIODS_US:
+        text = bus_text(proposal, ids, everything, period_us=period_us)
+        try:
+            check_budget(_parsed(text, folder))
+        except ConfigError:
+            if period_us == RUN_PERIODS_US[-1]:
+                raise
+        else:
+            return period_us
+    return RUN_PERIODS_US[-1]
 
 
 def write_bus(learned: Learned, out: Path) -> None:

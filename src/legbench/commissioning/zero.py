@@ -10,7 +10,7 @@ from legbench.commissioning.status import read_counts
 from legbench.drives.errors import DriveError
 from legbench.drives.master.session import Session
 from legbench.drives.setup.config import NodeConfig
-from legbench.drives.setup.units import AxisUnits, wrap
+from legbench.drives.setup.units import AxisUnits
 from legbench.errors import ConfigError, RecordingError
 from legbench.recording.files import write_whole
 
@@ -28,9 +28,9 @@ class Zero:
 
     node: str
     motor_offset: int
-    """[counts]"""
-    link_offset: int
-    """[counts]"""
+    """Of the encoder of the position loop [counts]."""
+    link_offset: int | None
+    """Of the second encoder, none without one [counts]."""
 
 
 def measure(session: Session, posture: Sequence[float]) -> list[Zero]:
@@ -56,19 +56,23 @@ def measure(session: Session, posture: Sequence[float]) -> list[Zero]:
 def _node(session: Session, node: NodeConfig, angle: float) -> Zero:
     reads = [read_counts(session, node) for _ in range(READS)]
     offsets = []
-    for place, (axis, units) in enumerate((("motor", node.motor), ("link", node.link))):
-        shown = sorted(read[place] for read in reads)
+    for place, (axis, units) in enumerate(((node.side.value, node.motor), ("link", node.link))):
+        if units is None:
+            continue
+        shown = sorted(count for read in reads if (count := read[place]) is not None)
         if shown[-1] - shown[0] > STILL_COUNTS:
             raise DriveError(
                 f"{axis} encoder of '{node.name}' moves by {shown[-1] - shown[0]} counts while it "
                 f"is read, the limit is {STILL_COUNTS}; hold the leg still"
             )
         offsets.append(_offset(units, shown[READS // 2], angle))
-    return Zero(node=node.name, motor_offset=offsets[0], link_offset=offsets[1])
+    return Zero(
+        node=node.name, motor_offset=offsets[0], link_offset=offsets[1] if offsets[1:] else None
+    )
 
 
 def _offset(units: AxisUnits, shown: int, angle: float) -> int:
-    return wrap(shown - replace(units, offset_counts=0).to_counts(angle), units.bits)
+    return units.nearest(shown - replace(units, offset_counts=0).to_counts(angle), 0)
 
 
 def write(path: Path, zeros: Sequence[Zero], out: Path | None = None) -> Path:
@@ -79,7 +83,12 @@ def write(path: Path, zeros: Sequence[Zero], out: Path | None = None) -> Path:
         RecordingError: it cannot be read or written.
     """
     out = out or path
-    wanted = [value for zero in zeros for value in (zero.motor_offset, zero.link_offset)]
+    wanted = [
+        value
+        for zero in zeros
+        for value in (zero.motor_offset, zero.link_offset)
+        if value is not None
+    ]
     try:
         lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
         section, place = "", 0

@@ -4,10 +4,12 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 from legbench.drives.protocol.cia402 import Mode
-from legbench.drives.protocol.datatypes import DataType, pack, size_of
+from legbench.drives.protocol.datatypes import FORMATS, DataType, pack, size_of
 from legbench.drives.protocol.objects import LINK_SHORT, OBJECTS, TEMPERATURE, Key, ObjectEntry
 from legbench.drives.protocol.sdo import Abort
 from legbench.drives.setup.config import NodeConfig
+from legbench.drives.setup.configuration import interpolation_time
+from legbench.drives.setup.outcome import CYCLE, CYCLE_INDEX
 from legbench.drives.sheet.data_sheet import DataSheet
 
 USUAL_LINKS: tuple[Key, ...] = ((0x60E4, 1), (LINK_SHORT, 0))
@@ -18,9 +20,6 @@ EMCY = (0x1014, 0)
 MAX_SPEED = (0x6080, 0)
 """Max motor speed, whose unit is the maker's own: a data sheet's default would stop the motor."""
 MODE, MODE_DISPLAY, CYCLIC = (0x6060, 0), (0x6061, 0), int(Mode.CYCLIC_SYNCHRONOUS_POSITION)
-OWN_WAY: Mapping[Key, int] = {(0x60C2, 1): 1, (0x60C2, 2): -3, MODE: CYCLIC, MODE_DISPLAY: CYCLIC}
-"""What a drive works with that lacks the object: it interpolates over the usual cycle of 1 ms, in
-the only mode that it has."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,8 +45,14 @@ class Dictionary:
         return Abort.TOO_LOW if value < low else Abort.TOO_HIGH
 
 
-def dictionary_of(node: NodeConfig, sheet: DataSheet | None = None) -> Dictionary:
-    """Return the objects of one node: those of a data sheet, else those of the usual drive."""
+def dictionary_of(
+    node: NodeConfig, sheet: DataSheet | None = None, period_us: int = 1000
+) -> Dictionary:
+    """Return the objects of one node: those of a data sheet, else those of the usual drive.
+
+    A drive that lacks 60C2h interpolates over the period of SYNC [us], and one whose mode cannot be
+    chosen (6060h) has cyclic synchronous position mode alone.
+    """
     own = dict(_identity(node))
     if sheet is None:
         own |= {key: _number(OBJECTS[key]) + node.node_id for key in (*RELATIVE, EMCY)}
@@ -64,7 +69,9 @@ def dictionary_of(node: NodeConfig, sheet: DataSheet | None = None) -> Dictionar
     )
     shown = {entry.key for entry in entries if isinstance(entry.default, int)}
     hidden = {key: _number(entry) for key, entry in OBJECTS.items() if key not in shown}
-    hidden |= {key: value for key, value in OWN_WAY.items() if key not in shown}
+    value, exponent = interpolation_time(period_us)
+    own_way = {CYCLE: value, CYCLE_INDEX: exponent, MODE: CYCLIC, MODE_DISPLAY: CYCLIC}
+    hidden |= {key: own_way[key] for key in own_way if key not in shown}
     warmth = node.temperature_object
     return Dictionary(
         entries=entries,
@@ -85,8 +92,8 @@ def _identity(node: NodeConfig) -> Iterator[tuple[Key, int]]:
 
 def _with(entries: Iterable[ObjectEntry], own: Mapping[Key, int]) -> Iterator[ObjectEntry]:
     for entry in entries:
-        number = entry.kind not in (DataType.VISIBLE_STRING, DataType.OCTET_STRING)
-        yield replace(entry, default=own[entry.key]) if number and entry.key in own else entry
+        number = entry.kind in FORMATS and entry.key in own
+        yield replace(entry, default=own[entry.key]) if number else entry
 
 
 def _shown_only(entry: ObjectEntry) -> ObjectEntry:

@@ -8,9 +8,11 @@ from typing import final
 from legbench.drives.emulated.axis import SYNC_MISSING, Axis
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.dictionary import Dictionary, dictionary_of
-from legbench.drives.emulated.heartbeats import HeartbeatConsumer
-from legbench.drives.emulated.process_data import LAST_SYNCHRONOUS, ProcessData
+from legbench.drives.emulated.heartbeats import HeartbeatConsumer, HeartbeatProducer
+from legbench.drives.emulated.oddities import changed
+from legbench.drives.emulated.process_data import ProcessData
 from legbench.drives.emulated.store import ObjectStore
+from legbench.drives.emulated.warmth import HOT, WARM, show_temperature
 from legbench.drives.errors import SdoAbortError
 from legbench.drives.protocol.cia402 import DriveState
 from legbench.drives.protocol.frame import (
@@ -30,7 +32,6 @@ from legbench.drives.setup.config import NodeConfig, Parameter
 
 UNDER_VOLTAGE, OVER_TEMPERATURE = 0x3220, 0x4310
 HEARTBEAT_LOST, PDO_SHORT, PDO_LONG, SYNC_LENGTH, RPDO_LATE = 0x8130, 0x8210, 0x8220, 0x8240, 0x8250
-TARGET, HOT = (0x607A, 0), 90.0
 _ORDERS = {
     NmtCommand.START: NmtState.OPERATIONAL,
     NmtCommand.STOP: NmtState.STOPPED,
@@ -59,25 +60,29 @@ class EmulatedDrive:
         self._node, self._behaviour, self._kept = node, behaviour or Behaviour(), kept
         self.node_id = node.node_id
         self._random = random.Random(self._behaviour.seed * LAST_NODE + node.node_id)
-        self._dictionary = shown = dictionary or dictionary_of(node)
-        self._store = ObjectStore(shown.entries, self._check, self._written, shown.hidden)
+        how = self._behaviour
+        self._dictionary = shown = changed(dictionary or dictionary_of(node), node, how)
+        self._store = ObjectStore(
+            shown.entries, self._check, self._written, shown.hidden, lacking=how.lacking
+        )
         self._values = self._store.values
-        self.axis = Axis(node, self._behaviour, self._values, shown.links)
+        self.axis = Axis(node, how, self._values, shown.links)
         self._pdos = ProcessData(self._store)
-        self._sdo = SdoServer(self._store.read, self._store.write)
+        self._target = node.target_object.key
+        self._sdo = SdoServer(self._store.read, self._store.write, how.sdo_answers)
         self.state = NmtState.BOOT_UP
         self._now_ns = 0
         self._tick_ns = 0
-        self._boot_ns = 1000 * self._behaviour.boot_us
-        self._beat_ns = 0
+        self._boot_ns = 1000 * how.boot_us
+        self._beats = HeartbeatProducer()
         self._sync_ns: int | None = None
         self._fresh = False
         self._heartbeats = HeartbeatConsumer(self._values)
         self._out: list[tuple[int, Frame]] = []
-        self._mute = False
         self._recall()
 
     def _recall(self) -> None:
+        show_temperature(self._store, self._dictionary, self._node, WARM)
         for parameter in self._kept:
             with suppress(SdoAbortError):
                 self._store.recall(parameter.key, parameter.value)
@@ -152,8 +157,8 @@ class EmulatedDrive:
         """Bring on the lasting cause of an error, such as `UNDER_VOLTAGE`."""
         self._now_ns = now_ns
         self.axis.alarms.hold(code)
-        if code == OVER_TEMPERATURE and self._dictionary.temperature is not None:
-            self._values[self._dictionary.temperature] = round(HOT / self._node.temperature_scale)
+        if code == OVER_TEMPERATURE:
+            show_temperature(self._store, self._dictionary, self._node, HOT)
         self.axis.fault(code)
         self._forward()
 
@@ -173,7 +178,7 @@ class EmulatedDrive:
 
     def mute_heartbeat(self, mute: bool = True) -> None:
         """Stop producing heartbeats, while everything else goes on."""
-        self._mute = mute
+        self._beats.mute = mute
 
     # --- CiA 301 -----------------------------------------------------------------------------
 
@@ -192,8 +197,8 @@ class EmulatedDrive:
                 self._pdos.rebuild()
         elif key[0] == 0x1016:
             self._heartbeats.clear()
-        elif key[0] >= 0x6000:
-            if key == TARGET:
+        elif key[0] >= 0x6000 or key == self._target:
+            if key == self._target:
                 self._fresh = True
             self.axis.written(key, self._now_ns)
 
@@ -201,7 +206,7 @@ class EmulatedDrive:
         self.state = NmtState.PRE_OPERATIONAL
         self._pdos.rebuild()
         self.axis.power.boot()
-        self._beat_ns = self._now_ns
+        self._beats.since_ns = self._now_ns
         self._out.append((self._now_ns, heartbeat_frame(self.node_id, NmtState.BOOT_UP)))
 
     def _obey(self, command: NmtCommand) -> None:
@@ -239,29 +244,21 @@ class EmulatedDrive:
     def _rpdo(self, cob_id: int, data: bytes) -> None:
         if self.state is not NmtState.OPERATIONAL:
             return
-        pdo = self._pdos.rpdos[cob_id]
-        size = pdo.layout.size
+        size = self._pdos.rpdos[cob_id].layout.size
         if len(data) < size:
             self._send_now(self.axis.alarms.raise_(PDO_SHORT))
             return
         if len(data) > size:
             self._send_now(self.axis.alarms.raise_(PDO_LONG))
-        pdo.seen_ns = self._now_ns
         self._send_now(self.axis.alarms.clear(RPDO_LATE))
         window_ns = 1000 * self._values[0x1007, 0]
-        values = pdo.layout.unpack(data[:size])
-        if pdo.kind > LAST_SYNCHRONOUS:
-            self._pdos.apply(pdo, values)
-        elif not (window_ns and self._sync_ns and self._now_ns - self._sync_ns > window_ns):
-            pdo.waiting = values
+        late = bool(window_ns and self._sync_ns and self._now_ns - self._sync_ns > window_ns)
+        self._pdos.receive(cob_id, data[:size], self._now_ns, late=late)
 
     def _timers(self) -> None:
         now_ns, values = self._now_ns, self._values
-        beat_ns = 1_000_000 * values[0x1017, 0]
-        if beat_ns and now_ns - self._beat_ns >= beat_ns:
-            self._beat_ns = now_ns
-            if not self._mute:
-                self._out.append((now_ns, heartbeat_frame(self.node_id, self.state)))
+        if self._beats.due(1_000_000 * values[0x1017, 0], now_ns):
+            self._out.append((now_ns, heartbeat_frame(self.node_id, self.state)))
         if self._heartbeats.lost(now_ns):
             self._heartbeats.clear()
             self._connection_lost(HEARTBEAT_LOST)

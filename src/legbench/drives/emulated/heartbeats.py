@@ -43,3 +43,24 @@ class HeartbeatConsumer:
             word = self._values[0x1016, sub]
             if word >> 16 & 0x7F and word & 0xFFFF:
                 yield word >> 16 & 0x7F, 1_000_000 * (word & 0xFFFF)
+
+
+@final
+class HeartbeatProducer:
+    """Grid of the heartbeats that a drive produces (1017h).
+
+    Attributes:
+        since_ns: time of the last one, or of the boot-up message [ns].
+        mute: whether none is sent, while their time goes on.
+    """
+
+    def __init__(self) -> None:
+        self.since_ns = 0
+        self.mute = False
+
+    def due(self, period_ns: int, now_ns: int) -> bool:
+        """Whether a heartbeat is to be sent now; none is with a period of 0."""
+        if not period_ns or now_ns - self.since_ns < period_ns:
+            return False
+        self.since_ns = now_ns
+        return not self.mute

@@ -159,6 +159,16 @@ class ProcessData:
                     frames.append(Frame(pdo.cob_id, self.sample(pdo)))
         return frames
 
+    def receive(self, cob_id: int, data: bytes, now_ns: int, *, late: bool) -> None:
+        """Take an RPDO of the right length; a synchronous one that is late (1007h) is discarded."""
+        pdo = self.rpdos[cob_id]
+        pdo.seen_ns = now_ns
+        values = pdo.layout.unpack(data)
+        if pdo.kind > LAST_SYNCHRONOUS:
+            self.apply(pdo, values)
+        elif not late:
+            pdo.waiting = values
+
     def latch(self) -> None:
         """Apply the synchronous RPDOs received before a SYNC."""
         for pdo in self.rpdos.values():

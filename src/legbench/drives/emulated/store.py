@@ -5,6 +5,7 @@ from typing import final
 
 from legbench.drives.errors import CodecError
 from legbench.drives.protocol.datatypes import (
+    FORMATS,
     DataType,
     Value,
     pack,
@@ -34,10 +35,21 @@ class ObjectStore:
         check: Check,
         written: Written,
         hidden: Mapping[Key, int] | None = None,
+        *,
+        lacking: Abort = Abort.NO_OBJECT,
     ) -> None:
-        """Hold objects; `hidden` are numbers for the drive's own use that no SDO reaches."""
+        """Hold the power-on values.
+
+        Args:
+            entries: objects that there are.
+            check: asked before a value is taken.
+            written: told of every value that was taken.
+            hidden: numbers for the drive's own use that no SDO reaches.
+            lacking: code that refuses what is not there; that of the standard by default.
+        """
         self._hidden = hidden or {}
         self._entries = {entry.key: entry for entry in entries}
+        self._lacking = lacking
         self._indices = {index for index, _ in self._entries}
         self._check, self._written = check, written
         self.values: dict[Key, int] = {}
@@ -67,8 +79,9 @@ class ObjectStore:
         entry = self._known(index, sub)
         if entry.access is Access.WO:
             raise abort_error(Abort.WRITE_ONLY, index, sub)
-        if size_of(entry.kind) is None:
-            return pack(entry.kind, self._texts[entry.key])
+        if entry.kind not in FORMATS:
+            there = self._texts.get(entry.key)
+            return pack(entry.kind, self.values[entry.key] if there is None else there)
         return pack(entry.kind, fit(entry.kind, self.values[entry.key]))
 
     def write(self, index: int, sub: int, data: bytes) -> None:
@@ -107,16 +120,21 @@ class ObjectStore:
         if entry is not None and entry.access is Access.RW:
             self.put(entry, value)
 
-    def show(self, key: Key, value: int) -> None:
-        """Publish an actual value, saturated to what its object holds."""
-        low, high = range_of(self._entries[key].kind)
-        self.values[key] = min(max(value, low), high)
+    def show(self, key: Key, value: float) -> None:
+        """Publish a measured value, rounded and saturated to what its object holds."""
+        kind = self._entries[key].kind
+        if kind is DataType.REAL32:
+            self._texts[key] = float(value)
+            return
+        low, high = range_of(kind)
+        self.values[key] = min(max(round(value), low), high)
 
     def _known(self, index: int, sub: int) -> ObjectEntry:
         entry = self._entries.get((index, sub))
         if entry is None:
             known = index in self._indices
-            raise abort_error(Abort.NO_SUB_INDEX if known else Abort.NO_OBJECT, index, sub)
+            usual = known and self._lacking is Abort.NO_OBJECT
+            raise abort_error(Abort.NO_SUB_INDEX if usual else self._lacking, index, sub)
         return entry
 
 

@@ -19,13 +19,15 @@ from legbench.drives.protocol.cia402 import POWERED, Mode, decode_state
 from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.emcy import MEANINGS
 from legbench.drives.protocol.nmt import NmtCommand, nmt_frame
+from legbench.drives.protocol.sdo import ABSENT
 from legbench.drives.setup.config import BusConfig, Identity, NodeConfig
 from legbench.drives.setup.configuration import configuration
-from legbench.drives.setup.outcome import MISSING, Outcome
+from legbench.drives.setup.outcome import Outcome
+from legbench.drives.setup.quirks import ModeShown
 from legbench.interrupts import shielded
 
-MODE_PATIENCE = 50
-"""Number of reads of 6061h, 10 ms apart, until the mode must be there."""
+MODE_LOOK_NS = 10_000_000
+"""Time between two reads of 6061h [ns]."""
 U32, I32, I8, U16 = (
     DataType.UNSIGNED32,
     DataType.INTEGER32,
@@ -176,28 +178,43 @@ class BringUp:
         return outcomes
 
     def _await_mode(self, node: NodeConfig) -> None:
-        """Read 6061h until it shows the mode written to 6060h, behind which it lags."""
-        timebase, mode = self._port.timebase, 0
-        for _ in range(MODE_PATIENCE):
+        """Read 6061h until it shows the mode written to 6060h, behind which it lags.
+
+        A drive that shows its mode only once it is enabled is asked then, see `ModePoll`.
+        """
+        quirks, timebase = node.quirks, self._port.timebase
+        if quirks.mode_shown is ModeShown.ENABLED:
+            return
+        until_ns = timebase.now_ns() + 1_000_000 * quirks.mode_patience_ms
+        while True:
             mode = self.sdo(node).get_int(0x6061, 0, I8)
             if mode == Mode.CYCLIC_SYNCHRONOUS_POSITION:
                 return
-            timebase.wait_until(timebase.now_ns() + 10_000_000)
+            if timebase.now_ns() >= until_ns:
+                break
+            timebase.wait_until(timebase.now_ns() + MODE_LOOK_NS)
         raise DriveError(
-            f"node {node.node_id} ('{node.name}') stays in mode {mode}, asked for was 8; is its "
-            "halt bit set?"
+            f"node {node.node_id} ('{node.name}') stays in mode {mode} (6061h) for "
+            f"{quirks.mode_patience_ms} ms, asked for was 8: is its halt bit set? If the drive is "
+            "slow, raise mode_patience_ms in [node.quirks]; if it shows its mode only once it is "
+            f'enabled, give mode_shown = "{ModeShown.ENABLED}"'
         )
 
     def preload(self, node: NodeConfig) -> int:
         """Set the target to the motor position (607Ah from 6064h); returns it [counts]."""
-        sdo = self.sdo(node)
-        actual = sdo.get_int(0x6064, 0, I32)
-        sdo.put(0x607A, 0, I32, actual)
-        if sdo.get_int(0x607A, 0, I32) != actual:
+        sdo, target = self.sdo(node), node.target_object
+        actual = self.position(node)
+        sdo.put(target.index, target.sub, target.kind, actual)
+        if sdo.get_int(target.index, target.sub, target.kind) != actual:
             raise DriveError(
                 f"node {node.node_id} ('{node.name}') does not take a target position by SDO"
             )
         return actual
+
+    def position(self, node: NodeConfig) -> int:
+        """Position of a drive as its object shows it (6064h) [counts]; raises as `SdoPort.get`."""
+        entry = node.motor_object
+        return self.sdo(node).get_int(entry.index, entry.sub, entry.kind)
 
     def soft_limits(self, node: NodeConfig) -> tuple[int, int] | None:
         """Range to which the drive clamps targets (607Dh) [counts]; none where it does not."""
@@ -205,7 +222,7 @@ class BringUp:
         try:
             low, high = sdo.get_int(0x607D, 1, I32), sdo.get_int(0x607D, 2, I32)
         except SdoAbortError as error:
-            if error.code in MISSING:
+            if error.code in ABSENT:
                 return None
             raise
         return (low, high) if low < high else None
@@ -219,7 +236,7 @@ class BringUp:
         limits = self.soft_limits(node)
         if limits is None:
             return
-        actual = self.sdo(node).get_int(0x6064, 0, I32)
+        actual = self.position(node)
         if not limits[0] <= actual <= limits[1]:
             ends = sorted(map(node.motor.to_rad, limits))
             raise DriveError(
@@ -229,10 +246,12 @@ class BringUp:
                 "when enabled: move it back by hand, or correct soft_limits and offset_counts"
             )
 
-    def temperature(self, node: NodeConfig) -> int | None:
+    def temperature(self, node: NodeConfig) -> float | None:
         """Reading of the drive's temperature [counts]; none if the bus file names no object."""
         entry = node.temperature_object
-        return None if entry is None else self.sdo(node).get_int(entry.index, entry.sub, entry.kind)
+        if entry is None:
+            return None
+        return self.sdo(node).get_number(entry.index, entry.sub, entry.kind)
 
     def unpower(self) -> None:
         """Stop drives that are found with power, by quick stop, before anything is written.

@@ -16,9 +16,9 @@ U32 = DataType.UNSIGNED32
 
 def read_identity(sdo: SdoPort) -> Identity:
     """Read the identity object of a node (1018h); raises as `SdoPort.read` does."""
-    vendor, product = (sdo.get_int(0x1018, sub, U32) for sub in (1, 2))
-    # CiA 301 (7.5.2.19) demands the vendor alone; revision and serial number may be missing.
-    revision, serial = (sdo.find_int(0x1018, sub, U32) for sub in (3, 4))
+    vendor = sdo.get_int(0x1018, 1, U32)
+    # CiA 301 (7.5.2.19) demands the vendor alone.
+    product, revision, serial = (sdo.find_int(0x1018, sub, U32) for sub in (2, 3, 4))
     return Identity(vendor=vendor, product=product, revision=revision, serial=serial)
 
 

@@ -2,7 +2,7 @@
 
 from typing import final
 
-from legbench.drives.protocol.emcy import Emergency, decode_emcy
+from legbench.drives.protocol.emcy import MEANINGS, Emergency, decode_emcy
 from legbench.drives.protocol.nmt import HeartbeatWatch, NmtState, decode_heartbeat
 from legbench.drives.setup.config import BusConfig, NodeConfig
 
@@ -16,7 +16,7 @@ class NodeWatch:
 
     Attributes:
         state: its NMT state, as last heard.
-        emergency: the first one since `arm`.
+        emergency: the first one since `arm` that is no warning.
         history: every emergency ever heard, the all-clear included.
         missed: cycles without process data since two in a row had theirs: every second answer is
             no answer, and may be an old one.
@@ -61,7 +61,8 @@ class NodeWatch:
         if emergency is None:
             return
         self.history.append(emergency)
-        if emergency.code != 0 and self.emergency is None:
+        warns = emergency.code in self._node.quirks.warnings
+        if emergency.code != 0 and not warns and self.emergency is None:
             self.emergency = emergency
 
     def cycle(self, *, complete: bool) -> None:
@@ -75,11 +76,18 @@ class NodeWatch:
             self.missed += 1
             self.lost_total += 1
 
+    def _way(self) -> str:
+        """How to go on after an emergency that only the maker of the drive can explain."""
+        if self.emergency is None or self.emergency.code in MEANINGS:
+            return ""
+        code = f"0x{self.emergency.code:04X}"
+        return f"; if its manual calls it a warning, give warnings = [{code}] in [node.quirks]"
+
     def trouble(self, now_ns: int, lost_frames: int) -> tuple[str, str] | None:
         """Cause and message of what is wrong with the drive; none if nothing is."""
         who = self._who
         if self.emergency is not None:
-            return "drive emergency", f"{who}: {self.emergency}"
+            return "drive emergency", f"{who}: {self.emergency}{self._way()}"
         if self._rebooted:
             return "drive reset", f"{who} has started again; its configuration is gone"
         if self.missed >= lost_frames:

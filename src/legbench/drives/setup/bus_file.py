@@ -10,15 +10,19 @@ from legbench.drives.errors import CodecError
 from legbench.drives.protocol.datatypes import SHORT_NAMES
 from legbench.drives.protocol.objects import name_of
 from legbench.drives.protocol.pdo import Mapped
-from legbench.drives.setup.config import (
-    NOT_IN_FILES,
+from legbench.drives.setup.config import NOT_IN_FILES, BusConfig, Identity, NodeConfig, Parameter
+from legbench.drives.setup.encoders import Side
+from legbench.drives.setup.pdos import (
+    CONTROLWORD,
+    LINK_POSITION_SHORT,
+    POSITION_ACTUAL,
     RPDO,
-    BusConfig,
-    Identity,
-    NodeConfig,
-    Parameter,
+    STATUSWORD,
+    TARGET_POSITION,
     PdoConfig,
+    packed,
 )
+from legbench.drives.setup.quirks import ModeShown, Quirks
 from legbench.drives.setup.units import AxisUnits
 from legbench.errors import ConfigError
 from legbench.limits.safety import SafetyLimits
@@ -32,6 +36,14 @@ _PLAIN_TYPES: dict[str, tuple[type, ...]] = {
     "float": (int, float),
     "bool": (bool,),
 }
+OBJECT_KEYS = (
+    "motor_object",
+    "target_object",
+    "link_object",
+    "torque_object",
+    "temperature_object",
+)
+"""Keys of a node that name an object."""
 LARGEST = 1e18
 """Bound that the magnitude of every number of a file stays below."""
 AXES = 2
@@ -110,21 +122,18 @@ def _node(given: dict[str, Any], folder: Path) -> NodeConfig:
     where = f"node '{name}'"
     identity = {key: given.pop(key) for key in _IDENTITY if key in given}
     given["identity"] = _build(Identity, where, identity)
-    for axis in ("motor", "link"):
-        given[axis] = _build(AxisUnits, f"{where} {axis}", _table(axis, given.get(axis, {})))
+    _encoders(where, given)
     if "eds" in given:
         if not isinstance(given["eds"], str):
             raise ConfigError(f"{where}: eds is {given['eds']!r}; it must be the path of a file")
         given["eds"] = folder / given["eds"]
     if "id" in given:
         given["node_id"] = given.pop("id")
-    for key in ("link_object", "temperature_object"):
+    for key in OBJECT_KEYS:
         if key in given:
             given[key] = parse_object(given[key])
-    for key, plural in (("rpdo", "rpdos"), ("tpdo", "tpdos")):
-        if key in given:
-            usual = {"deadline_ms": RPDO.deadline_ms} if key == "rpdo" else {}
-            given[plural] = tuple(_pdo(where, entry, usual) for entry in _list(key, given.pop(key)))
+    given["quirks"] = _quirks(where, given.get("quirks", {}))
+    _pdos(where, given)
     if "soft_limits" in given:
         given["soft_limits"] = _range("soft_limits", given["soft_limits"])
     parameters = _table("parameters", given.get("parameters", {}))
@@ -133,17 +142,56 @@ def _node(given: dict[str, Any], folder: Path) -> NodeConfig:
     for key in keys:
         if keys.count(key) > 1:
             raise ConfigError(f"{where} gives parameter {name_of(*key)} twice")
-    done = (
-        "identity",
-        "motor",
-        "link",
-        "link_object",
-        "temperature_object",
-        "rpdos",
-        "tpdos",
-        "eds",
-    )
+    done = ("identity", "motor", "link", "side", "quirks", "rpdos", "tpdos", "eds", *OBJECT_KEYS)
     return _build(NodeConfig, where, given, converted=(*done, "parameters", "soft_limits"))
+
+
+def _encoders(where: str, given: dict[str, Any]) -> None:
+    """Turn the tables of a drive's encoders into units: [node.motor], [node.link], or both.
+
+    A drive that has the one of the link alone closes its position loop over it.
+    """
+    found = [axis for axis in ("motor", "link") if axis in given]
+    if not found:
+        raise ConfigError(f"{where} has no encoder; describe it in [node.motor], [node.link]")
+    units = {
+        axis: _build(AxisUnits, f"{where} {axis}", _table(axis, given[axis])) for axis in found
+    }
+    given["motor"] = units[found[0]]
+    given["link"] = units["link"] if len(found) == 2 else None
+    given["side"] = Side(found[0])
+
+
+def _quirks(where: str, value: object) -> Quirks:
+    given = _table("quirks", value)
+    codes = _list("warnings", given.get("warnings", []))
+    for code in codes:
+        if isinstance(code, bool) or not isinstance(code, int):
+            raise ConfigError(f"{where} quirks: warnings holds {code!r}; it must be a whole number")
+    given["warnings"] = tuple(codes)
+    shown = given.get("mode_shown", ModeShown.CONFIGURED)
+    if shown not in list(ModeShown):
+        raise ConfigError(
+            f"{where} quirks: mode_shown is {shown!r}; it must be one of {', '.join(ModeShown)}"
+        )
+    given["mode_shown"] = ModeShown(shown)
+    return _build(Quirks, f"{where} quirks", given, converted=("warnings", "mode_shown"))
+
+
+def _pdos(where: str, given: dict[str, Any]) -> None:
+    """Turn the tables of the PDOs into process data; what is not given is packed by itself."""
+    for key, plural in (("rpdo", "rpdos"), ("tpdo", "tpdos")):
+        if key in given:
+            usual = {"deadline_ms": RPDO.deadline_ms} if key == "rpdo" else {}
+            given[plural] = tuple(_pdo(where, entry, usual) for entry in _list(key, given.pop(key)))
+    target = given.get("target_object", TARGET_POSITION)
+    given.setdefault("rpdos", packed((CONTROLWORD, target), RPDO.deadline_ms))
+    answers = [STATUSWORD, given.get("motor_object", POSITION_ACTUAL)]
+    if given["link"] is not None:
+        answers.append(given.get("link_object", LINK_POSITION_SHORT))
+    if "torque_object" in given:
+        answers.append(given["torque_object"])
+    given.setdefault("tpdos", packed(answers))
 
 
 def _pdo(where: str, table: object, usual: Mapping[str, int]) -> PdoConfig:

@@ -6,6 +6,7 @@ from legbench.drives.protocol.cia402 import Mode
 from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.frame import COB_INVALID, COB_NO_REMOTE, SYNC_ID
 from legbench.drives.protocol.objects import PDO_COUNT, Key
+from legbench.drives.setup.bus_numbers import WORD
 from legbench.drives.setup.config import BusConfig, NodeConfig, Parameter, PdoConfig
 from legbench.errors import ConfigError
 
@@ -57,7 +58,7 @@ def quick_stop_ramp(node: NodeConfig) -> Key:
 def configuration(bus: BusConfig, node: NodeConfig) -> Iterator[Parameter]:
     """Return all objects that a drive is sent in pre-operational, default values included."""
     value, exponent = interpolation_time(bus.period_us)
-    watched = bus.master_id << 16 | HEARTBEATS_MISSED * bus.master_heartbeat_ms
+    watched = bus.master_id << 16 | min(WORD, HEARTBEATS_MISSED * bus.beat_ms)
     yield _parameter(0x1005, 0, U32, SYNC_ID)  # bit 30 clear: the drive is no SYNC producer
     yield _parameter(0x1006, 0, U32, bus.period_us)
     if node.heartbeat_consumer:

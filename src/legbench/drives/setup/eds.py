@@ -26,7 +26,7 @@ def dcf_text(bus: BusConfig, node: NodeConfig) -> str:
     """The data sheet with what `node` is and is told: parameter values and node id."""
     values: dict[Key, int] = {
         (0x1018, 1): node.identity.vendor,
-        (0x1018, 2): node.identity.product,
+        (0x1018, 2): node.identity.product or 0,
         (0x1018, 3): node.identity.revision or 0,
         (0x1018, 4): node.identity.serial or 0,
     }

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from legbench.drives.protocol.objects import Key, name_of
-from legbench.drives.protocol.sdo import MEANINGS, Abort
+from legbench.drives.protocol.sdo import ABSENT, MEANINGS, Abort
 from legbench.drives.setup.needs import Need, Row, row_of
-from legbench.drives.setup.parameters import Parameter
+from legbench.drives.setup.parameters import PDO_OBJECTS, Parameter
 
 MISSING = (Abort.NO_OBJECT, Abort.NO_SUB_INDEX)
 """Abort codes of a drive that has no such object."""
@@ -41,8 +41,11 @@ class Outcome:
 
     @property
     def missing(self) -> bool:
-        """Whether the drive has no such object."""
-        return self.code in MISSING
+        """Whether the drive has no such object.
+
+        Some say so by a general code; then the object cannot be read, either.
+        """
+        return self.code in MISSING or (self.code in ABSENT and self.there is None)
 
     @property
     def passes(self) -> bool:
@@ -76,7 +79,9 @@ class Outcome:
         """Reason for which the drive cannot be used, and the way out."""
         if self.row.need is Need.PROTECTION:
             return f"{self.row.purpose}: give a value and a type that the drive takes"
-        return f"it is required: {self.row.purpose}"
+        way = ": map its objects into the PDOs that the drive has, in the way that it has them"
+        pdo = self.parameter.index in PDO_OBJECTS
+        return f"it is required: {self.row.purpose}{way if pdo else ''}"
 
     @property
     def line(self) -> str | None:

@@ -37,12 +37,12 @@ def link_candidates(sheet: DataSheet) -> tuple[Mapped, ...]:
 
 
 def temperature_candidates(sheet: DataSheet) -> tuple[Mapped, ...]:
-    """Whole numbers whose name says that they show a temperature."""
+    """Numbers whose name says that they show a temperature."""
     return _mapped(
         entry
         for entry in sheet.objects.values()
         if entry.access is Access.RO
-        and entry.kind in FORMATS
+        and (entry.kind in FORMATS or entry.kind is DataType.REAL32)
         and (size_of(entry.kind) or 9) <= 4
         and entry.kind is not DataType.BOOLEAN
         and _TEMPERATURE.search(entry.name)

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
-from legbench.drives.protocol.datatypes import range_of, size_of
+from legbench.drives.protocol.datatypes import FORMATS, range_of, size_of
 from legbench.drives.protocol.frame import COB_INVALID, COB_MASK
 from legbench.drives.protocol.objects import PDO_COUNT, Access, Key
 from legbench.drives.protocol.sdo import Abort
@@ -48,7 +48,7 @@ def _written(
         known = any(index == parameter.index for index, _ in sheet.objects)
         return (Abort.NO_SUB_INDEX if known else Abort.NO_OBJECT), None
     there = sheet.default(key, node.node_id)
-    if size_of(entry.kind) != size_of(parameter.kind):
+    if size_of(entry.kind) != size_of(parameter.kind) or entry.kind not in FORMATS:
         return Abort.TYPE_LENGTH, None
     if entry.access in (Access.RO, Access.CONST):
         return Abort.READ_ONLY, parameter.value if there is None else there

@@ -5,7 +5,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from legbench.drives.protocol.datatypes import range_of
+from legbench.drives.protocol.datatypes import FORMATS, range_of
 from legbench.drives.protocol.objects import Key
 from legbench.drives.protocol.pdo import Mapped
 from legbench.drives.setup.bus_file import format_object
@@ -26,9 +26,11 @@ MARK = "MEASURE"
 """Word in the comment of every line whose value is a guess."""
 COUNTS_PER_REV, GEAR = 65536, 6.0
 """Encoder and gear of the emulated leg, which stand until somebody has measured [counts], [-]."""
-ONE_FRAME_DEADLINE_US, TWO_FRAMES_DEADLINE_US = 650, 750
-"""Deadline of the answers after SYNC, by the number of TPDOs of a drive; two of 6 and of 4 bytes of
-both drives take 420 us of the wire after a reply delay of up to 250 us [us]."""
+ONE_ENCODER = "none"
+"""Word that stands for no second encoder, where an object is asked for."""
+TORQUE = (0x6077, 0)
+TORQUE_SCALE = 0.01
+"""Torque at the joint of one count of the emulated drive's torque [N m]."""
 WINDOW_RAD, TORQUE_PERMILLE, RAMP = 0.4, 800, 20_000.0
 """Following error window [rad], torque limit [permille of rated], quick stop [rad/s2]."""
 SOFT_LIMITS = ((-1.2, 1.0), (-1.0, 1.2))
@@ -44,62 +46,92 @@ class Proposal:
     """Path of the data sheet, relative to the bus file."""
     rpdos: tuple[PdoConfig, ...]
     tpdos: tuple[PdoConfig, ...]
-    link: Mapped
+    motor: Mapped
+    """Position actual value, in the type that the drive has."""
+    target: Mapped
+    link: Mapped | None
+    """Object that shows the position of the link; none on a drive with one encoder."""
     links: tuple[Mapped, ...]
     """All objects that may show the position of the link."""
+    torque: Mapped | None
+    """Torque that stands for that of the spring on a drive with one encoder."""
     temperature: Mapped | None
 
 
-def propose(sheet: DataSheet, eds: str, link: Mapped | None = None) -> Proposal:
+def propose(sheet: DataSheet, eds: str, link: Mapped | str | None = None) -> Proposal:
     """Choose process data and encoders for the drives of a data sheet.
 
     Args:
         sheet: the drive.
         eds: path of its file, relative to the bus file.
-        link: object that shows the position of the link; by default the likeliest one.
+        link: object that shows the position of the link, or `ONE_ENCODER` for none; by default the
+            likeliest one, or none where no object looks like it.
 
     Raises:
         ConfigError: the drive cannot carry the process data of a leg; the message names the object.
     """
     links = link_candidates(sheet)
-    shown = link or (links[0] if links else None)
-    if shown is None:
-        raise ConfigError(
-            f"{sheet.name}: no object shows a second position, which is the link's; name one that "
-            'does with --link, such as --link "60E4:01 i32"'
-        )
-    known = sheet.objects.get(shown.key)
-    if known is None:
+    shown = link if isinstance(link, Mapped) else None
+    if link is None and links:
+        shown = links[0]
+    if shown is not None and not sheet.has(shown.key):
         raise ConfigError(f"{sheet.name}: {shown} is missing; name another object with --link")
-    rpdos = choose(sheet, (CONTROLWORD, TARGET_POSITION), commands=True)
-    tpdos = choose(sheet, (STATUSWORD, POSITION_ACTUAL, shown), commands=False)
-    for chosen, words, what in (
-        (rpdos, "RPDOs", f"{CONTROLWORD} and {TARGET_POSITION}"),
-        (tpdos, "TPDOs", f"{STATUSWORD}, {POSITION_ACTUAL} and {shown}"),
-    ):
-        if chosen is None:
-            numbers = sheet.pdos(commands=words == "RPDOs")
-            raise ConfigError(
-                f"{sheet.name}: its {len(numbers)} {words} cannot carry {what} at every SYNC: they "
-                "are fixed otherwise, or too few; name another link object with --link, or map "
-                "them with the maker's tool"
-            )
+    motor, target = _typed(sheet, POSITION_ACTUAL), _typed(sheet, TARGET_POSITION)
+    second = shown or _torque(sheet)
+    answers = (STATUSWORD, motor) if second is None else (STATUSWORD, motor, second)
     temperatures = temperature_candidates(sheet)
     return Proposal(
         sheet=sheet,
         eds=eds,
-        rpdos=rpdos or (),
-        tpdos=tpdos or (),
+        rpdos=_carried(sheet, (CONTROLWORD, target), commands=True),
+        tpdos=_carried(sheet, answers, commands=False),
+        motor=motor,
+        target=target,
         link=shown,
         links=links,
+        torque=_torque(sheet) if shown is None else None,
         temperature=temperatures[0] if temperatures else None,
     )
 
 
-def bus_text(proposal: Proposal, node_ids: Sequence[int], waive: Sequence[str] = ()) -> str:
+def _typed(sheet: DataSheet, usual: Mapped) -> Mapped:
+    """Return an object in the type that the drive has, if that is a whole number."""
+    known = sheet.objects.get(usual.key)
+    return usual if known is None or known.kind not in FORMATS else Mapped(*usual.key, known.kind)
+
+
+def _torque(sheet: DataSheet) -> Mapped | None:
+    known = sheet.objects.get(TORQUE)
+    if known is None or not known.mappable or known.kind not in FORMATS:
+        return None
+    return Mapped(*TORQUE, known.kind)
+
+
+def _carried(
+    sheet: DataSheet, needed: Sequence[Mapped], *, commands: bool
+) -> tuple[PdoConfig, ...]:
+    """Return the PDOs that carry some objects; raises ConfigError where none do."""
+    chosen = choose(sheet, needed, commands=commands)
+    if chosen is not None:
+        return chosen
+    numbers, words = sheet.pdos(commands=commands), "RPDOs" if commands else "TPDOs"
+    raise ConfigError(
+        f"{sheet.name}: its {len(numbers)} {words} cannot carry "
+        f"{', '.join(map(str, needed))} at every SYNC: they are fixed otherwise, or too few; name "
+        f"another link object with --link, or --link {ONE_ENCODER}, or map them with the maker's "
+        "tool"
+    )
+
+
+def bus_text(
+    proposal: Proposal,
+    node_ids: Sequence[int],
+    waive: Sequence[str] = (),
+    *,
+    period_us: int = 1000,
+) -> str:
     """Return the text of a bus file; every line whose value is a guess has the mark."""
     sheet = proposal.sheet
-    two = len(proposal.tpdos) > 1
     who = f"{sheet.product_name or sheet.name} of {sheet.vendor_name or 'an unknown maker'}"
     lines = [
         f"# A leg on drives of the kind {who}.",
@@ -111,8 +143,8 @@ def bus_text(proposal: Proposal, node_ids: Sequence[int], waive: Sequence[str] =
         'interface = "socketcan"',
         'channel = "can0"',
         "bitrate = 1_000_000",
-        "period_us = 1000",
-        f"tpdo_deadline_us = {TWO_FRAMES_DEADLINE_US if two else ONE_FRAME_DEADLINE_US}",
+        f"period_us = {period_us}",
+        f"reply_delay_us = 250  # {MARK}: from SYNC to the first answer, by the drive manual",
         "master_id = 126",
         "heartbeat_ms = 20",
         "master_heartbeat_ms = 10",
@@ -143,11 +175,11 @@ def _node(proposal: Proposal, place: int, node_id: int) -> Iterator[str]:
         yield f"# serial = 0  # {MARK}: two drives of a kind are told apart by it alone"
     else:
         yield "# No serial number: the drive tells none, so look at the labels before each run."
-    yield f'link_object = "{format_object(proposal.link)}"' + _other_links(proposal)
+    yield from _objects(proposal)
     if proposal.temperature is not None:
         entry = format_object(proposal.temperature)
         yield f'# temperature_object = "{entry}"  # {MARK}: its scale and its place'
-        yield f"# temperature_scale = 0.1  # {MARK} [deg C a count]"
+        yield f"# temperature_scale = 1.0  # {MARK} [deg C a count]"
     if place < len(SOFT_LIMITS) and all(sheet.writable((0x607D, sub)) for sub in (1, 2)):
         low, high = SOFT_LIMITS[place]
         yield f"soft_limits = [{low}, {high}]  # {MARK}: of the motor, in the drive itself [rad]"
@@ -156,24 +188,39 @@ def _node(proposal: Proposal, place: int, node_id: int) -> Iterator[str]:
     yield from _pdos(proposal)
 
 
-def _other_links(proposal: Proposal) -> str:
-    others = [format_object(entry) for entry in proposal.links if entry != proposal.link]
-    return f"  # {MARK}: whether it is the link's" + (
-        f"; else {', '.join(others)}" if others else ""
-    )
+def _objects(proposal: Proposal) -> Iterator[str]:
+    """Yield the objects of positions and torque, where they are not the usual ones."""
+    if proposal.motor != POSITION_ACTUAL:
+        yield f'motor_object = "{format_object(proposal.motor)}"'
+    if proposal.target != TARGET_POSITION:
+        yield f'target_object = "{format_object(proposal.target)}"'
+    if proposal.link is not None:
+        others = [format_object(entry) for entry in proposal.links if entry != proposal.link]
+        more = f"; else {', '.join(others)}" if others else ""
+        link = format_object(proposal.link)
+        yield f'link_object = "{link}"  # {MARK}: whether it is the link\'s{more}'
+        return
+    yield "# One encoder, at the motor: name a second one, if there is one, as link_object."
+    if proposal.torque is not None:
+        yield f'torque_object = "{format_object(proposal.torque)}"'
+        yield f"torque_scale = {TORQUE_SCALE}  # {MARK}: torque at the joint of one count [N m]"
 
 
 def _axes(proposal: Proposal, place: int) -> Iterator[str]:
     sign = -1 if place % 2 else 1
-    for axis, gear in (("motor", GEAR), ("link", 1.0)):
+    axes = [("motor", GEAR, proposal.motor)]
+    if proposal.link is not None:
+        axes.append(("link", 1.0, proposal.link))
+    for axis, gear, entry in axes:
         yield ""
         yield f"[node.{axis}]"
         yield f"counts_per_rev = {COUNTS_PER_REV}  # {MARK}: counts a turn of the encoder's shaft"
         yield f"gear = {gear}  # {MARK}: turns of that shaft for one turn of the {axis}"
         yield f"sign = {sign}  # {MARK}: 1 if counts grow forward"
         yield f"offset_counts = 0  # {MARK}: legbench drives zero"
-        if axis == "link":
-            yield f"bits = {proposal.link.bits}"
+        yield f"bits = {entry.bits}"
+        if range_of(entry.kind)[0] == 0:
+            yield "lowest_count = 0  # an unsigned object"
 
 
 def _parameters(sheet: DataSheet) -> Iterator[str]:
