@@ -226,6 +226,9 @@ def test_a_drive_with_one_encoder_leads_a_leg_by_its_torque_or_tells_none(tmp_pa
     (tmp_path / "leg.toml").unlink()
     bus = learned_by(tmp_path, stranger().without(0x60E4, 0x6077))
     assert {one.torque_object for one in bus.nodes} == {None}
+    assert bus.waive == ("spring watch",)
+    findings = {one.object: one for one in check(tmp_path / "leg.toml").assessments[0].findings}
+    assert "controllers that need them are refused" in findings["second position"].remark
     # Two encoders of 32 bits need two answers of each drive, and so a longer period.
     (tmp_path / "leg.toml").unlink()
     assert learned_by(tmp_path, stranger()).period_us == 2000

@@ -20,7 +20,7 @@ from legbench.drives.sheet.candidates import link_candidates, temperature_candid
 from legbench.drives.sheet.data_sheet import DataSheet
 from legbench.drives.sheet.mapping import choose
 from legbench.errors import ConfigError
-from legbench.limits.upper_ends import MASTER_WATCH, QUICK_STOP_RAMP
+from legbench.limits.upper_ends import MASTER_WATCH, QUICK_STOP_RAMP, SPRING_WATCH
 
 MARK = "MEASURE"
 """Word in the comment of every line whose value is a guess."""
@@ -268,14 +268,16 @@ def _pdos(proposal: Proposal) -> Iterator[str]:
                 yield f"deadline_ms = {pdo.deadline_ms}"
 
 
-def waivers_for(*, watched: bool, braked: bool) -> tuple[str, ...]:
+def waivers_for(proposal: Proposal, *, watched: bool, braked: bool) -> tuple[str, ...]:
     """Names of the protections that drives have to do without.
 
     Args:
+        proposal: encoders of the drives.
         watched: a means of every drive stops it when its master is gone.
         braked: every drive takes the ramp of a quick stop.
     """
-    names = ((MASTER_WATCH, watched), (QUICK_STOP_RAMP, braked))
+    sprung = proposal.link is not None or proposal.torque is not None
+    names = ((MASTER_WATCH, watched), (QUICK_STOP_RAMP, braked), (SPRING_WATCH, sprung))
     return tuple(name for name, has in names if not has)
 
 
