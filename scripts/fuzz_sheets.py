@@ -107,7 +107,7 @@ def learned(text: bytes) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Mutate and count; 1 if something else than a refusal was raised."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--mutations", type=int, default=2000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("sheets", type=Path, nargs="*", help="other data sheets to begin with")

@@ -55,6 +55,7 @@ def bus_of(eds: Path) -> BusConfig:
 
 
 def _on(one: NodeConfig, eds: Path) -> NodeConfig:
+    assert one.link is not None
     link = replace(one.link, bits=32)
     return replace(one, eds=eds, link=link, link_object=LINK_POSITION, tpdos=TPDOS)
 
