@@ -5,7 +5,13 @@ from typing import Annotated
 
 from tyro.conf import subcommand
 
-from legbench.cli import drives_moving, drives_reading, drives_serving, drives_timing
+from legbench.cli import (
+    drives_moving,
+    drives_reading,
+    drives_serving,
+    drives_sheets,
+    drives_timing,
+)
 from legbench.cli.drives_reading import Bench
 from legbench.cli.parse import parse
 from legbench.interrupts import stop_on_interrupt
@@ -46,6 +52,14 @@ class DrivesArguments:
         | Annotated[
             drives_reading.Budget,
             subcommand("budget", description="what the schedule takes of the wire at worst"),
+        ]
+        | Annotated[
+            drives_sheets.Learn,
+            subcommand("learn", description="a vendor's data sheet to a bus file to begin with"),
+        ]
+        | Annotated[
+            drives_sheets.Check,
+            subcommand("check", description="a bus file against its drives' data sheets"),
         ]
         | Annotated[
             drives_serving.Emulate,

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from legbench.cli.drives_reading import Bench
-from legbench.cli.output import note, print_json
+from legbench.cli.output import note, print_json, report_error
 from legbench.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -26,6 +26,21 @@ def _check_time(name: str, value: float) -> None:
 
 def _at_bitrate(config: "BusConfig", bitrate: int | None) -> "BusConfig":
     return config if bitrate is None else replace(config, bitrate=bitrate)
+
+
+def _wearing(config: "BusConfig", eds: Path | None) -> "BusConfig":
+    """Give all nodes of a bus one data sheet, if there is one."""
+    if eds is None:
+        return config
+    return replace(config, nodes=tuple(replace(node, eds=eds) for node in config.nodes))
+
+
+def _tell_problems(config: "BusConfig") -> None:
+    """Say which drives cannot be used as the bus file says; they are served all the same."""
+    from legbench.commissioning.learn import problems_of
+
+    for problem in problems_of(config):
+        report_error(problem)
 
 
 def _print_state(as_json: bool, at: float, node: str, state: str) -> None:
@@ -50,6 +65,8 @@ class Emulate:
     """How other processes reach it: a socket file, or python-can's slcan on a terminal."""
     bare: bool = False
     """Nothing on the shafts: no MuJoCo."""
+    eds: Path | None = None
+    """Data sheet (EDS) whose dictionary all drives wear; else those that the bus file names."""
     patience: int = 5
     """Periods without SYNC or target that fault an enabled drive; more on a busy machine."""
     seconds: float = math.inf
@@ -73,9 +90,11 @@ class Emulate:
         chosen = Experiment(design=bench.leg(), controller=JumpConfig())
         start = start_of(chosen)
         body = stiff_body if self.bare else EmulatedLeg(chosen.design, chosen.options, start)
-        config = _at_bitrate(bench.config(), bench.bitrate)
+        config = _wearing(_at_bitrate(bench.config(), bench.bitrate), self.eds)
         end = time.monotonic() + self.seconds
         where = None if bench.channel is None else Path(bench.channel)
+
+        _tell_problems(config)
 
         def serve_at(network: Network) -> Server:
             if self.serve == SLCAN:

@@ -25,7 +25,7 @@ from legbench.drives.protocol.frame import (
     Frame,
 )
 from legbench.drives.protocol.nmt import NmtCommand, NmtState, decode_nmt, heartbeat_frame
-from legbench.drives.protocol.objects import Access, Key
+from legbench.drives.protocol.objects import Key
 from legbench.drives.protocol.sdo import Abort
 from legbench.drives.protocol.sdo_server import SdoServer
 from legbench.drives.setup.config import NodeConfig, Parameter
@@ -84,10 +84,8 @@ class EmulatedDrive:
     def _recall(self) -> None:
         show_temperature(self._store, self._dictionary, self._node, WARM)
         for parameter in self._kept:
-            entry = self._store.entry(parameter.key)
-            if entry is not None and entry.access is Access.RW:
-                with suppress(SdoAbortError):
-                    self._store.put(entry, parameter.value)
+            with suppress(SdoAbortError):
+                self._store.recall(parameter.key, parameter.value)
 
     # --- what the wire and the body call -----------------------------------------------------
 
@@ -185,9 +183,8 @@ class EmulatedDrive:
     # --- CiA 301 -----------------------------------------------------------------------------
 
     def _check(self, key: Key, value: int) -> Abort | None:
-        low, high = self._dictionary.limits.get(key, (value, value))
-        if not low <= value <= high:
-            return Abort.TOO_LOW if value < low else Abort.TOO_HIGH
+        if (refusal := self._dictionary.refusal(key, value)) is not None:
+            return refusal
         if ProcessData.owns(key):
             return self._pdos.check(key, value)
         if key == (0x1019, 0) and self._values[0x1006, 0]:

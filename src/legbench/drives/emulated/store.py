@@ -110,6 +110,16 @@ class ObjectStore:
         self.values[entry.key] = value
         self._written(entry.key)
 
+    def recall(self, key: Key, value: int) -> None:
+        """Take a number from the drive's own memory; one that cannot be written keeps its value.
+
+        Raises:
+            SdoAbortError: the drive refuses the value.
+        """
+        entry = self._entries.get(key)
+        if entry is not None and entry.access is Access.RW:
+            self.put(entry, value)
+
     def show(self, key: Key, value: float) -> None:
         """Publish a measured value, rounded and saturated to what its object holds."""
         kind = self._entries[key].kind
