@@ -63,29 +63,7 @@ def open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
         BusError: the interface is not there, is down, or has a master.
         DriveError: a drive is missing, is another one, or refuses its configuration.
     """
-    if leg.servo != ServoConfig():
-        raise ConfigError(
-            "servo settings describe a simulated servo; on the can plant the drives decide: leave "
-            "slew_rate, bandwidth, delay_cycles and encoder_counts out"
-        )
-    config = load_bus(choice.bus)
-    if len(config.nodes) != 2:
-        raise ConfigError(f"{choice.bus}: {len(config.nodes)} nodes; a leg has 2")
-    if config.period_us not in RUN_PERIODS_US:
-        raise ConfigError(
-            f"{choice.bus}: period_us is {config.period_us} us; a run needs "
-            f"{', '.join(map(str, RUN_PERIODS_US))} us"
-        )
-    if not choice.read_only:
-        check_needs(config, leg.needs)
-    check_budget(config.at(choice.bitrate))
-    if choice.limits is None:
-        limits = limits_for(choice.bus.parent / LIMITS_NAME, leg.design)
-    else:
-        limits = limits_within(choice.limits, leg.design)
-    check_together(config, limits, stops=joint_ranges(leg.design), leads=not choice.read_only)
-    if not choice.is_virtual(config):
-        limits.require_complete()
+    config, limits = _checked(choice, leg)
     session = open_session(config, choice, leg, leads=not choice.read_only)
     try:
         granted = session.be_punctual()
@@ -109,6 +87,38 @@ def open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
         gone=lambda: gone_drive(link),
         trouble=lambda: None if link.stopped is None else link.stopped.trouble,
     )
+
+
+def _checked(choice: CanChoice, leg: Leg) -> tuple[BusConfig, SafetyLimits]:
+    """The bus file and the limits of a choice, held against each other and against the leg.
+
+    Raises:
+        ConfigError: they make no sense, or do not fit.
+    """
+    if leg.servo != ServoConfig():
+        raise ConfigError(
+            "servo settings describe a simulated servo; on the can plant the drives decide: leave "
+            "slew_rate, bandwidth, delay_cycles and encoder_counts out"
+        )
+    config = load_bus(choice.bus)
+    if len(config.nodes) != 2:
+        raise ConfigError(f"{choice.bus}: {len(config.nodes)} nodes; a leg has 2")
+    if config.period_us not in RUN_PERIODS_US:
+        raise ConfigError(
+            f"{choice.bus}: period_us is {config.period_us} us; a run needs "
+            f"{', '.join(map(str, RUN_PERIODS_US))} us"
+        )
+    if not choice.read_only:
+        check_needs(config, leg.needs)
+    check_budget(config.at(choice.bitrate))
+    if choice.limits is None:
+        limits = limits_for(choice.bus.parent / LIMITS_NAME, leg.design)
+    else:
+        limits = limits_within(choice.limits, leg.design)
+    check_together(config, limits, stops=joint_ranges(leg.design), leads=not choice.read_only)
+    if not choice.is_virtual(config):
+        limits.require_complete()
+    return config, limits
 
 
 def _facts(
