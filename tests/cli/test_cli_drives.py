@@ -328,8 +328,8 @@ def test_a_wrong_bitrate_is_named(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    done = called(capfd, *command, *EMULATED, *DESIGN, "--bitrate", "750000")
-    done.refused("750000 bit/s is asked for", "the bus file says 1000000 bit/s", "error frames")
+    done = called(capfd, *command, *EMULATED, *DESIGN, "--bitrate", "900000")
+    done.refused("900000 bit/s is asked for", "the bus file says 1000000 bit/s", "error frames")
     assert list(tmp_path.iterdir()) == []
 
 

@@ -1,8 +1,10 @@
 """`legbench drives scan|status|budget`: looking, never enabling."""
 
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from legbench.cli.output import note, print_json
 from legbench.cli.waived import tell_waived
@@ -13,6 +15,9 @@ from legbench.drives.setup.config import BusConfig
 from legbench.errors import ConfigError
 from legbench.plant.can_choice import CanChoice
 from legbench.plant.can_open import open_session
+
+if TYPE_CHECKING:
+    from legbench.drives.setup.wire import LoadEntry
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -157,23 +162,7 @@ class Budget:
                 }
             )
         else:
-            for entry in entries:
-                share = entry.bits * entry.rate / config.bitrate
-                print(
-                    f"{entry.what:<24} {entry.bits:4d} bits  {entry.rate:7.1f} /s  "
-                    f"{100 * share:5.1f} %"
-                )
-            print(
-                f"{'worst load':<24} {100 * load:.1f} % of {config.bitrate} bit/s, the limit is "
-                f"{100 * MAX_LOAD:.0f} %"
-            )
-            for one in exchanges(config):
-                where = f"exchange {one.channel or ''}".strip()
-                print(
-                    f"{where:<24} last answer {one.answers_us:.0f} us after SYNC, the deadline is "
-                    f"{config.deadline_us}; last command {one.commands_us:.0f} of "
-                    f"{config.period_us} us"
-                )
+            _print_budget(config, entries, load)
             for name, found in means.items():
                 texts = [f"{one.stop_ms:.0f} ms by {one.name}" for one in found]
                 print(f"without master, {name} stands after {' or '.join(texts) or 'no time'}")
@@ -185,3 +174,23 @@ class Budget:
 def _told(number: int | None, form: str = "d") -> str:
     """A number of the identity object, or that a drive tells none."""
     return "not told" if number is None else format(number, form)
+
+
+def _print_budget(config: BusConfig, entries: "Sequence[LoadEntry]", load: float) -> None:
+    """Print what every frame takes of its wire, and when the last ones come."""
+    from legbench.drives.setup.exchange import exchanges
+    from legbench.drives.setup.wire import MAX_LOAD
+
+    for entry in entries:
+        share = entry.bits * entry.rate / config.bitrate
+        print(f"{entry.what:<24} {entry.bits:4d} bits  {entry.rate:7.1f} /s  {100 * share:5.1f} %")
+    print(
+        f"{'worst load':<24} {100 * load:.1f} % of {config.bitrate} bit/s, the limit is "
+        f"{100 * MAX_LOAD:.0f} %"
+    )
+    for one in exchanges(config):
+        where = f"exchange {one.channel or ''}".strip()
+        print(
+            f"{where:<24} last answer {one.answers_us:.0f} us after SYNC, the deadline is "
+            f"{config.deadline_us}; last command {one.commands_us:.0f} of {config.period_us} us"
+        )

@@ -28,9 +28,9 @@ class Zero:
 
     node: str
     motor_offset: int
-    """Of the encoder of the position loop [counts]."""
+    """Offset of the encoder of the position loop [counts]."""
     link_offset: int | None
-    """Of the second encoder, none without one [counts]."""
+    """Offset of the second encoder, none without one [counts]."""
 
 
 def measure(session: Session, posture: Sequence[float]) -> list[Zero]:

@@ -1,5 +1,6 @@
 """Opening servo drives on a CAN bus as a plant, with what a run on them logs and tells."""
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any, final
 
@@ -62,29 +63,7 @@ def open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
         BusError: the interface is not there, is down, or has a master.
         DriveError: a drive is missing, is another one, or refuses its configuration.
     """
-    if leg.servo != ServoConfig():
-        raise ConfigError(
-            "servo settings describe a simulated servo; on the can plant the drives decide: leave "
-            "slew_rate, bandwidth, delay_cycles and encoder_counts out"
-        )
-    config = load_bus(choice.bus)
-    if len(config.nodes) != 2:
-        raise ConfigError(f"{choice.bus}: {len(config.nodes)} nodes; a leg has 2")
-    if config.period_us not in RUN_PERIODS_US:
-        raise ConfigError(
-            f"{choice.bus}: period_us is {config.period_us} us; a run needs "
-            f"{', '.join(map(str, RUN_PERIODS_US))} us"
-        )
-    if not choice.read_only:
-        check_needs(config, leg.needs)
-    check_budget(config.at(choice.bitrate))
-    if choice.limits is None:
-        limits = limits_for(choice.bus.parent / LIMITS_NAME, leg.design)
-    else:
-        limits = limits_within(choice.limits, leg.design)
-    check_together(config, limits, stops=joint_ranges(leg.design), leads=not choice.read_only)
-    if not choice.is_virtual(config):
-        limits.require_complete()
+    config, limits = _checked(choice, leg)
     session = open_session(config, choice, leg, leads=not choice.read_only)
     try:
         granted = session.be_punctual()
@@ -108,6 +87,38 @@ def open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
         gone=lambda: gone_drive(link),
         trouble=lambda: None if link.stopped is None else link.stopped.trouble,
     )
+
+
+def _checked(choice: CanChoice, leg: Leg) -> tuple[BusConfig, SafetyLimits]:
+    """The bus file and the limits of a choice, held against each other and against the leg.
+
+    Raises:
+        ConfigError: they make no sense, or do not fit.
+    """
+    if leg.servo != ServoConfig():
+        raise ConfigError(
+            "servo settings describe a simulated servo; on the can plant the drives decide: leave "
+            "slew_rate, bandwidth, delay_cycles and encoder_counts out"
+        )
+    config = load_bus(choice.bus)
+    if len(config.nodes) != 2:
+        raise ConfigError(f"{choice.bus}: {len(config.nodes)} nodes; a leg has 2")
+    if config.period_us not in RUN_PERIODS_US:
+        raise ConfigError(
+            f"{choice.bus}: period_us is {config.period_us} us; a run needs "
+            f"{', '.join(map(str, RUN_PERIODS_US))} us"
+        )
+    if not choice.read_only:
+        check_needs(config, leg.needs)
+    check_budget(config.at(choice.bitrate))
+    if choice.limits is None:
+        limits = limits_for(choice.bus.parent / LIMITS_NAME, leg.design)
+    else:
+        limits = limits_within(choice.limits, leg.design)
+    check_together(config, limits, stops=joint_ranges(leg.design), leads=not choice.read_only)
+    if not choice.is_virtual(config):
+        limits.require_complete()
+    return config, limits
 
 
 def _facts(
@@ -153,32 +164,42 @@ def open_session(
         return Session(bus, config.at(choice.bitrate), lock=lock)
     networks = _emulated(config, choice, leg)
     if len(networks) > 1:
-        bus = ChannelsBus(networks, config, choice.bitrate)
+        bus = ChannelsBus(tuple(networks), config, choice.bitrate)
     else:
         bus = LockstepBus("leg", network=networks[0], bitrate=choice.bitrate)
     return Session(bus, config.at(choice.bitrate))
 
 
-def _emulated(config: BusConfig, choice: CanChoice, leg: Leg | None) -> tuple[Network, ...]:
+def _emulated(config: BusConfig, choice: CanChoice, leg: Leg | None) -> Sequence[Network]:
     """The emulated leg; its drives run at the bitrate of the bus file, whatever is asked for.
 
     For those who only look its drives have kept their configuration: nobody may write it.
     """
-    split = len(config.channels) > 1
+    several = len(config.channels) > 1
     if leg is None:
         idle = [Behaviour(start_pos=start) for start in IDLE_POS]
         found = idle if len(config.nodes) == len(idle) else None
-        if split:
+        if several:
             return emulate_channels(config, found, configured=choice.read_only)
-        return (emulate(config, found, configured=choice.read_only),)
-    motors = [float(value) for value in leg.start.motor_pos]
-    one_or_more = emulate_channels if split else emulate
-    made = one_or_more(
+        return [emulate(config, found, configured=choice.read_only)]
+    drives = [Behaviour(start_pos=float(value)) for value in leg.start.motor_pos]
+    body = EmulatedLeg(leg.design, leg.options, leg.start)
+    faults, configured = choice.faults, choice.read_only
+    if several:
+        return emulate_channels(
+            config,
+            drives,
+            body=body,
+            body_period_ns=LEG_PERIOD_NS,
+            faults=faults,
+            configured=configured,
+        )
+    network = emulate(
         config,
-        [Behaviour(start_pos=motor) for motor in motors],
-        body=EmulatedLeg(leg.design, leg.options, leg.start),
+        drives,
+        body=body,
         body_period_ns=LEG_PERIOD_NS,
-        faults=choice.faults,
-        configured=choice.read_only,
+        faults=faults,
+        configured=configured,
     )
-    return made if isinstance(made, tuple) else (made,)
+    return [network]

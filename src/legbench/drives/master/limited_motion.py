@@ -6,7 +6,9 @@ from typing import final
 from legbench.drives.master.cycle import Cycle
 from legbench.drives.master.sample import Sample, sample_of
 from legbench.drives.master.tick import Tick
+from legbench.drives.setup.config import BusConfig
 from legbench.limits.guard import Guard
+from legbench.limits.safety import SafetyLimits
 
 
 @final
@@ -81,3 +83,13 @@ class LimitedMotion:
             words.append(axis.machine.controlword)
         self._expected = [self._expected[-1], applied]
         return applied, words
+
+
+def guard_of(config: BusConfig, limits: SafetyLimits) -> Guard:
+    """Make the guard of a bus; limits of what its drives do not tell will not act."""
+    return Guard(
+        limits,
+        config.period,
+        known=[node.knows for node in config.nodes],
+        two_encoders=config.two_encoders,
+    )

@@ -20,7 +20,7 @@ import can
 from legbench.drives.errors import DriveError
 from legbench.drives.master.enabling import enable
 from legbench.drives.master.ending import Ending, StopOnError
-from legbench.drives.master.limited_motion import LimitedMotion
+from legbench.drives.master.limited_motion import LimitedMotion, guard_of
 from legbench.drives.master.link_parts import LinkParts
 from legbench.drives.master.link_state import LinkState
 from legbench.drives.master.move import missed, move
@@ -35,7 +35,6 @@ from legbench.drives.transport.lock import ChannelLock
 from legbench.drives.transport.open_bus import timebase_of
 from legbench.drives.transport.timebase import Timebase
 from legbench.errors import PlantFault
-from legbench.limits.guard import Guard
 from legbench.limits.safety import SafetyLimits
 from legbench.limits.shortfall import Shortfall
 
@@ -91,12 +90,7 @@ class Link(Lead):
         self._opening, self._ending = Opening(parts), Ending(parts)
         self._stop_on_error = StopOnError(self._ending)
         self._ticks = Ticks(parts)
-        self._guard = Guard(
-            parts.limits,
-            config.period,
-            known=[node.knows for node in config.nodes],
-            two_encoders=config.two_encoders,
-        )
+        self._guard = guard_of(config, parts.limits)
         self._motion = LimitedMotion(
             parts.cycle, self._guard, stiffness, two_encoders=config.two_encoders
         )

@@ -29,9 +29,9 @@ class SdoAnswers(Enum):
     """Ways in which a drive answers for an object of one to three bytes."""
 
     SIZED = "sized"
-    """As long as the object, as the standard says."""
+    """Answers are as long as the object, as the standard says."""
     FOUR_BYTES = "four bytes"
-    """Four bytes, zeros behind the object."""
+    """All answers have four bytes, with zeros behind the object."""
     UNSIZED = "without size"
     """No size is told; what follows the object is left over from another answer."""
 

@@ -13,12 +13,12 @@ USUAL_PATIENCE_MS, LONGEST_PATIENCE_MS = 500, 30_000
 
 
 class ModeShown(StrEnum):
-    """When a drive shows in 6061h the mode that was written to 6060h."""
+    """Times from which a drive shows in 6061h the mode that was written to 6060h."""
 
     CONFIGURED = "configured"
-    """As soon as it is configured, before it is enabled."""
+    """The drive shows it as soon as it is configured, before it is enabled."""
     ENABLED = "enabled"
-    """Only once it is enabled; it is held where it stands until it does."""
+    """The drive shows it only once it is enabled; it is held where it stands until then."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,7 +32,7 @@ class Quirks:
     mode_patience_ms: int = USUAL_PATIENCE_MS
     """Longest time until 6061h shows the mode [ms]; some drives take 3 to 6 s."""
     mode_shown: ModeShown = ModeShown.CONFIGURED
-    """When 6061h follows 6060h."""
+    """Time from which 6061h follows 6060h."""
     follows_bit: bool = True
     """Whether bit 12 of the statusword says that the drive follows its target. Without it a drive
     that ignores its target is found by its following error alone."""

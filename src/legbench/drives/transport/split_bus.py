@@ -3,6 +3,7 @@
 import select
 import time
 from collections.abc import Sequence
+from contextlib import ExitStack
 from typing import final
 
 import can
@@ -62,16 +63,11 @@ class SplitBus(can.BusABC):
         """Send a frame on its channels; one that refuses it keeps no other from it.
 
         Raises:
-            Exception: as the first interface that refuses.
+            Exception: as an interface that refuses.
         """
-        refused: Exception | None = None
-        for place in self._routes.of(msg.arbitration_id, msg.data):
-            try:
-                self.parts[place].send(msg, timeout)
-            except Exception as error:  # Drivers raise what they like; it is raised below.
-                refused = refused or error
-        if refused is not None:
-            raise refused
+        with ExitStack() as sending:
+            for place in reversed(self._routes.of(msg.arbitration_id, msg.data)):
+                sending.callback(self.parts[place].send, msg, timeout)
 
     def recv(self, timeout: float | None = None) -> can.Message | None:
         """The next frame of any channel, none within the time [s]; channels take turns."""
@@ -103,14 +99,14 @@ class SplitBus(can.BusABC):
                 return state
         return can.BusState.ACTIVE
 
+    @state.setter
+    def state(self, new_state: can.BusState) -> None:
+        for part in self.parts:
+            part.state = new_state
+
     def shutdown(self) -> None:
         """Shut all interfaces down, whatever one of them raises."""
         super().shutdown()
-        failed: BaseException | None = None
-        for part in self.parts:
-            try:
-                part.shutdown()
-            except BaseException as error:  # The others have to be closed, too.
-                failed = failed or error
-        if failed is not None:
-            raise failed
+        with ExitStack() as closing:
+            for part in self.parts:
+                closing.callback(part.shutdown)
