@@ -136,3 +136,15 @@ def test_learn_says_that_limits_are_missing(call: Call, folder: Path) -> None:
     done = call("drives", "learn", folder / "it.eds", "--out", folder / "new" / "my.toml")
     assert done.status == 0, done.err
     assert "a run also needs limits: copy hardware/limits.toml beside it" in done.err
+
+
+def test_a_budget_counts_the_means_that_the_data_sheet_leaves(call: Call, folder: Path) -> None:
+    learnt(call, folder)
+    done = call("drives", "budget", "--bus", folder / "my.toml")
+    assert done.status == 0, done.err
+    assert "without master, motor1 stands after 24 ms by deadline of RPDO1 1400h:05\n" in done.out
+    text = (folder / "my.toml").read_text(encoding="utf-8")
+    without = "\n".join(line for line in text.splitlines() if not line.startswith("eds ="))
+    (folder / "my.toml").write_text(without, encoding="utf-8")
+    done = call("drives", "budget", "--bus", folder / "my.toml")
+    assert "by deadline of RPDO1 1400h:05 or 34 ms by heartbeat consumer 1016h\n" in done.out

@@ -132,17 +132,15 @@ class Budget:
 
     def run(self, bench: Bench) -> int:
         """Print every frame; raises ConfigError where a channel or the files do not fit."""
+        from legbench.commissioning.learn import known_means
         from legbench.drives.setup.checks import check_together
         from legbench.drives.setup.exchange import check_budget, exchanges
-        from legbench.drives.setup.master_watch import means_of
         from legbench.drives.setup.wire import MAX_LOAD, bus_load, schedule
         from legbench.plants import LIMITS_NAME, joint_ranges, limits_for
 
         config = bench.config().at(bench.bitrate)
         limits = limits_for(bench.limits or bench.bus.parent / LIMITS_NAME, bench.leg())
-        means = {
-            node.name: means_of(config, node, speed=limits.command_speed) for node in config.nodes
-        }
+        means = known_means(config, speed=limits.command_speed)
         entries = [entry for one in config.channels for entry in schedule(config, one)]
         load = max(bus_load(config, one) for one in config.channels)
         if bench.json:

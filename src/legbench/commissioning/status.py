@@ -78,7 +78,7 @@ def _status(sdo: SdoPort, node: NodeConfig) -> NodeStatus:
         name=node.name,
         node_id=node.node_id,
         statusword=describe_statusword(sdo.get_int(0x6041, 0, DataType.UNSIGNED16)),
-        mode=MODES.get(mode, f"mode {mode}"),
+        mode=MODES.get(mode, str(mode)),
         error=_error(code),
         side=node.side.value,
         motor_pos=motor_pos,
