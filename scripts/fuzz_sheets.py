@@ -19,8 +19,9 @@ from pathlib import Path
 from legbench.drives.setup.bus_file import bus_from_mapping
 from legbench.drives.setup.eds import eds_text
 from legbench.drives.sheet.assess import assess
+from legbench.drives.sheet.bus_text import bus_text
 from legbench.drives.sheet.load import sheet_of
-from legbench.drives.sheet.propose import bus_text, propose
+from legbench.drives.sheet.propose import propose
 from legbench.errors import ConfigError, LegbenchError
 from legbench.reading import UnreadableError, parse_toml
 
