@@ -80,7 +80,8 @@ class Scan:
             for node in found:
                 print(
                     f"node {node.node_id:3d}  vendor {node.vendor:#010x}  product "
-                    f"{node.product:#010x}  serial {node.serial}  revision {node.revision}  "
+                    f"{_told(node.product, '#010x')}  serial {_told(node.serial)}  revision "
+                    f"{_told(node.revision)}  "
                     f"{node.verdict}"
                 )
         double = [node for node in found if node.answers > 1]
@@ -116,10 +117,10 @@ class Status:
             print(f"{node.name} (node {node.node_id}): {node.statusword}")
             homed = {None: "", True: ", homed", False: ", NOT HOMED"}[node.homed]
             print(f"  mode {node.mode}, error {node.error}{heat}{homed}")
-            print(
-                f"  motor {node.motor_pos:+.4f} rad ({node.motor_counts} counts), "
-                f"link {node.link_pos:+.4f} rad ({node.link_counts} counts)"
-            )
+            second = ", no second encoder"
+            if node.link_pos is not None:
+                second = f", link {node.link_pos:+.4f} rad ({node.link_counts} counts)"
+            print(f"  {node.side} {node.motor_pos:+.4f} rad ({node.motor_counts} counts){second}")
         return 0
 
 
@@ -132,10 +133,11 @@ class Budget:
     """
 
     def run(self, bench: Bench) -> int:
-        """Print every frame; raises ConfigError above 80 %, or where the files do not fit."""
+        """Print every frame; raises ConfigError where a channel or the files do not fit."""
         from legbench.drives.setup.checks import check_together
+        from legbench.drives.setup.exchange import check_budget, exchanges
         from legbench.drives.setup.master_watch import means_of
-        from legbench.drives.setup.wire import MAX_LOAD, bus_load, check_load, schedule
+        from legbench.drives.setup.wire import MAX_LOAD, bus_load, schedule
         from legbench.plants import LIMITS_NAME, joint_ranges, limits_for
 
         config = bench.config().at(bench.bitrate)
@@ -143,7 +145,8 @@ class Budget:
         means = {
             node.name: means_of(config, node, speed=limits.command_speed) for node in config.nodes
         }
-        entries, load = schedule(config), bus_load(config)
+        entries = [entry for one in config.channels for entry in schedule(config, one)]
+        load = max(bus_load(config, one) for one in config.channels)
         if bench.json:
             print_json(
                 {
@@ -151,6 +154,9 @@ class Budget:
                     "load": load,
                     "limit": MAX_LOAD,
                     "frames": [asdict(entry) for entry in entries],
+                    "exchanges": [asdict(one) for one in exchanges(config)],
+                    "deadline_us": config.deadline_us,
+                    "period_us": config.period_us,
                     "master_watch": {
                         name: [asdict(one) | {"stop_ms": one.stop_ms} for one in found]
                         for name, found in means.items()
@@ -168,9 +174,21 @@ class Budget:
                 f"{'worst load':<24} {100 * load:.1f} % of {config.bitrate} bit/s, the limit is "
                 f"{100 * MAX_LOAD:.0f} %"
             )
+            for one in exchanges(config):
+                where = f"exchange {one.channel or ''}".strip()
+                print(
+                    f"{where:<24} last answer {one.answers_us:.0f} us after SYNC, the deadline is "
+                    f"{config.deadline_us}; last command {one.commands_us:.0f} of "
+                    f"{config.period_us} us"
+                )
             for name, found in means.items():
                 texts = [f"{one.stop_ms:.0f} ms by {one.name}" for one in found]
                 print(f"without master, {name} stands after {' or '.join(texts) or 'no time'}")
-        check_load(config)
+        check_budget(config)
         check_together(config, limits, stops=joint_ranges(bench.leg()))
         return 0
+
+
+def _told(number: int | None, form: str = "d") -> str:
+    """A number of the identity object, or that a drive tells none."""
+    return "not told" if number is None else format(number, form)

@@ -80,6 +80,7 @@ def main(arguments: list[str]) -> int:
             clock=clock,
             stop=stop,
             progress=progress,
+            on_note=report_error,
             on_started=watching.start if watched else None,
         )
     watching.stop()

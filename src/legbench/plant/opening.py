@@ -1,6 +1,6 @@
 """What a plant is opened with, and what belongs to a run on it besides the plant."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
 
@@ -15,6 +15,23 @@ if TYPE_CHECKING:
     from legbench.recording.writer import RunWriter
 
 
+def _nobody(known: Collection[str]) -> tuple[str, ...]:
+    """Nobody runs on a plant whose controllers are not known."""
+    return ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Needs:
+    """What the controller of a run needs of the plant."""
+
+    controller: str = ""
+    """Kind of the controller."""
+    signals: frozenset[str] = frozenset()
+    """Names of the measured signals that it cannot do without."""
+    run_on: Callable[[Collection[str]], tuple[str, ...]] = _nobody
+    """Kinds of the controllers that can run where only some signals are known."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Leg:
     """The leg that the plant is to be."""
@@ -23,6 +40,8 @@ class Leg:
     options: BuildOptions
     start: Start
     servo: ServoConfig
+    needs: Needs = field(default_factory=Needs)
+    """What its controller needs; by default nothing is asked for."""
 
 
 def _no_log(writer: "RunWriter") -> None:
@@ -43,6 +62,8 @@ class OpenPlant:
     """What paces it if nobody asks for another pace."""
     facts: dict[str, Any] = field(default_factory=dict)
     """What a run has to say of it."""
+    notes: tuple[str, ...] = ()
+    """What a person should know before anything moves, such as what does not protect the leg."""
     start_log: Callable[["RunWriter"], None] = _no_log
     """Begin to log beside the rows of a run, such as raw frames, with `RunWriter.log`."""
     events: Callable[[], dict[str, dict[str, Any]]] = dict

@@ -8,6 +8,7 @@ from legbench.limits.upper_ends import DRIVE_HEARTBEAT, check_number
 BUS_NUMBERS: Mapping[str, tuple[int, int, str]] = {
     "bitrate": (10_000, 1_000_000, "bit/s"),
     "period_us": (200, 20_000, "us"),
+    "reply_delay_us": (1, 10_000, "us"),
     "master_id": (1, 127, ""),
     "master_heartbeat_ms": (1, 21_845, "ms"),
     "sdo_timeout_ms": (1, 10_000, "ms"),
