@@ -11,6 +11,7 @@ from legbench.drives.emulated.channels_bus import ChannelsBus
 from legbench.drives.emulated.network import Network
 from legbench.drives.master.session import Session
 from legbench.drives.setup.bus_file import load_bus
+from legbench.drives.setup.bus_numbers import RUN_PERIODS_US
 from legbench.drives.setup.checks import check_together
 from legbench.drives.setup.config import BusConfig
 from legbench.drives.setup.exchange import check_budget
@@ -34,8 +35,6 @@ from legbench.servo import ServoConfig
 
 LEG_PERIOD_NS = round(1e9 * PERIOD)
 """Period of the leg on the shafts of emulated drives [ns]."""
-RUN_PERIODS_US = (1000, 2000, 4000)
-"""Periods with which a leg is led [us]: whole periods of the simulated leg, which moves each."""
 IDLE_POS = (-0.3, 0.3)
 """Motors of emulated drives that nothing hangs on: a knee that every leg can have [rad]."""
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.body import Body, stiff_body
-from legbench.drives.emulated.dictionary import dictionary_of
+from legbench.drives.emulated.dictionary import Dictionary, dictionary_of
 from legbench.drives.emulated.drive import EmulatedDrive
 from legbench.drives.emulated.faults import Fault
 from legbench.drives.emulated.network import Network
@@ -71,15 +71,9 @@ def emulate(
     chosen = [Behaviour() for _ in bus.nodes] if behaviours is None else list(behaviours)
     if len(chosen) != len(bus.nodes):
         raise ConfigError(f"{len(chosen)} behaviours for {len(bus.nodes)} drives")
-    sheets = {path: load_sheet(path) for path in {node.eds for node in bus.nodes} if path}
     drives = [
-        EmulatedDrive(
-            node,
-            how,
-            tuple(configuration(bus, node)) if configured else (),
-            dictionary_of(node, None if node.eds is None else sheets[node.eds]),
-        )
-        for node, how in zip(bus.nodes, chosen, strict=True)
+        EmulatedDrive(node, how, tuple(configuration(bus, node)) if configured else (), objects)
+        for node, how, objects in zip(bus.nodes, chosen, _dictionaries(bus), strict=True)
     ]
     return Network(
         drives,
@@ -90,6 +84,12 @@ def emulate(
         faults=faults,
         keep_log=keep_log,
     )
+
+
+def _dictionaries(bus: BusConfig) -> list[Dictionary]:
+    """Return the objects of every drive; a data sheet is read once."""
+    sheets = {path: load_sheet(path) for path in {node.eds for node in bus.nodes} if path}
+    return [dictionary_of(node, node.eds and sheets[node.eds], bus.period_us) for node in bus.nodes]
 
 
 def emulate_channels(

@@ -3,10 +3,13 @@
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
-from legbench.drives.protocol.datatypes import DataType
+from legbench.drives.protocol.cia402 import Mode
+from legbench.drives.protocol.datatypes import FORMATS, DataType, pack, size_of
 from legbench.drives.protocol.objects import LINK_SHORT, OBJECTS, TEMPERATURE, Key, ObjectEntry
 from legbench.drives.protocol.sdo import Abort
 from legbench.drives.setup.config import NodeConfig
+from legbench.drives.setup.configuration import interpolation_time
+from legbench.drives.setup.outcome import CYCLE, CYCLE_INDEX
 from legbench.drives.sheet.data_sheet import DataSheet
 
 USUAL_LINKS: tuple[Key, ...] = ((0x60E4, 1), (LINK_SHORT, 0))
@@ -14,10 +17,9 @@ USUAL_LINKS: tuple[Key, ...] = ((0x60E4, 1), (LINK_SHORT, 0))
 RELATIVE = {(base + number, 1) for base in (0x1400, 0x1800) for number in range(4)}
 """Objects of the usual drive whose default is added to its node id, besides that of EMCY."""
 EMCY = (0x1014, 0)
-OWN_WAY: Mapping[Key, int] = {(0x60C2, 1): 1, (0x60C2, 2): -3}
-"""What a drive works with that lacks the object: it interpolates over the usual cycle of 1 ms."""
-MODE_OF_ITS_OWN: Mapping[Key, int] = {(0x6060, 0): 8, (0x6061, 0): 8}
-"""Mode of a drive whose mode cannot be chosen (6060h): cyclic synchronous position."""
+MAX_SPEED = (0x6080, 0)
+"""Max motor speed, whose unit is the maker's own: a data sheet's default would stop the motor."""
+MODE, MODE_DISPLAY, CYCLIC = (0x6060, 0), (0x6061, 0), int(Mode.CYCLIC_SYNCHRONOUS_POSITION)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,22 +47,35 @@ class Dictionary:
         return Abort.TOO_LOW if value < low else Abort.TOO_HIGH
 
 
-def dictionary_of(node: NodeConfig, sheet: DataSheet | None = None) -> Dictionary:
-    """Return the objects of one node: those of a data sheet, else those of the usual drive."""
+def dictionary_of(
+    node: NodeConfig, sheet: DataSheet | None = None, period_us: int = 1000
+) -> Dictionary:
+    """Return the objects of one node: those of a data sheet, else those of the usual drive.
+
+    A drive that lacks 60C2h interpolates over the period of SYNC [us], and one whose mode cannot be
+    chosen (6060h) has cyclic synchronous position mode alone.
+    """
     own = dict(_identity(node))
     if sheet is None:
         own |= {key: _number(OBJECTS[key]) + node.node_id for key in (*RELATIVE, EMCY)}
         return Dictionary(
             entries=tuple(_with(OBJECTS.values(), own)), relative=frozenset((*RELATIVE, EMCY))
         )
+    if not sheet.has(MODE):
+        own[MODE_DISPLAY] = CYCLIC
     for key in sheet.relative:
         entry = sheet.objects[key]
         own.setdefault(key, _number(entry) + node.node_id)
-    entries = tuple(_with(sheet.objects.values(), own))
+    written = {parameter.key for parameter in node.parameters}
+    entries = tuple(
+        _shown_only(entry) if entry.key == MAX_SPEED and MAX_SPEED not in written else entry
+        for entry in _with(sheet.objects.values(), own)
+    )
     shown = {entry.key for entry in entries if isinstance(entry.default, int)}
     hidden = {key: _number(entry) for key, entry in OBJECTS.items() if key not in shown}
-    for other in (OWN_WAY, {} if (0x6060, 0) in shown else MODE_OF_ITS_OWN):
-        hidden |= {key: value for key, value in other.items() if key not in shown}
+    value, exponent = interpolation_time(period_us)
+    own_way = {CYCLE: value, CYCLE_INDEX: exponent, MODE: CYCLIC, MODE_DISPLAY: CYCLIC}
+    hidden |= {key: own_way[key] for key in own_way if key not in shown}
     warmth = node.temperature_object
     return Dictionary(
         entries=entries,
@@ -82,8 +97,15 @@ def _identity(node: NodeConfig) -> Iterator[tuple[Key, int]]:
 
 def _with(entries: Iterable[ObjectEntry], own: Mapping[Key, int]) -> Iterator[ObjectEntry]:
     for entry in entries:
-        number = entry.kind not in (DataType.VISIBLE_STRING, DataType.OCTET_STRING)
-        yield replace(entry, default=own[entry.key]) if number and entry.key in own else entry
+        number = entry.kind in FORMATS and entry.key in own
+        yield replace(entry, default=own[entry.key]) if number else entry
+
+
+def _shown_only(entry: ObjectEntry) -> ObjectEntry:
+    """Return an object that holds its value for the bus, and acts on nothing."""
+    if size_of(entry.kind) is None or isinstance(entry.default, bytes):
+        return entry
+    return replace(entry, kind=DataType.OCTET_STRING, default=pack(entry.kind, entry.default))
 
 
 def _number(entry: ObjectEntry) -> int:

@@ -164,6 +164,7 @@ class EmulatedDrive:
         self._connection.outlet.clear()
         self.axis.restart()
         self._restart(ALL, cold=True)
+        show_temperature(self._store, self._dictionary, self._node, WARM)
 
     def _restart(self, indices: Container[int], *, cold: bool = False) -> None:
         """Set objects among some indices back and boot; the node id is that set last over LSS."""

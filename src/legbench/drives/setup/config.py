@@ -139,15 +139,11 @@ class NodeConfig:
 
     def rpdo_id(self, pdo: PdoConfig) -> int:
         """COB-ID of an RPDO."""
-        return _given(pdo, RPDO_BASES[pdo.number - 1] + self.node_id)
+        return pdo.identifier(RPDO_BASES, self.node_id)
 
     def tpdo_id(self, pdo: PdoConfig) -> int:
         """COB-ID of a TPDO."""
-        return _given(pdo, TPDO_BASES[pdo.number - 1] + self.node_id)
-
-
-def _given(pdo: PdoConfig, predefined: int) -> int:
-    return predefined if pdo.cob_id is None else pdo.cob_id
+        return pdo.identifier(TPDO_BASES, self.node_id)
 
 
 USUAL_DEADLINE = 0.7

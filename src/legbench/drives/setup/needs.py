@@ -59,6 +59,13 @@ class Row:
     fallbacks: Mapping[int, tuple[int, ...]] = field(default_factory=dict)
     """Wanted value -> values to try in turn where the drive refuses it."""
 
+    @property
+    def loss(self) -> str:
+        """Description of what is lost without the object, and of what takes its place."""
+        lost = "not protected by " if self.need is Need.PROTECTION else "without "
+        instead = f"; instead: {self.instead}" if self.instead else ""
+        return f"{lost}{self.purpose}{instead}"
+
 
 def _cob(wanted: int, there: int) -> bool:
     """Compare valid bit and identifier; whether remote frames are answered does not matter."""
@@ -238,7 +245,7 @@ _MAPPING = Row(
     need=_REQUIRED,
     purpose="process data: a drive whose mapping is fixed needs a bus file that maps the same",
 )
-_DEADLINE = Row(
+DEADLINE = Row(
     need=_PROTECTION,
     purpose="the deadline of its commands",
     instead="its watch over the master's heartbeat (1016h)",
@@ -278,4 +285,4 @@ def row_of(parameter: Parameter) -> Row:
         return _SPARE_RPDO if command else _SPARE_TPDO
     if sub == 2:
         return _COMMAND_TYPE if command else _ANSWER_TYPE
-    return _DEADLINE if command else _ASKED
+    return DEADLINE if command else _ASKED

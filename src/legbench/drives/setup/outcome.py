@@ -67,6 +67,8 @@ class Outcome:
         wanted = self.parameter.value
         if self.code is None:
             return f"wrote {wanted}, reads {self.there}; the drive does not take this value"
+        if self.missing:
+            return f"the drive has no such object (abort {self.code:08X}h)"
         known = {int(abort): text for abort, text in MEANINGS.items()}
         refusal = f"{known.get(self.code, 'aborted')} (abort {self.code:08X}h)"
         held = "" if self.there is None else f", holds {self.there}, wanted {wanted}"
@@ -91,9 +93,7 @@ class Outcome:
         if not self.agrees:
             if not row.instead and self.missing:
                 return None
-            lost = "not protected by " if row.need is Need.PROTECTION else "without "
-            instead = f"; instead: {row.instead}" if row.instead else ""
-            return f"{self.name}: {self.why}; {lost}{row.purpose}{instead}"
+            return f"{self.name}: {self.why}; {row.loss}"
         if self.there in (None, self.parameter.value) or not row.instead:
             return None
         return f"{self.name}: wanted {self.parameter.value}, the drive holds {self.there}"

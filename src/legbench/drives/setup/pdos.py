@@ -53,6 +53,10 @@ class PdoConfig:
             check_cob_id(self.cob_id)
         check_number("deadline_ms", self.deadline_ms, 0, WORD, "ms")
 
+    def identifier(self, bases: Sequence[int], node_id: int) -> int:
+        """COB-ID that is given, else that of the predefined connection set by its `bases`."""
+        return bases[self.number - 1] + node_id if self.cob_id is None else self.cob_id
+
 
 RPDO = PdoConfig(number=1, objects=(CONTROLWORD, TARGET_POSITION), deadline_ms=20)
 """Command frame used by default: controlword and target position, six bytes."""

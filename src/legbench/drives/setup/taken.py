@@ -1,12 +1,14 @@
 """Whether drives are protected by what they took of their configuration; pure."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 from legbench.drives.errors import DriveError
+from legbench.drives.protocol.objects import Key, name_of
 from legbench.drives.setup.config import BusConfig
 from legbench.drives.setup.configuration import quick_stop_ramp
 from legbench.drives.setup.master_watch import check_master_watch
+from legbench.drives.setup.needs import DEADLINE, RPDOS, TABLE, Need, Row
 from legbench.drives.setup.outcome import Outcome, held_by
 from legbench.errors import ConfigError
 from legbench.limits.upper_ends import QUICK_STOP_RAMP
@@ -14,6 +16,11 @@ from legbench.limits.upper_ends import QUICK_STOP_RAMP
 Outcomes = Mapping[str, Sequence[Outcome]]
 """Name of a node -> what became of each object of its configuration."""
 HEARTBEAT = (0x1017, 0)
+RAMPS = ((0x6085, 0), (0x6084, 0))
+"""Ramps of a quick stop, of which a drive needs one."""
+FIRST_DEADLINE = (0x1400, 5)
+SOFT_LIMITS_HIGH = (0x607D, 2)
+"""Second half of a range, of which the first is told."""
 
 
 def check_taken(
@@ -65,13 +72,35 @@ def _deadline(entry: Outcome) -> bool:
 
 
 def unprotected(outcomes: Outcomes) -> tuple[str, ...]:
-    """Return one line for every object that a drive lacks or holds otherwise, and what it costs."""
+    """Return one line for every object that drives lack or hold otherwise, and what it costs."""
+    told: dict[str, list[str]] = {}
+    for name, entries in outcomes.items():
+        for entry in entries:
+            if entry.line is not None:
+                told.setdefault(entry.line, []).append(f"'{name}'")
+        for key, row in not_given({entry.parameter.key for entry in entries}):
+            line = f"{name_of(*key)}: the bus file gives no value; {row.loss}"
+            told.setdefault(line, []).append(f"'{name}'")
     return tuple(
-        f"drive '{name}', {entry.line}"
-        for name, entries in outcomes.items()
-        for entry in entries
-        if entry.line is not None
+        f"{'drive' if len(names) == 1 else 'drives'} {', '.join(names)}, {line}"
+        for line, names in told.items()
     )
+
+
+def not_given(written: Collection[Key]) -> Iterator[tuple[Key, Row]]:
+    """Yield the protections that a bus file gives no value for, with their entries of the table.
+
+    Args:
+        written: objects that the drive is written.
+    """
+    ramps = [key for key in RAMPS if key in written]
+    for key, row in TABLE.items():
+        if row.need is not Need.PROTECTION or key in written or (key in RAMPS and ramps):
+            continue
+        if key not in (RAMPS[1], SOFT_LIMITS_HIGH):
+            yield key, row
+    if not any(index in RPDOS and sub == FIRST_DEADLINE[1] for index, sub in written):
+        yield FIRST_DEADLINE, DEADLINE
 
 
 def tells_heartbeat(outcomes: Sequence[Outcome]) -> bool:

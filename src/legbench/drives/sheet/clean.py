@@ -8,6 +8,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator
 
 from legbench.drives.sheet.text import Section, Sections, node_number, number, words
+from legbench.reading import UnreadableError
 
 RECORD = 0x9
 LAST_BASIC_TYPE = 0x1B
@@ -17,27 +18,33 @@ TEXTS = (0x09, 0x0A, 0x0B, 0x0F)
 REALS = (0x08, 0x11)
 ACCESS = ("ro", "wo", "rw", "rwr", "rww", "const")
 MOST_SUBS = 254
-MOST_OBJECTS = 100_000
-"""Largest number of objects that compact arrays are written out to."""
+MOST_OBJECTS = 16_384
+"""Largest number of objects, those of compact arrays included."""
 COUNT: Section = {"parametername": "count", "datatype": "5", "accesstype": "ro"}
 
 
 def clean_text(found: Sections) -> str:
-    """Return the text of all objects; what is left out is added to the remarks of `found`."""
+    """Return the text of all objects; what is left out is added to the remarks of `found`.
+
+    Raises:
+        UnreadableError: compact arrays make more objects than a device has.
+    """
     grouped: dict[int, dict[int | None, Section]] = defaultdict(dict)
     for (index, sub), section in found.objects.items():
         grouped[index][sub] = section
     remarks: Counter[str] = Counter()
     # Without this section canopen warns.
     lines = ["[DeviceInfo]"]
-    left = MOST_OBJECTS
+    total = 0
     for index, group in sorted(grouped.items()):
         head = group.pop(None, {})
         subs = {sub: section for sub, section in group.items() if sub is not None}
-        count = min(number(head.get("compactsubobj")) or 0, MOST_SUBS, left)
+        count = min(number(head.get("compactsubobj")) or 0, MOST_SUBS)
         if count > 0:
             subs = _expanded(found, index, head, count) | subs
-        left -= len(subs)
+        total += max(1, len(subs))
+        if total > MOST_OBJECTS:
+            raise UnreadableError(f"describes more than {MOST_OBJECTS} objects, the limit")
         if not subs:
             lines += _variable(f"{index:04X}", head, found, remarks)
             continue

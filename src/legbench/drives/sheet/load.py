@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from legbench.drives.protocol.datatypes import DataType, Value, range_of, size_of
+from legbench.drives.protocol.datatypes import FORMATS, DataType, Value, range_of, size_of
 from legbench.drives.protocol.objects import Access, Key, ObjectEntry
 from legbench.drives.sheet.clean import clean_text
 from legbench.drives.sheet.data_sheet import DataSheet, profile_default
@@ -17,10 +17,10 @@ from legbench.reading import UnreadableError, read_file
 if TYPE_CHECKING:
     from legbench.drives.sheet._canopen import ODVariable
 
-BYTES = {0x08: 4, 0x0C: 6, 0x0D: 6, 0x10: 3, 0x11: 8, 0x12: 5, 0x13: 6, 0x14: 7}
+BYTES = {0x0C: 6, 0x0D: 6, 0x10: 3, 0x11: 8, 0x12: 5, 0x13: 6, 0x14: 7}
 BYTES |= {0x16: 3, 0x18: 5, 0x19: 6, 0x1A: 7}
 """Lengths of the basic types that are no whole numbers of 1, 2, 4 or 8 bytes [bytes]."""
-REALS = {0x08: "<f", 0x11: "<d"}
+REAL64 = 0x11
 KINDS = frozenset(DataType) - BYTES.keys()
 ACCESS = {"ro": Access.RO, "wo": Access.WO, "const": Access.CONST}
 
@@ -148,6 +148,8 @@ def _typed(variable: "ODVariable") -> tuple[DataType, Value | None]:
                 "ascii", "ignore"
             ).decode()
         return kind, default if isinstance(default, bytes) else None
+    if kind is DataType.REAL32:
+        return kind, float(default) if isinstance(default, int | float) else None
     if not isinstance(default, int):
         return kind, None
     low, high = range_of(kind)
@@ -157,19 +159,18 @@ def _typed(variable: "ODVariable") -> tuple[DataType, Value | None]:
 
 
 def _bytes(number_of: int, default: object) -> bytes | None:
-    layout = REALS.get(number_of)
-    if layout is None or not isinstance(default, int | float):
+    """Bytes of a default of double precision; no other type of `BYTES` has a default here."""
+    if number_of != REAL64 or not isinstance(default, int | float):
         return None
-    try:
-        return struct.pack(layout, default)
-    except (OverflowError, struct.error):
-        return None
+    return struct.pack("<d", default)
 
 
 def _profile(key: Key, kind: DataType, number_of: int) -> Value:
     """Return what an object holds whose data sheet tells no default."""
+    if kind is DataType.REAL32:
+        return 0.0
     known = profile_default(key, kind)
-    if known is not None:
+    if known is not None and kind in FORMATS:
         low, high = range_of(kind)
         return known if low <= known <= high else 0
     return "" if kind is DataType.VISIBLE_STRING else bytes(BYTES.get(number_of, 0))

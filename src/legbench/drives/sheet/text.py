@@ -12,7 +12,7 @@ from legbench.reading import UnreadableError
 
 LARGEST_EDS = 1 << 22
 """Largest data sheet [bytes]; those of drives have 40 000 to a million."""
-MOST_SECTIONS, MOST_KEYS, LONGEST_VALUE = 50_000, 512, 4096
+MOST_SECTIONS, MOST_KEYS, LONGEST_VALUE = 16_384, 512, 4096
 """Largest number of sections, of keys in one, and of characters in a value."""
 Section = dict[str, str]
 _OBJECT = re.compile(r"(?:0x)?([0-9a-f]{1,4})(?:\s*sub\s*(?:0x)?([0-9a-f]{1,2}))?", re.IGNORECASE)
