@@ -156,7 +156,11 @@ def _encoder(chance: random.Random, units: AxisUnits) -> tuple[AxisUnits, DataTy
         lowest = chance.choice([one for one in anywhere if low <= one <= high - modulus + 1])
     gear = 1.0 if single or fine > 26 else units.gear
     per_rev = modulus or 1 << (min(fine, 12) if bits == 16 else fine)
-    offset = chance.randrange(modulus) if single else (1 << 29 if low == 0 and bits > 16 else 500)
+    offset = 500
+    if modulus is not None:
+        offset = chance.randrange(modulus)
+    elif low == 0 and bits > 16:
+        offset = 1 << 29
     return (
         replace(
             units,

@@ -5,8 +5,12 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from odd_drive_draw import INTERPOLATES, Drawn, ordinary
-from odd_drives import START, pair, trial
+from odd_drive_draw import (  # pyright: ignore[reportMissingImports]
+    INTERPOLATES,
+    Drawn,
+    ordinary,
+)
+from odd_drives import START, pair, trial  # pyright: ignore[reportMissingImports]
 
 from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.pdo import Mapped

@@ -119,11 +119,15 @@ def test_limits_of_what_is_not_known_do_not_act_and_all_others_do() -> None:
     guard = Guard(limits, 0.001, known=[frozenset(["motor_pos"])] * 2, two_encoders=False)
     guard.start_at((0.0, 0.0))
     guard.check(motor_pos=(0.0, 0.0), joint_pos=nan, spring_torque=nan, expected_pos=(0.0, 0.0))
-    far = {"motor_pos": (0.0, 0.5), "joint_pos": nan, "spring_torque": nan}
+
+    def far() -> None:
+        rest = (0.0, 0.0)
+        guard.check(motor_pos=(0.0, 0.5), joint_pos=nan, spring_torque=nan, expected_pos=rest)
+
     for _ in range(limits.following_cycles):
-        guard.check(**far, expected_pos=(0.0, 0.0))
+        far()
     with pytest.raises(PlantFault, match=r"motor 2 shows 0\.500 rad"):
-        guard.check(**far, expected_pos=(0.0, 0.0))
+        far()
     # What is to be known and is no number ends a run.
     known = Guard(limits, 0.001, known=[ALL, ALL])
     with pytest.raises(PlantFault, match="spring 1 carries nan N m"):

@@ -1,5 +1,6 @@
 """Opening servo drives on a CAN bus as a plant, with what a run on them logs and tells."""
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any, final
 
@@ -153,32 +154,42 @@ def open_session(
         return Session(bus, config.at(choice.bitrate), lock=lock)
     networks = _emulated(config, choice, leg)
     if len(networks) > 1:
-        bus = ChannelsBus(networks, config, choice.bitrate)
+        bus = ChannelsBus(tuple(networks), config, choice.bitrate)
     else:
         bus = LockstepBus("leg", network=networks[0], bitrate=choice.bitrate)
     return Session(bus, config.at(choice.bitrate))
 
 
-def _emulated(config: BusConfig, choice: CanChoice, leg: Leg | None) -> tuple[Network, ...]:
+def _emulated(config: BusConfig, choice: CanChoice, leg: Leg | None) -> Sequence[Network]:
     """The emulated leg; its drives run at the bitrate of the bus file, whatever is asked for.
 
     For those who only look its drives have kept their configuration: nobody may write it.
     """
-    split = len(config.channels) > 1
+    several = len(config.channels) > 1
     if leg is None:
         starts = IDLE_POS if len(config.nodes) == len(IDLE_POS) else (0.0,) * len(config.nodes)
         idle = [on_bench(node, start) for node, start in zip(config.nodes, starts, strict=True)]
-        if split:
+        if several:
             return emulate_channels(config, idle, configured=choice.read_only)
-        return (emulate(config, idle, configured=choice.read_only),)
-    motors = [float(value) for value in leg.start.motor_pos]
-    one_or_more = emulate_channels if split else emulate
-    made = one_or_more(
+        return [emulate(config, idle, configured=choice.read_only)]
+    drives = [Behaviour(start_pos=float(value)) for value in leg.start.motor_pos]
+    body = EmulatedLeg(leg.design, leg.options, leg.start)
+    faults, configured = choice.faults, choice.read_only
+    if several:
+        return emulate_channels(
+            config,
+            drives,
+            body=body,
+            body_period_ns=LEG_PERIOD_NS,
+            faults=faults,
+            configured=configured,
+        )
+    network = emulate(
         config,
-        [Behaviour(start_pos=motor) for motor in motors],
-        body=EmulatedLeg(leg.design, leg.options, leg.start),
+        drives,
+        body=body,
         body_period_ns=LEG_PERIOD_NS,
-        faults=choice.faults,
-        configured=choice.read_only,
+        faults=faults,
+        configured=configured,
     )
-    return made if isinstance(made, tuple) else (made,)
+    return [network]

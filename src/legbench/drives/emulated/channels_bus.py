@@ -53,6 +53,11 @@ class ChannelsBus(VirtualBus):
                 return state
         return can.BusState.ACTIVE
 
+    @state.setter
+    def state(self, new_state: can.BusState) -> None:
+        for part in self._parts:
+            part.state = new_state
+
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
         """Hand a frame to the controllers of its channels; takes no time.
 

@@ -103,6 +103,11 @@ class SplitBus(can.BusABC):
                 return state
         return can.BusState.ACTIVE
 
+    @state.setter
+    def state(self, new_state: can.BusState) -> None:
+        for part in self.parts:
+            part.state = new_state
+
     def shutdown(self) -> None:
         """Shut all interfaces down, whatever one of them raises."""
         super().shutdown()
