@@ -104,6 +104,19 @@ QUIRKS: dict[str, Callable[[Sheet], object]] = {
         },
         "ro",
     ),
+    "constant COB-IDs, mapped right": lambda it: it.fixed(
+        {(0x1400, 1): "$NODEID+0x200", (0x1800, 1): "$NODEID+0x40000180"}
+    ).fixed(
+        {
+            (0x1600, 0): "2",
+            (0x1600, 1): "0x60400010",
+            (0x1600, 2): "0x607A0020",
+            (0x1A00, 0): "2",
+            (0x1A00, 1): "0x60410010",
+            (0x1A00, 2): "0x60640020",
+        },
+        "rw",
+    ),
     "fixed times": lambda it: it.fixed({(0x1017, 0): "30", (0x1006, 0): "0"}),
 }
 
@@ -139,6 +152,10 @@ REFUSED: dict[str, tuple[Callable[[Sheet], object], str]] = {
         "60B0h:00 Position offset: .*holds 100, wanted 0; .*must be 0",
     ),
     "another cycle": (lambda it: it.fixed({(0x60C2, 2): "-2"}), "60C2h:02"),
+    "constant COB-ID, mapped otherwise": (
+        lambda it: it.fixed({(0x1400, 1): "$NODEID+0x200"}),
+        "1600h:00 .*present device state.*it is required: process data",
+    ),
     "commands at once": (lambda it: it.fixed({(0x1400, 2): "255"}), "1400h:02 .*act at SYNC"),
     "drops at quick stop": (lambda it: it.fixed({(0x605A, 0): "0"}), "605Ah:00 .*braking by quick"),
     "no command frame": (lambda it: it.without(0x1400, 0x1600), "1400h:01"),
@@ -226,6 +243,9 @@ def test_a_drive_with_one_encoder_leads_a_leg_by_its_torque_or_tells_none(tmp_pa
     (tmp_path / "leg.toml").unlink()
     bus = learned_by(tmp_path, stranger().without(0x60E4, 0x6077))
     assert {one.torque_object for one in bus.nodes} == {None}
+    assert bus.waive == ("spring watch",)
+    findings = {one.object: one for one in check(tmp_path / "leg.toml").assessments[0].findings}
+    assert "controllers that need them are refused" in findings["second position"].remark
     # Two encoders of 32 bits need two answers of each drive, and so a longer period.
     (tmp_path / "leg.toml").unlink()
     assert learned_by(tmp_path, stranger()).period_us == 2000
@@ -307,6 +327,25 @@ def test_second_positions_and_temperatures_are_told_by_profile_and_name() -> Non
     found = read(sheet)
     assert [str(one) for one in link_candidates(found)] == ["2100h:00", "2102h:01"]
     assert [str(one) for one in temperature_candidates(found)] == ["2105h:00", "2107h:00"]
+
+
+def test_frames_whose_identifier_or_type_is_fixed_otherwise_are_left_alone() -> None:
+    sheet = stranger().fixed({(0x1400, 1): "0x205", (0x1401, 2): "255"})
+    sheet.fixed({(0x1402, 1): "$NODEID+0x400", (0x1402, 2): "1"}, "ro")
+    commands = choose(read(sheet), (CONTROLWORD, TARGET_POSITION), commands=True)
+    assert [pdo.number for pdo in commands or ()] == [4]
+    fixed = {(0x1602, 0): "2", (0x1602, 1): "0x60400010", (0x1602, 2): "0x607A0020"}
+    sheet.fixed(fixed, "rw").without(0x1403)
+    commands = choose(read(sheet), (CONTROLWORD, TARGET_POSITION), commands=True)
+    assert [pdo.number for pdo in commands or ()] == [3]
+
+
+def test_the_highest_bitrate_of_the_drive_is_proposed(tmp_path: Path) -> None:
+    sheet = stranger().without(0x60E4, (0x1018, 2))
+    sheet.head = sheet.head.replace("BaudRate_1000=1", "Baudrate_500=1\nBaudRate_125=1")
+    bus = learned_by(tmp_path, sheet)
+    assert (bus.bitrate, bus.period_us) == (500_000, 2000)
+    assert {one.identity.product for one in bus.nodes} == {None}
 
 
 def test_process_data_is_carried_by_fixed_frames_where_nothing_is_free() -> None:

@@ -65,9 +65,10 @@ def learn(
     def text_with(waive: Sequence[str]) -> str:
         return bus_text(proposal, ids, waive, period_us=period_us)
 
-    config = _parsed(text_with(waivers_for(watched=False, braked=False)), out.parent)
+    config = _parsed(text_with(waivers_for(proposal, watched=False, braked=False)), out.parent)
     found = [assess(sheet, config, node) for node in config.nodes]
     waive = waivers_for(
+        proposal,
         watched=all(one.means for one in found),
         braked=all(
             any(entry.parameter.key == quick_stop_ramp(node) for entry in one.outcomes)
@@ -81,7 +82,7 @@ def learn(
 
 def _period_us(proposal: Proposal, ids: Sequence[int], folder: Path) -> int:
     """Return the shortest period in which all frames are exchanged; raises ConfigError for none."""
-    everything = waivers_for(watched=False, braked=False)
+    everything = waivers_for(proposal, watched=False, braked=False)
     for period_us in RUN_PERIODS_US:
         text = bus_text(proposal, ids, everything, period_us=period_us)
         try:

@@ -26,7 +26,7 @@ READ = {
     (0x603F, 0): "the reason of a fault, but for what an emergency message says",
 }
 """Objects that are read, and what is not known without them."""
-NEEDED_READS = ((0x1000, 0), (0x1018, 1), (0x1018, 2))
+NEEDED_READS = ((0x1000, 0), (0x1018, 1))
 
 
 class State(Enum):
@@ -81,7 +81,13 @@ def assess(
     reads = [finding for finding in _reads(sheet) if finding.state is State.LACKS]
     return Assessment(
         node=node.name,
-        findings=(*_cyclic(sheet), *_reads(sheet), *map(_finding, written), *unused),
+        findings=(
+            *_cyclic(sheet),
+            *_encoders(node),
+            *_reads(sheet),
+            *map(_finding, written),
+            *unused,
+        ),
         problems=tuple(_problems(sheet, node, outcomes)),
         unprotected=(*lost, *(f"{one.object}: {one.remark}" for one in (*reads, *unused))),
         means=means_of(bus, node, speed=speed, held=held_by(outcomes)),
@@ -130,6 +136,20 @@ def _cyclic(sheet: DataSheet) -> Iterator[Finding]:
         has = sheet.has((index, 0))
         state = State.HAS if has else State.LACKS
         yield Finding(object=name_of(index), need=Need.REQUIRED.value, state=state)
+
+
+def _encoders(node: NodeConfig) -> Iterator[Finding]:
+    """Yield what is not known of a joint with one encoder."""
+    if node.link is None:
+        known = node.torque_object
+        remark = (
+            "not known are the torque of the spring and the position of the link; controllers that "
+            "need them are refused"
+            if known is None
+            else f"the spring's torque is the drive's own ({known}), inertia and friction in it"
+        )
+        optional = Need.OPTIONAL.value
+        yield Finding(object="second position", need=optional, state=State.LACKS, remark=remark)
 
 
 def _reads(sheet: DataSheet) -> Iterator[Finding]:

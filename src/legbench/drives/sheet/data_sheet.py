@@ -30,6 +30,8 @@ class DataSheet:
     revision: int | None = None
     vendor_name: str = ""
     product_name: str = ""
+    bitrates: frozenset[int] = frozenset()
+    """Bitrates that the device knows; none where the data sheet tells none [bit/s]."""
     node_id: int | None = None
     """Node id of a configured device (DCF)."""
     remarks: tuple[str, ...] = ()
@@ -68,10 +70,20 @@ class DataSheet:
         return tuple(word for word in words if word)
 
     def mappable(self, number: int, entries: int, *, commands: bool) -> bool:
-        """Whether a PDO can be mapped anew, with so many entries."""
+        """Whether a PDO can be mapped anew, with so many entries.
+
+        It has to be switched off for that, by its COB-ID (CiA 301, 7.5.2.36).
+        """
         mapping = (0x1600 if commands else 0x1A00) + number - 1
-        return self.writable((mapping, 0)) and all(
-            self.writable((mapping, sub)) for sub in range(1, entries + 1)
+        return self.writable((mapping - 0x200, 1)) and all(
+            self.writable((mapping, sub)) for sub in range(entries + 1)
+        )
+
+    def stays_on(self, comm: int) -> bool:
+        """Whether a PDO is on at power-on, by its communication object, and cannot be let off."""
+        return (
+            not self.writable((comm, 1))
+            and not (self.default((comm, 1), 0) or COB_INVALID) & COB_INVALID
         )
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from legbench.drives.protocol.datatypes import FORMATS, DataType, Value, range_of, size_of
 from legbench.drives.protocol.objects import Access, Key, ObjectEntry
+from legbench.drives.setup.eds import BAUD_RATES
 from legbench.drives.sheet.clean import clean_text
 from legbench.drives.sheet.data_sheet import DataSheet, profile_default
 from legbench.drives.sheet.text import LARGEST_EDS, Sections, decode, number, split, words
@@ -94,6 +95,9 @@ def _described(
         revision=_identity(device, "revisionnumber", objects, given, 3),
         vendor_name=words(device, "vendorname"),
         product_name=words(device, "productname"),
+        bitrates=frozenset(
+            1000 * rate for rate in BAUD_RATES if number(device.get(f"baudrate_{rate}"))
+        ),
         node_id=node_id if node_id is not None and 1 <= node_id <= 127 else None,
         remarks=tuple(sections.remarks),
     )

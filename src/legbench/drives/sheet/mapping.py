@@ -4,8 +4,11 @@ from collections.abc import Iterable, Sequence
 from itertools import combinations
 
 from legbench.drives.errors import CodecError
+from legbench.drives.protocol.frame import COB_NO_REMOTE, RPDO_BASES, TPDO_BASES
 from legbench.drives.protocol.pdo import MAX_BYTES, Mapped, split_word
 from legbench.drives.setup.config import PdoConfig
+from legbench.drives.setup.configuration import EVERY_SYNC
+from legbench.drives.setup.needs import LAST_SYNCHRONOUS
 from legbench.drives.sheet.data_sheet import DataSheet
 
 MOST_TRIED = 8
@@ -26,7 +29,11 @@ def choose(
         needed: objects to carry.
         commands: RPDOs, else TPDOs.
     """
-    numbers = sheet.pdos(commands=commands)[:MOST_TRIED]
+    numbers = [
+        number
+        for number in sheet.pdos(commands=commands)[:MOST_TRIED]
+        if _is_usable(sheet, number, commands=commands)
+    ]
     free = [number for number in numbers if _is_free(sheet, number, commands=commands)]
     fixed = {
         number: entries
@@ -51,13 +58,28 @@ def _pdo(
 ) -> PdoConfig:
     index = (0x1400 if commands else 0x1800) + number - 1
     deadline_ms = 20 if commands and sheet.writable((index, 5)) else 0
-    # Beyond the fourth there is no identifier by the standard: the drive's own one is kept.
-    cob = None if number <= 4 else (sheet.default((index, 1), 0) or 0) & 0x7FF or None
-    return PdoConfig(number=number, objects=entries, deadline_ms=deadline_ms, cob_id=cob)
+    return PdoConfig(number=number, objects=entries, deadline_ms=deadline_ms)
+
+
+def _is_usable(sheet: DataSheet, number: int, *, commands: bool) -> bool:
+    """Whether identifier and transmission type of a PDO are what they have to be, or can be."""
+    base, comm = (RPDO_BASES, 0x1400) if commands else (TPDO_BASES, 0x1800)
+    comm += number - 1
+    if number > len(base):
+        return False
+    if not sheet.writable((comm, 1)):
+        cob = sheet.default((comm, 1), 0)
+        own = (comm, 1) in sheet.relative and cob is not None
+        if not own or (cob or 0) & ~COB_NO_REMOTE != base[number - 1]:
+            return False
+    kind = sheet.default((comm, 2), 0)
+    if sheet.writable((comm, 2)) or kind is None:
+        return True
+    return kind <= LAST_SYNCHRONOUS if commands else kind == EVERY_SYNC
 
 
 def _is_free(sheet: DataSheet, number: int, *, commands: bool) -> bool:
-    return number <= 4 and sheet.mappable(number, 2, commands=commands)
+    return sheet.mappable(number, 2, commands=commands)
 
 
 def _fixed(
@@ -79,7 +101,7 @@ def _fixed(
             return None
         entries.append(entry)
     carries = any(entry in needed for entry in entries)
-    return tuple(entries) if carries and number <= 4 else None
+    return tuple(entries) if carries else None
 
 
 def _packed(

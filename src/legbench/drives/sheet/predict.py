@@ -9,7 +9,7 @@ from legbench.drives.protocol.objects import PDO_COUNT, Access, Key
 from legbench.drives.protocol.sdo import Abort
 from legbench.drives.setup.config import BusConfig, NodeConfig, Parameter
 from legbench.drives.setup.configuration import configuration
-from legbench.drives.setup.needs import RPDOS, TPDOS, row_of
+from legbench.drives.setup.needs import MAPPINGS, RPDOS, TPDOS, row_of
 from legbench.drives.setup.outcome import CYCLE, CYCLE_INDEX, Outcome, cycle_count, judge
 from legbench.drives.sheet.data_sheet import DataSheet
 
@@ -52,11 +52,18 @@ def _written(
         return Abort.TYPE_LENGTH, None
     if entry.access in (Access.RO, Access.CONST):
         return Abort.READ_ONLY, parameter.value if there is None else there
+    if _is_mapping(parameter) and sheet.stays_on(parameter.index - 0x200):
+        # A PDO that is on cannot be mapped.
+        return Abort.DEVICE_STATE, there
     low, high = sheet.limits.get(key, range_of(entry.kind))
     for value in (parameter.value, *row_of(parameter).fallbacks.get(parameter.value, ())):
         if low <= value <= high:
             return None, value
     return (Abort.TOO_HIGH if parameter.value > high else Abort.TOO_LOW), there
+
+
+def _is_mapping(parameter: Parameter) -> bool:
+    return any(parameter.index in mapping for mapping in MAPPINGS)
 
 
 def _fitting(sheet: DataSheet, parameter: Parameter, index: int) -> Parameter:

@@ -20,7 +20,7 @@ from legbench.drives.sheet.candidates import link_candidates, temperature_candid
 from legbench.drives.sheet.data_sheet import DataSheet
 from legbench.drives.sheet.mapping import choose
 from legbench.errors import ConfigError
-from legbench.limits.upper_ends import MASTER_WATCH, QUICK_STOP_RAMP
+from legbench.limits.upper_ends import MASTER_WATCH, QUICK_STOP_RAMP, SPRING_WATCH
 
 MARK = "MEASURE"
 """Word in the comment of every line whose value is a guess."""
@@ -142,7 +142,7 @@ def bus_text(
         f"eds = {json.dumps(proposal.eds, ensure_ascii=False)}",
         'interface = "socketcan"',
         'channel = "can0"',
-        "bitrate = 1_000_000",
+        f"bitrate = {_bitrate(sheet):_}",
         f"period_us = {period_us}",
         f"reply_delay_us = 250  # {MARK}: from SYNC to the first answer, by the drive manual",
         "master_id = 126",
@@ -154,6 +154,11 @@ def bus_text(
     for place, node_id in enumerate(node_ids):
         lines += _node(proposal, place, node_id)
     return "\n".join(lines) + "\n"
+
+
+def _bitrate(sheet: DataSheet) -> int:
+    """Highest bitrate of the device; that of the emulated leg where it tells none [bit/s]."""
+    return max(sheet.bitrates, default=1_000_000)
 
 
 def _waived(waive: Sequence[str]) -> Iterator[str]:
@@ -170,7 +175,8 @@ def _node(proposal: Proposal, place: int, node_id: int) -> Iterator[str]:
     yield f'name = "motor{place + 1}"'
     yield f"id = {node_id}"
     yield f"vendor = 0x{sheet.vendor or 0:08X}" + ("" if sheet.vendor else f"  # {MARK}")
-    yield f"product = 0x{sheet.product or 0:08X}" + ("" if sheet.product else f"  # {MARK}")
+    if sheet.has((0x1018, 2)):
+        yield f"product = 0x{sheet.product or 0:08X}" + ("" if sheet.product else f"  # {MARK}")
     if sheet.has((0x1018, 4)):
         yield f"# serial = 0  # {MARK}: two drives of a kind are told apart by it alone"
     else:
@@ -262,20 +268,20 @@ def _pdos(proposal: Proposal) -> Iterator[str]:
             yield f"[[node.{words}]]"
             yield f"number = {pdo.number}"
             yield f"objects = [{objects}]"
-            if pdo.cob_id is not None:
-                yield f"cob_id = 0x{pdo.cob_id:03X}"
             if words == "rpdo":
                 yield f"deadline_ms = {pdo.deadline_ms}"
 
 
-def waivers_for(*, watched: bool, braked: bool) -> tuple[str, ...]:
+def waivers_for(proposal: Proposal, *, watched: bool, braked: bool) -> tuple[str, ...]:
     """Names of the protections that drives have to do without.
 
     Args:
+        proposal: encoders of the drives.
         watched: a means of every drive stops it when its master is gone.
         braked: every drive takes the ramp of a quick stop.
     """
-    names = ((MASTER_WATCH, watched), (QUICK_STOP_RAMP, braked))
+    sprung = proposal.link is not None or proposal.torque is not None
+    names = ((MASTER_WATCH, watched), (QUICK_STOP_RAMP, braked), (SPRING_WATCH, sprung))
     return tuple(name for name, has in names if not has)
 
 
