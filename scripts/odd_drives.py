@@ -106,6 +106,11 @@ def _lead(
     link: Link, emulated: Sequence[EmulatedDrive], drives: Sequence[Drawn], wrong: list[str]
 ) -> None:
     link.start()
+    wrong += [
+        f"led in mode {drive._values[0x6061, 0]}"
+        for drive in emulated
+        if drive._values[0x6061, 0] != 8
+    ]
     there = [pos + (FAR if place else -FAR) for place, pos in enumerate(START)]
     sample = link.move_to(there, 2.0)
     for _ in range(150):

@@ -154,11 +154,13 @@ class Axis:
             return
         if self.power.stopping is not None or values[0x6040, 0] & HALT:
             return
-        target = values[self._target] + values[0x60B0, 0] if fresh else None
+        asked, units = values[self._target], self._node.motor
+        # A position beyond what the drive shows is none: it is as if no target had come.
+        target = asked + values[0x60B0, 0] if fresh and units.show(asked) == asked else None
         if target is not None:
             # The object wraps; the motor takes the short way round.
             near = round(self.motion.demand)
-            target = self._node.motor.nearest(self.motion.sign * target, near)
+            target = units.nearest(self.motion.sign * target, near)
         self.motion.latch(target, now_ns)
         if self.motion.missing > self._behaviour.missing_limit:
             self.fault(SETPOINTS_MISSING)
