@@ -8,6 +8,7 @@ from legbench.limits.upper_ends import DRIVE_HEARTBEAT, check_number
 BUS_NUMBERS: Mapping[str, tuple[int, int, str]] = {
     "bitrate": (10_000, 1_000_000, "bit/s"),
     "period_us": (200, 20_000, "us"),
+    "reply_delay_us": (1, 10_000, "us"),
     "master_id": (1, 127, ""),
     "master_heartbeat_ms": (1, 21_845, "ms"),
     "sdo_timeout_ms": (1, 10_000, "ms"),
@@ -22,6 +23,8 @@ leads no leg. Drives watch for three heartbeats, in the 16 bits of 1016h: 65 535
 2 000 cycles for regular process data, so that 1 000 in a row can come. Holding brakes of motors of
 this size open within 20 to 200 ms; half a second of one drive alone is no enabling any more.
 """
+RUN_PERIODS_US = (1000, 2000, 4000)
+"""Periods with which a leg is led [us]: whole periods of the simulated leg, which moves each."""
 SLOWEST_HEARTBEAT, SLOWEST_WAIVED = 100, 2000
 """Longest heartbeat of a drive, and where it is waived [ms]."""
 WORD = (1 << 16) - 1
