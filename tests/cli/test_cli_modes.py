@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 from commands import MODELS, called
 
+from legbench.cli import main
+
 pytest.importorskip("heyoka")
 
 PROTOTYPE, TABLE_2 = MODELS / "prototype.toml", MODELS / "table2.toml"
@@ -34,6 +36,21 @@ PROTOTYPE, TABLE_2 = MODELS / "prototype.toml", MODELS / "table2.toml"
         (("hop", "--basin", "5", "--out", "x", "--workers", "0"), ("workers is 0",)),
         (("hop", "--basin", "5", "--out", "x", "--up", "width"), ("axis 'width' is unknown",)),
         (("hop", "--basin", "5", "--out", "x", "--passive"), ("there is no basin to map",)),
+        (("hop", "--across", "foo"), ("axis 'foo' is unknown; an apex has height",)),
+        (("hop", "--across-span", "nan"), ("axis z1 runs from nan to nan",)),
+        (("hop", "--across", "speed"), ("both axes are speed; a map needs two",)),
+        (
+            ("hop", "--basin", "1000", "--out", "x"),
+            ("1000 x 1000 = 1000000 cells, some", "up to 500 points a side, or say --large"),
+        ),
+        (("hop", "--delay", "-5"), ("delay is -5 s; it must be zero or more",)),
+        (("hop", "--dz2", "-0.1"), ("dz2 is -0.1 rad; a push needs a positive amplitude",)),
+        (
+            ("hop", "--touchdown-load", "0.1", "--release-load", "0.5"),
+            ("release_load 0.5 and touchdown_load 0.1 must satisfy 0 < release < touchdown < 1",),
+        ),
+        (("hop", "--apex-turn", "0"), ("apex_turn is 0 rad; it must be positive",)),
+        (("hop", "--release-time", "nan"), ("release_time is nan s; it must be 0 or more",)),
     ],
     ids=lambda value: " ".join(value) if value[0] in ("modes", "hop") else "",
 )
@@ -90,3 +107,44 @@ def test_a_map_that_is_interrupted_ends_and_keeps_its_rows(tmp_path: Path) -> No
     assert said.endswith("legbench: interrupted\n")
     lines = rows.read_text(encoding="utf-8").splitlines()
     assert all(len(json.loads(line)["fates"]) == 300 for line in lines[1:])
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        ("--delay", "-5"),
+        ("--dz2", "-0.1"),
+        ("--touchdown-load", "0.1", "--release-load", "0.5"),
+        ("--touchdown-time", "inf"),
+        ("--z2", "3"),
+    ],
+)
+def test_hop_refuses_the_settings_that_run_refuses_in_the_same_words(
+    settings: tuple[str, ...], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    said = []
+    for command in (("hop", PROTOTYPE), ("run", "jump", "--design", PROTOTYPE)):
+        end = ("--out", tmp_path / "run") if command[0] == "run" else ()
+        done = called(capfd, *command, *settings, *end)
+        assert done.status != 0
+        said.append(done.err.splitlines()[-1])
+    assert said[0] == said[1]
+
+
+def test_the_basin_that_is_mapped_unasked_shows_its_boundary(tmp_path: Path) -> None:
+    content = tmp_path / "hop.json"
+    assert main(["hop", str(PROTOTYPE), "--basin", "9", "--out", str(tmp_path)]) == 0
+    shares = json.loads(content.read_text(encoding="utf-8"))["basin"]
+    assert shares["returns"] > 0.2
+    assert shares["stands"] + shares["fell"] > 0.2
+
+
+def test_hop_makes_the_folder_that_it_writes_to(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "new" / "one"
+    assert called(capfd, "hop", PROTOTYPE, "--hops", "20", "--out", out).status == 0
+    assert {path.name for path in out.iterdir()} == {"hop.json", "return.png"}
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    done = called(capfd, "hop", PROTOTYPE, "--hops", "20", "--out", tmp_path / "file", "--json")
+    done.refused("file cannot be written")

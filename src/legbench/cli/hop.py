@@ -10,7 +10,7 @@ import tyro
 
 from legbench.analytic import LegModel
 from legbench.analytic.taylor import TaylorLeg
-from legbench.cli.output import note, print_json, progress, write_json
+from legbench.cli.output import make_folder, note, print_json, progress, write_json
 from legbench.cli.parse import parse
 from legbench.control import JumpConfig
 from legbench.design import LegDesign, load_design
@@ -32,6 +32,10 @@ WHY = {
     "a longer --touchdown-time",
 }
 """What to say of a leg that does not come to its next apex."""
+LARGE = 250_000
+"""Cells of a basin map beyond which it is asked whether that was meant [-]."""
+CELL_TIME = 0.004
+"""What one cell takes one process, about [s]."""
 MATCHED = 1e-5
 """Polar set point of the motors that is smaller than a count of most encoders [rad]."""
 DROPS = (0.02, 0.05, 0.1)
@@ -57,12 +61,14 @@ class HopArguments:
     """Points a side of the basin map; 0: none."""
     across: str = "z1"
     """What varies to the right in the basin map."""
-    across_span: float = 0.3
-    """How far, either way."""
-    up: str = "height"
+    across_span: float = 0.6
+    """How far, either way; in metres, radians and seconds."""
+    up: str = "speed"
     """What varies upwards."""
-    up_span: float = 0.08
-    """How far, either way."""
+    up_span: float = 2.5
+    """How far, either way; in metres, radians and seconds."""
+    large: bool = False
+    """Map a basin of more than 250 000 cells all the same."""
     workers: int = 2
     """Processes for the basin map."""
     out: Path | None = None
@@ -76,6 +82,8 @@ def main(arguments: list[str]) -> int:
     flags = parse(HopArguments, "hop", arguments)
     _check(flags)
     design = load_design(flags.design)
+    if flags.out is not None:
+        make_folder(flags.out)
     content = _passive(flags, design) if flags.passive else _driven(flags, design)
     if flags.json:
         print_json(content)
@@ -90,6 +98,10 @@ def _check(flags: HopArguments) -> None:
         raise ConfigError(f"hops is {flags.hops}; it must be 1 or more")
     if flags.height is not None and not 0.0 < flags.height < math.inf:
         raise ConfigError(f"height is {flags.height:g} m; an apex lies above the ground")
+    for name, span in ((flags.across, flags.across_span), (flags.up, flags.up_span)):
+        Axis(name=name, low=-span, high=span, count=max(flags.basin, 2))
+    if flags.across == flags.up:
+        raise ConfigError(f"both axes are {flags.up}; a map needs two different ones")
     if flags.basin == 0:
         return
     if flags.basin < 2:
@@ -103,8 +115,13 @@ def _check(flags: HopArguments) -> None:
         )
     if flags.workers < 1:
         raise ConfigError(f"workers is {flags.workers}; a map needs 1 process or more")
-    for name, span in ((flags.across, flags.across_span), (flags.up, flags.up_span)):
-        Axis(name=name, low=-span, high=span, count=flags.basin)
+    if flags.basin**2 > LARGE and not flags.large:
+        hours = flags.basin**2 * CELL_TIME / flags.workers / 3600.0
+        raise ConfigError(
+            f"basin is {flags.basin} x {flags.basin} = {flags.basin**2} cells, some {hours:.2g} h "
+            f"with {flags.workers} processes; take up to {math.isqrt(LARGE)} points a side, or say "
+            "--large"
+        )
 
 
 def _driven(flags: HopArguments, design: LegDesign) -> dict[str, Any]:
@@ -115,7 +132,7 @@ def _driven(flags: HopArguments, design: LegDesign) -> dict[str, Any]:
     standing = model.mass_centre_from_hip(q)[1] - model.foot_from_hip(q)[1]
     height = standing + 0.03 if flags.height is None else flags.height
     start = Apex(height=height, speed=0.0, z1=0.0, z2=z2, dz1=0.0, dz2=0.0)
-    apexes = settle(leg, law, start, flags.hops)
+    apexes = _hopped(leg, law, start, flags.hops)
     if len(apexes) <= flags.hops:
         ending = return_map(leg, law, apexes[-1]).ending
         raise ConfigError(
@@ -150,6 +167,19 @@ def _driven(flags: HopArguments, design: LegDesign) -> dict[str, Any]:
         if not flags.json:
             print("\nbasin   " + ", ".join(f"{k} {v:.1%}" for k, v in _share(fates).items()))
     return content
+
+
+def _hopped(leg: TaylorLeg, law: JumpLaw, start: Apex, hops: int) -> list[Apex]:
+    """Apexes of up to `hops` hops, the start first; tells how many are done."""
+    apexes = [start]
+    progress(0, hops)
+    for done in range(hops):
+        after = settle(leg, law, apexes[-1], 1)[1:]
+        if not after:
+            break
+        apexes += after
+        progress(done + 1, hops)
+    return apexes
 
 
 def _passive(flags: HopArguments, design: LegDesign) -> dict[str, Any]:

@@ -51,6 +51,18 @@ def write_json(path: Path, content: Mapping[str, Any]) -> None:
         raise ConfigError(f"{path.parent} cannot be written: {error}") from error
 
 
+def make_folder(path: Path) -> None:
+    """Make the folder that results are to be written to, before they are computed.
+
+    Raises:
+        ConfigError: it cannot be made.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError(f"{path} cannot be written: {error}") from error
+
+
 def progress(done: int, total: int) -> None:
     """Draw a line that overwrites itself, on a terminal that takes it at once.
 
