@@ -18,7 +18,7 @@ from scipy.integrate import solve_ivp
 
 from legbench.analytic import Accuracy, HybridLeg, LegModel, LegState, Method, flying
 from legbench.analytic import matrices as mx
-from legbench.analytic.hybrid import switch
+from legbench.analytic.contact import switch
 from legbench.analytic.state import Regime
 from legbench.analytic.taylor import MAP_TOLERANCE, TaylorLeg
 from legbench.design import load_design

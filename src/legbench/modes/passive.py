@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import root, root_scalar
 
+from legbench.analytic.contact import switch
 from legbench.analytic.equations import Pair
-from legbench.analytic.hybrid import switch
 from legbench.analytic.state import standing
 from legbench.analytic.taylor import SILENT, TaylorLeg, Watched
 from legbench.modes.drive import Passive
