@@ -21,7 +21,7 @@ from legbench.modes.drive import JumpLaw, Passive
 from legbench.modes.fixed_point import FixedPoint, fixed_point
 from legbench.modes.hop import Apex, Ending, return_map, settle
 from legbench.modes.passive import FreeHop, depths, free_hop
-from legbench.modes.scene import make_scene
+from legbench.modes.scene import Holding, make_scene
 from legbench.modes.slip import Slip, leg_groups, slip_groups
 from legbench.signals import Ints
 
@@ -183,9 +183,7 @@ def _hopped(leg: TaylorLeg, law: JumpLaw, start: Apex, hops: int) -> list[Apex]:
 
 
 def _passive(flags: HopArguments, design: LegDesign) -> dict[str, Any]:
-    from legbench.design.setup import SetupKind
-
-    scene = make_scene(design, SetupKind.JUMP, flags.rest)
+    scene = make_scene(design, Holding.JUMP, flags.rest)
     half = 0.5 * (scene.motor[1] - scene.motor[0])
     leg = TaylorLeg(LegModel.of(design, undamped=True), probe=Passive.probe)
     hops = []
@@ -281,7 +279,7 @@ def _point(point: FixedPoint) -> dict[str, Any]:
 
 
 def _plot_return(out: Path, design: LegDesign, apexes: list[Apex], point: FixedPoint) -> None:
-    from legbench.viz.print.modes import plot_return
+    from legbench.viz.print.hops import plot_return
 
     heights = np.array([apex.height for apex in apexes])
     pairs = np.stack([heights[:-1], heights[1:]], axis=-1)
@@ -291,7 +289,7 @@ def _plot_return(out: Path, design: LegDesign, apexes: list[Apex], point: FixedP
 
 
 def _basin(flags: HopArguments, design: LegDesign, point: FixedPoint, out: Path) -> Ints:
-    from legbench.viz.print.modes import plot_basin
+    from legbench.viz.print.hops import plot_basin
 
     def axis(name: str, span: float) -> Axis:
         middle = getattr(point.apex, name, 0.0)

@@ -147,7 +147,7 @@ def _unit(vector: Floats) -> Floats:
 
 
 def beyond_limits(scene: Scene, path: Floats) -> str:
-    """Joint that a path of postures (n, 2) takes furthest beyond its limit, in words; else empty."""
+    """Joint that a path of postures (n, 2) takes furthest beyond its limit; empty if none."""
     limits = scene.design.limits
     worst, said = 0.0, ""
     for joint, angle, (low, high) in (

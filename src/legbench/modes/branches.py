@@ -101,7 +101,7 @@ def _followed(
         nonlocal halted
         orbit = shooting.orbit(found.unknown)
         if orbit.outside:
-            halted = orbit.outside
+            halted = f"{orbit.outside} beyond {orbits[-1].energy:.4g} J"
             return AGAIN
         orbits.append(orbit)
         shooting.refer(orbit.start)

@@ -1,4 +1,4 @@
-"""Flow of the two angles between events, with its derivatives: what every periodic orbit is made of.
+"""Flow of the two angles between events, with its derivatives: periodic orbits are made of it.
 
 One integrator serves every leg and every way of holding it, because inertias, gravity, springs,
 dampers and motors are parameters of it at run time. Joint stops do not act; who asks for an orbit
@@ -6,28 +6,25 @@ says whether it stays within them.
 """
 
 from dataclasses import dataclass
-from functools import cache
 from typing import Any, final
 
 import numpy as np
 
 from legbench.analytic import equations
-from legbench.analytic._heyoka import SYMBOLS
-from legbench.analytic._heyoka import heyoka as hy
+from legbench.analytic.compiled import varied_integrator
+from legbench.analytic.course import TIME_LIMIT
 from legbench.analytic.equations import Pair
-from legbench.analytic.terms import PairTerms
+from legbench.analytic.places import DAMPING, MOTOR, PUSHES, SMOOTH
 from legbench.errors import ConfigError
 from legbench.modes.scene import Scene
 from legbench.signals import Floats
 
-STIFFNESS, DAMPING, MOTOR, PARAMETERS = 5, 7, 9, 11
-"""Places of springs, dampers and motors among the parameters, and how many there are [-]."""
 STATES = 4
-TOLERANCE = 1e-14
+"""Two angles and their rates [-]."""
+TOLERANCE = 1e-15
 """Error of a step over the size of the state [-]."""
 MAX_STEPS = 20_000
 """Largest number of steps of one integration [-]; an orbit takes some hundred."""
-TIME_LIMIT = int(hy.taylor_outcome.time_limit)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,6 +54,7 @@ class Carrier:
     def __init__(self, scene: Scene, damping: Pair = (0.0, 0.0)) -> None:
         self.scene = scene
         self.damping: Floats = np.array(damping)
+        self._integrator = varied_integrator(TOLERANCE)
         terms = scene.terms
         self._parameters = np.array(
             [
@@ -93,13 +91,12 @@ class Carrier:
         Raises:
             ConfigError: the leg runs away from there.
         """
-        integrator = _varied()
-        self._load(integrator, start, extra, motor)
+        integrator = self._load(start, extra, motor)
         outcome = int(integrator.propagate_until(float(time), MAX_STEPS)[0])
         state = integrator.state.copy()
         if outcome != TIME_LIMIT or not np.all(np.isfinite(state)):
             raise ConfigError(f"the leg cannot be followed for {time:.3g} s: it runs away")
-        slopes = state[STATES:].reshape(STATES, STATES + PARAMETERS)
+        slopes = state[STATES:].reshape(STATES, STATES + SMOOTH)
         return Carried(
             end=state[:STATES],
             by_start=slopes[:, :STATES],
@@ -120,47 +117,21 @@ class Carrier:
         Raises:
             ConfigError: the leg runs away from there.
         """
-        integrator = _plain()
-        self._load(integrator, start, extra, motor)
+        integrator = self._load(start, extra, motor)
         outcome, *_, states = integrator.propagate_grid(times)
         if int(outcome) != TIME_LIMIT:
             raise ConfigError(f"the leg cannot be followed for {times[-1]:.3g} s: it runs away")
-        return np.asarray(states)
+        return np.asarray(states)[:, :STATES]
 
-    def _load(
-        self, integrator: Any, start: Floats, extra: float, motor: Floats | None
-    ) -> None:
+    def _load(self, start: Floats, extra: float, motor: Floats | None) -> Any:
+        """The integrator at a start, its derivatives those of the start by itself."""
+        integrator = self._integrator
         integrator.time = 0.0
         integrator.state[:STATES] = start
-        if integrator.state.size > STATES:
-            integrator.state[STATES:] = np.eye(STATES, STATES + PARAMETERS).ravel()
-        integrator.pars[:] = self._parameters
+        integrator.state[STATES:] = np.eye(STATES, STATES + SMOOTH).ravel()
+        integrator.pars[:SMOOTH] = self._parameters
+        integrator.pars[PUSHES:] = 0.0
         integrator.pars[DAMPING:MOTOR] += extra
         if motor is not None:
-            integrator.pars[MOTOR:PARAMETERS] = motor
-
-
-def _system() -> list[Any]:
-    q, v = hy.make_vars("q1", "q2"), hy.make_vars("v1", "v2")
-    par = [hy.par[place] for place in range(PARAMETERS)]
-    terms = PairTerms(inertia=(par[0], par[1]), coupling=par[2], moment=(par[3], par[4]))
-    spring = equations.spring_torque((par[5], par[6]), (par[9], par[10]), (q[0], q[1]))
-    torque = equations.damped(spring, (par[7], par[8]), (v[0], v[1]))
-    a = equations.pair_acceleration(SYMBOLS, terms, (q[0], q[1]), (v[0], v[1]), torque)
-    return [(q[0], v[0]), (q[1], v[1]), (v[0], a[0]), (v[1], a[1])]
-
-
-@cache
-def _varied() -> Any:
-    seeds = [*hy.make_vars("q1", "q2", "v1", "v2"), *(hy.par[place] for place in range(PARAMETERS))]
-    return hy.taylor_adaptive(
-        hy.var_ode_sys(_system(), seeds),
-        [0.0] * STATES,
-        tol=TOLERANCE,
-        compact_mode=True,
-    )
-
-
-@cache
-def _plain() -> Any:
-    return hy.taylor_adaptive(_system(), [0.0] * STATES, tol=TOLERANCE)
+            integrator.pars[MOTOR:SMOOTH] = motor
+        return integrator

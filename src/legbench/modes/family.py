@@ -1,4 +1,4 @@
-"""Families of nonlinear modes: a mode's orbits by growing energy, and where their stability changes.
+"""Families of nonlinear modes: a mode's orbits by growing energy, and where stability changes.
 
 Pseudo-arclength continuation follows the brake orbits out of a linear mode. Along them the trace
 of the pair of multipliers says what happens: beyond 2 a pair of multipliers is real and positive,
@@ -21,7 +21,7 @@ from legbench.modes.scene import Scene
 from legbench.modes.seed import APART, FIRST, first_unknown, gap
 from legbench.signals import Floats
 
-STEP = 0.05
+STEP = 0.03
 """Longest arc between two orbits; [rad], half periods count in units of the linear one."""
 SMALLEST = 1e-5
 """Amplitude of the smallest orbit that is solved for [rad]."""
@@ -76,7 +76,7 @@ def follow(
     name: str,
     energy: float,
     *,
-    most: int = 60,
+    most: int = 200,
     progress: Callable[[int, int], None] | None = None,
 ) -> Family:
     """Continue the `radial` or `polar` mode from rest up to an energy [J], at most `most` orbits.
@@ -97,7 +97,16 @@ def follow(
         smaller: list[BrakeOrbit] = []
         _grow(shooting, unknown, -along, Stride(first=0.02, longest=0.02), smaller, 0.0)
         orbits = smaller[::-1] + orbits
-    ended = _grow(shooting, unknown, along, Stride(most=most), orbits, energy, progress)
+    ended = _grow(
+        shooting,
+        unknown,
+        along,
+        Stride(first=STEP, longest=STEP, most=most),
+        orbits,
+        energy,
+        progress,
+    )
+    orbits = _refined(shooting, orbits)
     return Family(
         mode=modes[name],
         shooting=shooting,
@@ -198,10 +207,33 @@ def _small(family: Family, energy: float) -> BrakeOrbit:
         )
     if gap(linear_modes(shooting.scene)) < APART:
         raise ConfigError(
-            f"the {family.mode.name} mode cannot be followed below {first.energy:.3g} J: in the 1:1 "
-            "resonance orbits so small do not tell the modes apart"
+            f"the {family.mode.name} mode cannot be followed below {first.energy:.3g} J: in the "
+            "1:1 resonance orbits so small do not tell the modes apart"
         )
     return shooting.with_energy(smallest, largest, energy)
+
+
+def _refined(shooting: BrakeShooting, orbits: list[BrakeOrbit]) -> list[BrakeOrbit]:
+    """Orbits with one more wherever the trace seems to touch 2 or -2 between three of them."""
+    more: list[tuple[int, BrakeOrbit]] = []
+    for index, (one, two, three) in enumerate(zip(orbits, orbits[1:], orbits[2:], strict=False)):
+        energies = np.array([orbit.energy for orbit in (one, two, three)])
+        traces = np.array([orbit.monodromy.trace for orbit in (one, two, three)])
+        bend, slope, _ = np.polyfit(energies - energies[1], traces, 2)
+        if bend == 0.0:
+            continue
+        turn = -0.5 * slope / bend
+        level = traces[1] - 0.25 * slope**2 / bend
+        inside = energies[0] < energies[1] + turn < energies[2]
+        if inside and abs(level) > 2.0 > np.max(np.abs(traces)):
+            before, after = (one, two) if turn < 0.0 else (two, three)
+            ends = shooting.unknown_of(before), shooting.unknown_of(after)
+            share = (energies[1] + turn - before.energy) / (after.energy - before.energy)
+            unknown = shooting.nearly(*ends, float(share))
+            more.append((index + (1 if turn < 0.0 else 2), shooting.orbit(unknown)))
+    for index, orbit in reversed(more):
+        orbits.insert(index, orbit)
+    return orbits
 
 
 def _passings(shooting: BrakeShooting, orbits: list[BrakeOrbit]) -> list[Passing]:

@@ -13,8 +13,9 @@ from typing import final
 
 import numpy as np
 
+from legbench.analytic.places import DAMPING, MOTOR
 from legbench.modes.brake import beyond_limits
-from legbench.modes.carry import DAMPING, MOTOR, Carrier
+from legbench.modes.carry import Carrier
 from legbench.modes.continuation import Solution, correct
 from legbench.modes.monodromy import Monodromy, monodromy
 from legbench.signals import Floats

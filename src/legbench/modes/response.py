@@ -14,7 +14,7 @@ import numpy as np
 from legbench.design.statics import motor_holding
 from legbench.errors import ConfigError
 from legbench.modes.brake import beyond_limits
-from legbench.modes.carry import MOTOR, Carrier
+from legbench.modes.carry import Carrier
 from legbench.modes.continuation import AGAIN, LOST, Solution, Stride, correct, trace
 from legbench.modes.linear import RADIAL, linear_modes
 from legbench.modes.scene import SUPPORTED, Scene
@@ -148,7 +148,7 @@ def respond(
     *,
     fastest: float = 1.5,
     slowest: float = 0.6,
-    most: int = 300,
+    most: int = 1000,
 ) -> ResponseCurve:
     """Follow the response to a square wave of the motors through the radial resonance.
 
@@ -193,6 +193,6 @@ def respond(
 
     if visit(solved) == AGAIN:
         raise ConfigError(f"motors of {dz2:g} rad take the leg too far: {halted}")
-    ended = trace(equations, solved, Stride(first=0.02, longest=0.05, most=most), CLOSED, visit)
+    ended = trace(equations, solved, Stride(first=0.01, longest=0.02, most=most), CLOSED, visit)
     said = {AGAIN: halted, LOST: f"no response continues it at {found[-1].freq:.4g} Hz"}
     return ResponseCurve(dz2=dz2, responses=tuple(found), ended=said.get(ended, ended))

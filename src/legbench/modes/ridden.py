@@ -3,7 +3,7 @@
 Bang-bang switches its motors itself, when the spring torque along z2, zero at rest, passes
 `+threshold` (to z2 + dz2) or `-threshold` (to z2 - dz2). Its limit cycle is closed, and both
 switches happen at their torque: six equations for the state at a switch, the two durations and
-dz2. So the cycles form a curve. It crosses the response curves of all dz2 near their resonance.
+dz2. So the cycles form a curve. Every cycle is a response to motors of its own amplitude and duty.
 """
 
 from dataclasses import dataclass
@@ -103,17 +103,19 @@ class _Law:
         passed = np.flatnonzero((past[1:] < 0.0) & (past[:-1] >= 0.0))
         if len(passed) == 0:
             raise ConfigError(
-                f"bang-bang stops switching: the torque does not pass {self.threshold:g} N m; lower "
-                "the threshold or raise dz2"
+                f"bang-bang stops switching: the torque does not pass {self.threshold:g} N m; "
+                "lower the threshold or raise dz2"
             )
-        low, high = grid[passed[0]], grid[passed[0] + 1]
+        near = path[passed[0]]
+
+        def at(time: float) -> Floats:
+            return carrier.path(near, np.array([0.0, time]), motor=motor)[-1] if time else near
 
         def off(time: float) -> float:
-            end = carrier.path(state, np.array([0.0, time]), motor=motor)[-1]
-            return sign * self.torque(end, motor) + self.threshold
+            return sign * self.torque(at(time), motor) + self.threshold
 
-        time = float(brentq(off, max(low, 1e-6 * unit), high, xtol=1e-12))
-        return time, carrier.path(state, np.array([0.0, time]), motor=motor)[-1]
+        time = float(brentq(off, 0.0, unit / LOOKED, xtol=1e-12))
+        return float(grid[passed[0]]) + time, at(time)
 
     def cycle(self, unknown: Floats) -> Response:
         """The cycle of solved unknowns (7,), with the multipliers of the law's own map."""

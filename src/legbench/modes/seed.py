@@ -81,8 +81,8 @@ def _apart(scene: Scene) -> Scene:
             if gap(linear_modes(other)) > 2.0 * APART:
                 return other
     raise ConfigError(
-        f"the leg's two frequencies lie within {100.0 * APART:g} % of each other at every set point "
-        f"within {REACH:g} rad of {_set_point(scene):.4g} rad: there is no telling its modes apart"
+        f"the leg's two frequencies lie within {100.0 * APART:g} % of each other at every set "
+        f"point within {REACH:g} rad of {_set_point(scene):.4g} rad: its modes cannot be told apart"
     )
 
 

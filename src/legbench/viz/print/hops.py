@@ -1,0 +1,79 @@
+"""Pictures of hops: figures of their own, no window."""
+
+from pathlib import Path
+
+import numpy as np
+
+from legbench.modes.basin import Fate, Question
+from legbench.signals import Floats, Ints
+from legbench.viz.print._matplotlib import (
+    BoundaryNorm,
+    Figure,
+    Line2D,
+    ListedColormap,
+    styled,
+)
+from legbench.viz.print.modes import DPI, GREY, RADIAL
+from legbench.viz.print.save import save_figure
+
+FATES = {
+    Fate.RETURNS: ("#2e7d32", "ends in the periodic hop"),
+    Fate.WANDERS: ("#c0ca33", "hops on, otherwise"),
+    Fate.STANDS: ("#9e9e9e", "comes to stand"),
+    Fate.FELL: ("#c62828", "swings over"),
+    Fate.FAULT: ("#6a1b9a", "controller loses step"),
+    Fate.BURIED: ("#e0e0e0", "foot under the ground"),
+}
+
+
+def plot_return(heights: Floats, fixed: float | None, title: str, path: Path) -> None:
+    """The return map of the apex height: (n, 2) of before and after [m]."""
+    with styled():
+        figure = Figure(figsize=(4.6, 4.4), layout="constrained")
+        axes = figure.subplots()
+        span = [float(np.min(heights)), float(np.max(heights))]
+        axes.plot(span, span, lw=0.8, color=GREY, label="same height again")
+        axes.plot(*heights.T, "o-", ms=3, lw=0.9, color=RADIAL, label="hops in a row")
+        if fixed is not None:
+            axes.plot(fixed, fixed, "o", ms=7, mfc="none", color="k", ls="", label="periodic hop")
+        axes.legend(frameon=False)
+        axes.set(
+            xlabel="apex of the centre of mass [m]",
+            ylabel="next apex of the centre of mass [m]",
+            title=title,
+        )
+        axes.set_aspect("equal")
+        save_figure(figure, path, DPI)
+
+
+def plot_basin(question: Question, fates: Ints, path: Path) -> None:
+    """The grid of starts, coloured by where they lead."""
+    with styled():
+        figure = Figure(figsize=(7.4, 4.4), layout="constrained")
+        axes = figure.subplots()
+        colours = ListedColormap([colour for colour, _ in FATES.values()])
+        axes.pcolormesh(
+            question.across.values(),
+            question.up.values(),
+            fates,
+            cmap=colours,
+            norm=BoundaryNorm(np.arange(-0.5, len(FATES)), len(FATES)),
+            rasterized=True,
+        )
+        centre = question.centre
+        at = (getattr(centre, question.across.name), getattr(centre, question.up.name))
+        axes.plot(*at, "k+", ms=10)
+        handles = [Line2D([], [], marker="+", ls="", color="k", ms=10, label="periodic hop")]
+        for value in np.unique(fates).tolist():
+            colour, label = FATES[Fate(value)]
+            handles.append(Line2D([], [], marker="s", ls="", color=colour, label=label))
+        axes.legend(handles=handles, frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        units = {"height": "m", "speed": "m/s", "dz1": "rad/s", "dz2": "rad/s"}
+        labels = [
+            f"{name} at the apex [{units.get(name, 'rad')}]"
+            for name in (question.across.name, question.up.name)
+        ]
+        axes.set(
+            xlabel=labels[0], ylabel=labels[1], title=f"{question.design.name}: where a hop leads"
+        )
+        save_figure(figure, path, DPI)
