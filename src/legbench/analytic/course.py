@@ -22,6 +22,8 @@ from legbench.analytic.dual import DUAL, floats, without_gradients
 from legbench.analytic.equations import (
     Pair,
     Term,
+    contact_force,
+    pair_acceleration,
     pair_kinetic,
     sweep,
     sweep_rate,
@@ -31,7 +33,7 @@ from legbench.analytic.model import LegModel
 from legbench.analytic.places import HEIGHT, MOTOR, SPEED, Event, Kind, Watched
 from legbench.analytic.state import LegState, Regime
 from legbench.analytic.variation import Variation
-from legbench.analytic.watch import NUDGE, OFF, Watch
+from legbench.analytic.watch import NUDGE, OFF, PAIRS, Watch
 from legbench.design.statics import GRAVITY
 from legbench.errors import PlantFault
 
@@ -227,18 +229,20 @@ class Course:
 
     def _due(self) -> int | None:
         """Guard every event against the zero it starts on; one whose condition holds already."""
-        watch, (q1, q2), (v1, v2), (p1, p2) = self.watch, self._q, self._v, self.probe
+        watch, (q1, q2) = self.watch, self._q
         watch.restore()
-        reading, lean, knee, rate = p1 * q1 + p2 * q2, q1 + q2, q2 - q1, p1 * v1 + p2 * v2
-        if self._levels.turns:
-            self._watch_turn(rate)
+        reading = self.probe[0] * q1 + self.probe[1] * q2
+        lean, knee, low, high = q1 + q2, q2 - q1, watch.low, watch.high
         due = None
-        readings = (reading, reading, rate, lean, lean, knee, knee, q1, q1)
-        for event, ahead in enumerate(map(_ahead, watch.gain, readings, watch.level)):
-            if ahead > -NUDGE:
-                watch.guard(event, readings[event])
-                if ahead > NUDGE and event in SEEN and due is None:
-                    due = event
+        if not (
+            low[0] < reading < high[0]
+            and low[1] < lean < high[1]
+            and low[2] < knee < high[2]
+            and low[3] < q1 < high[3]
+        ):
+            due = self._near((reading, lean, knee, q1))
+        if self._levels.turns:
+            self._guard_turn()
         if self.bumpers.touched:
             self.bumpers.guard(watch, self.terms, self.plain_motor, self._q, self._v)
         if self._free:
@@ -246,20 +250,29 @@ class Course:
             due = contact if due is None else due
         return due
 
+    def _near(self, readings: tuple[float, ...]) -> int | None:
+        """Guard the events that are near; one whose condition holds already."""
+        due = None
+        for reading, pair in zip(readings, PAIRS, strict=True):
+            for event in pair:
+                if self.watch.guard(event, reading) and event in SEEN and due is None:
+                    due = event
+        return due
+
     def _contact(self) -> int | None:
         """Guard touchdown or lift-off; the event if the leg cannot stay in its regime."""
-        watch, q, v = self.watch, self._q, self._v
+        watch = self.watch
         if self.time < self._blind:
-            watch.lay(Event.CONTACT, *OFF)
+            if watch.gain[Event.CONTACT] != 0.0:
+                watch.lay(Event.CONTACT, *OFF)
             return None
         if watch.flies:
             return self._touchdown()
-        force = self.plain.stance_force(self.plain_motor, q, v)[1] / self._weight
+        force = self._force()
         if not watch.held:
             if force < 0.0:
                 return Event.CONTACT
-            watch.lay(Event.CONTACT, -1.0, 0.0)
-            watch.guard(Event.CONTACT, force)
+            self._expect(force)
             return None
         released = self._released()
         if force > 0.0 or released > -TIE:
@@ -277,8 +290,7 @@ class Course:
         height = z + (dz - 0.5 * fallen) * elapsed
         height += sweep(self.plain.ops, self._q, self._plain_arm)[1]
         if height > 0.0:
-            watch.lay(Event.CONTACT, -1.0, 0.0)
-            watch.guard(Event.CONTACT, height)
+            self._expect(height)
             return None
         arm_vel = sweep_rate(self.plain.ops, self._q, self._v, self._plain_arm)
         if dz - fallen + arm_vel[1] < 0.0:
@@ -287,19 +299,40 @@ class Course:
         watch.lay(Event.CONTACT, *OFF)
         return None
 
+    def _expect(self, reading: float) -> None:
+        """Watch height or force fall to zero."""
+        if self.watch.gain[Event.CONTACT] != -1.0:
+            self.watch.lay(Event.CONTACT, -1.0, 0.0)
+        if reading < NUDGE:
+            self.watch.guard(Event.CONTACT, reading)
+
+    def _force(self) -> float:
+        """Vertical force on the standing foot, over the weight."""
+        plain, q, v = self.plain, self._q, self._v
+        if self.bumpers.touched:
+            return plain.stance_force(self.plain_motor, q, v)[1] / self._weight
+        torque = plain.torque(self.plain_motor, q, v)
+        a = pair_acceleration(plain.ops, plain.stance, q, v, torque)
+        return contact_force(plain.ops, plain.floating, q, v, a)[1] / self._weight
+
     def _released(self) -> float:
         """Acceleration that the standing foot would have if it were let go, over gravity."""
         return self.plain.released_rise(self.plain_motor, self._q, self._v) / GRAVITY
 
-    def _watch_turn(self, rate: float) -> None:
+    def _guard_turn(self) -> None:
         """Watch the probe's next turn, which is the other kind after one that has just been."""
+        (p1, p2), (v1, v2) = self.probe, self._v
+        rate = p1 * v1 + p2 * v2
         if self._turn == 0.0:
+            towards = rate
             if abs(rate) <= NUDGE:
                 a = self.plain.acceleration(self.terms, self.plain_motor, self._q, self._v)
-                rate = self.probe[0] * a[0] + self.probe[1] * a[1]
-            self._turn = -1.0 if rate > 0.0 else 1.0
+                towards = p1 * a[0] + p2 * a[1]
+            self._turn = -1.0 if towards > 0.0 else 1.0
         if self.watch.gain[Event.TURN] != self._turn:
             self.watch.lay(Event.TURN, self._turn, 0.0)
+        if self._turn * rate > -NUDGE:
+            self.watch.guard(Event.TURN, rate)
 
     def _piece(self, until: float) -> int | None:
         """Integrate to `until` or to the next event."""
@@ -409,7 +442,3 @@ class Course:
                 return 0.0, 0.0
             case _:
                 return floating.reach, floating.reach
-
-
-def _ahead(gain: float, reading: float, level: float) -> float:
-    return gain * reading - level

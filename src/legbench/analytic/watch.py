@@ -8,6 +8,7 @@ the wrong side of it by the error of the step before, the level is moved until t
 `NUDGE` on its own side; the event then happens that much later.
 """
 
+import math
 from typing import final
 
 from legbench.analytic.compiled import event_integrator
@@ -18,6 +19,18 @@ NUDGE = 1e-13
 """Distance from zero that tells a side from rounding, in units of the events' readings."""
 OFF = (0.0, 1.0)
 """Gain and level of an event that is not watched."""
+PAIRS = (
+    (Event.RISE, Event.FALL),
+    (Event.FELL, Event.FELL_BACK),
+    (Event.KNEE_LOW, Event.KNEE_HIGH),
+    (Event.HIP_LOW, Event.HIP_HIGH),
+)
+"""Events that look at the same reading: probe, q1 + q2, knee, q1."""
+READINGS = len(PAIRS)
+PAIR_OF = {
+    int(event): (reading, *map(int, pair)) for reading, pair in enumerate(PAIRS) for event in pair
+}
+"""Reading of an event, and the two events that look at it."""
 
 
 @final
@@ -34,6 +47,8 @@ class Watch:
         pars: view of its parameters (n,).
         gain: gain of each event.
         level: level of each event, before the guard moves it.
+        low: largest of each reading of `PAIRS` at which one of its events is near.
+        high: smallest.
     """
 
     def __init__(self, kind: Kind, values: list[float], tolerance: float) -> None:
@@ -46,12 +61,27 @@ class Watch:
         self.pars: Floats = self.integrator.pars
         self.pars[:] = values[: len(self.pars)]
         self.gain, self.level = [0.0] * len(Event), [1.0] * len(Event)
+        self.low, self.high = [-math.inf] * READINGS, [math.inf] * READINGS
         self._moved: list[int] = []
 
     def lay(self, event: int, gain: float, level: float) -> None:
         """Watch `gain * reading` rise through a level."""
         self.gain[event], self.level[event] = gain, level
         self.pars[GAIN + event], self.pars[LEVEL + event] = gain, level
+        pair = PAIR_OF.get(event)
+        if pair is not None:
+            self._bound(*pair)
+
+    def _bound(self, reading: int, first: int, second: int) -> None:
+        """Find the range in which neither event of a reading is near."""
+        low, high = -math.inf, math.inf
+        for event in (first, second):
+            level = self.level[event]
+            if self.gain[event] > 0.0:
+                high = min(high, level - NUDGE)
+            elif self.gain[event] < 0.0:
+                low = max(low, NUDGE - level)
+        self.low[reading], self.high[reading] = low, high
 
     def lay_bounds(self, fall: int, rise: int, lower: float, upper: float, never: float) -> None:
         """Watch a reading fall through a lower and rise through an upper level, unless `never`."""
