@@ -13,7 +13,8 @@ import numpy as np
 from legbench.signals import Floats
 
 Equations = Callable[[Floats], tuple[Floats, Floats]]
-"""Residual (n,) of unknowns (n + 1,), and its derivative (n, n + 1)."""
+"""Residual (n,) of unknowns (n + 1,), and its derivative (n, n + 1); a residual that is not finite
+where there is nothing to solve."""
 NEWTON = 12
 """Iterations after which a step is given up and halved."""
 FARTHEST = 0.5
@@ -62,6 +63,8 @@ def correct(
     for _ in range(NEWTON):
         residual, slope = equations(unknown)
         wrong = np.append(residual, row @ unknown - value)
+        if not np.all(np.isfinite(wrong)):
+            return None
         if np.max(np.abs(wrong)) < tolerance:
             return Solution(unknown=unknown, slope=slope, tangent=tangent_of(slope, row))
         change = np.linalg.lstsq(np.vstack([slope, row]), wrong, rcond=stiff)[0]

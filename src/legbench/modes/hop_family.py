@@ -1,0 +1,273 @@
+"""A periodic hop followed over one setting of controller or leg, with its stability."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from itertools import pairwise
+from typing import final
+
+import numpy as np
+
+from legbench.analytic import LegModel
+from legbench.analytic.taylor import TaylorLeg
+from legbench.control import JumpConfig
+from legbench.design import LegDesign
+from legbench.errors import ConfigError
+from legbench.modes.continuation import AGAIN, LOST, Solution, Stride, correct, tangent_of, trace
+from legbench.modes.cycles import Cycle, described, stacked
+from legbench.modes.drive import JumpLaw
+from legbench.modes.fixed_point import UNITS
+from legbench.modes.hop import Apex, return_map
+from legbench.signals import Floats
+
+CLOSED = 1e-8
+"""Distance between the two ends of a cycle of the family, in `fixed_point.UNITS` [-]."""
+DIFFERENCE = 1e-5
+"""Step of the central difference by the setting, in its `SPANS` [-]."""
+STEP = 0.1
+"""Longest arc between two hops, apexes in `UNITS` and the setting in its `SPANS` [-]."""
+MOST = 120
+"""Largest number of hops of a family [-]."""
+AGAIN_NEAR, AGAIN_AFTER = 0.03, 5
+"""How near a family comes to one of its hops, and how many hops later, when it has closed [-]."""
+
+
+class Setting(StrEnum):
+    """What is varied."""
+
+    Z2 = "z2"
+    """Middle of the set points [rad]."""
+    DZ2 = "dz2"
+    """Amplitude of the push [rad]."""
+    DAMPING = "damping"
+    """Factor on both dampers [-]; 1 is the design."""
+    MISMATCH = "mismatch"
+    """Difference of the springs over their mean, `(k1 - k2) / k` [-]."""
+
+
+SPANS = {Setting.Z2: 0.1, Setting.DZ2: 0.1, Setting.DAMPING: 1.0, Setting.MISMATCH: 0.1}
+"""Changes of a setting that count as large."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Member:
+    """A periodic hop at one value of the setting."""
+
+    value: float
+    cycle: Cycle
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Change:
+    """Where stability changes between two hops of a family."""
+
+    value: float
+    """Of the setting, at which the largest multiplier has the size 1."""
+    multiplier: complex
+    """That multiplier: near +1, near -1, or one of a pair."""
+    stable_after: bool
+    """Whether hops beyond it are stable."""
+
+    @property
+    def kind(self) -> str:
+        """What happens there, in words."""
+        if abs(self.multiplier.imag) > 1e-3:
+            return "a pair of multipliers, to hops that wander around it"
+        if self.multiplier.real < 0.0:
+            return "a multiplier of -1, to hops of twice the period"
+        return "a multiplier of +1"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HopFamily:
+    """Periodic hops over one setting."""
+
+    setting: Setting
+    members: tuple[Member, ...]
+    changes: tuple[Change, ...]
+    ended: str
+    """Why there are no more."""
+
+
+def tools_at(
+    design: LegDesign,
+    jump: JumpConfig,
+    setting: Setting,
+    value: float,
+    same: TaylorLeg | None = None,
+) -> tuple[TaylorLeg, JumpLaw]:
+    """The leg and its law with a setting at some value; the law knows the leg.
+
+    Settings of the controller leave the leg as it is: `same` is then used again.
+
+    Raises:
+        ConfigError: a value that leg or controller refuse.
+    """
+    match setting:
+        case Setting.Z2:
+            jump = replace(jump, z2=value)
+        case Setting.DZ2:
+            jump = replace(jump, dz2=value)
+        case Setting.DAMPING:
+            if not value >= 0.0:
+                raise ConfigError(f"damping is {value:g} times the design's; it cannot be negative")
+            design = replace(design, damping=(value * design.damping[0], value * design.damping[1]))
+        case Setting.MISMATCH:
+            if not -2.0 < value < 2.0:
+                raise ConfigError(f"mismatch is {value:g}; a spring has no stiffness beyond +-2")
+            mean = 0.5 * sum(design.stiffness)
+            stiffness = (mean * (1.0 + 0.5 * value), mean * (1.0 - 0.5 * value))
+            design = replace(design, stiffness=stiffness)
+    law = JumpLaw(jump, design)
+    if same is None or setting in (Setting.DAMPING, Setting.MISMATCH):
+        same = TaylorLeg(LegModel.of(design), probe=law.probe)
+    return same, law
+
+
+def value_of(design: LegDesign, jump: JumpConfig, setting: Setting) -> float:
+    """Present value of a setting."""
+    match setting:
+        case Setting.Z2:
+            return jump.z2
+        case Setting.DZ2:
+            return jump.dz2
+        case Setting.DAMPING:
+            return 1.0
+        case Setting.MISMATCH:
+            first, second = design.stiffness
+            return 2.0 * (first - second) / (first + second)
+
+
+@final
+class _Equations:
+    """Closure of all hops, of unknowns (apexes in `UNITS`, setting in its `SPANS`)."""
+
+    def __init__(self, design: LegDesign, jump: JumpConfig, setting: Setting) -> None:
+        self.design, self.jump, self.setting = design, jump, setting
+        self.span = SPANS[setting]
+        self.why = ""
+        self._leg: TaylorLeg | None = None
+
+    def tools(self, value: float) -> tuple[TaylorLeg, JumpLaw]:
+        tools = tools_at(self.design, self.jump, self.setting, value, self._leg)
+        self._leg = tools[0]
+        return tools
+
+    def __call__(self, unknown: Floats) -> tuple[Floats, Floats]:
+        apexes, value = unknown[:-1].reshape(-1, 6), float(unknown[-1]) * self.span
+        size = apexes.size
+        try:
+            residual, slope, _ = stacked(*self.tools(value), apexes)
+            ends = [
+                self._ends(apexes, value + sign * DIFFERENCE * self.span) for sign in (1.0, -1.0)
+            ]
+        except ConfigError as error:
+            self.why = str(error)
+            return np.full(size, np.nan), np.zeros((size, size + 1))
+        by_setting = (ends[0] - ends[1]) / (2.0 * DIFFERENCE)
+        return residual, np.column_stack([slope, by_setting])
+
+    def _ends(self, apexes: Floats, value: float) -> Floats:
+        leg, law = self.tools(value)
+        ends = []
+        for row in apexes:
+            done = return_map(leg, law, Apex.of(row * UNITS))
+            if done.after is None:
+                raise ConfigError(f"the hop does not return: it ended as '{done.ending}'")
+            ends.append(done.after.vector() / UNITS)
+        return np.concatenate(ends)
+
+
+def follow_hop(
+    design: LegDesign,
+    jump: JumpConfig,
+    setting: Setting,
+    start: Cycle,
+    to: float,
+    *,
+    progress: Callable[[int, int], None] | None = None,
+) -> HopFamily:
+    """Follow a periodic hop from the present value of a setting to another one.
+
+    Args:
+        design: the leg.
+        jump: settings of the controller.
+        setting: what is varied.
+        start: the hop at the present value.
+        to: value at which the family ends, if it gets there.
+        progress: called with the share of the way that is done, in hundredths, and 100.
+
+    Raises:
+        ConfigError: a value that leg or controller refuse, or the present one.
+    """
+    value = value_of(design, jump, setting)
+    tools_at(design, jump, setting, to)
+    if to == value:
+        raise ConfigError(f"{setting} is {value:g} already; a family needs another value to go to")
+    equations = _Equations(design, jump, setting)
+    size = 6 * start.period
+    row = np.eye(size + 1)[size]
+    apexes = np.array([apex.vector() for apex in start.apexes]) / UNITS
+    guess = np.append(apexes.ravel(), value / equations.span)
+    first = correct(equations, guess, row, float(guess[-1]), CLOSED)
+    if first is None:
+        raise ConfigError(
+            f"the hop cannot be followed in {setting}: {equations.why or 'it is lost'}"
+        )
+    members, passed = [_member(equations, first)], [first.unknown]
+    sign = np.sign(to - value)
+
+    def visit(found: Solution) -> str | None:
+        equations.why = ""
+        member = _member(equations, found)
+        members.append(member)
+        older = passed[:-AGAIN_AFTER]
+        if older and min(np.max(np.abs(found.unknown - one)) for one in older) < AGAIN_NEAR:
+            return f"it comes back to a hop that it has passed, at {setting} = {member.value:.4g}"
+        passed.append(found.unknown)
+        if progress is not None:
+            progress(min(99, int(100.0 * abs((member.value - value) / (to - value)))), 100)
+        if (member.value - to) * sign >= 0.0:
+            return f"{setting} = {to:g}"
+        return f"it turned back past {value:g}" if (member.value - value) * sign < 0.0 else None
+
+    begin = Solution(
+        unknown=first.unknown, slope=first.slope, tangent=tangent_of(first.slope, sign * row)
+    )
+    stride = Stride(first=STEP, longest=STEP * 3.0, shortest=1e-3, most=MOST)
+    ended = trace(equations, begin, stride, CLOSED, visit)
+    if ended in (LOST, AGAIN):
+        ended = f"no hop continues it at {setting} = {members[-1].value:.4g}"
+        ended += f": {equations.why}" if equations.why else ""
+    if progress is not None:
+        progress(100, 100)
+    return HopFamily(
+        setting=setting, members=tuple(members), changes=tuple(_changes(members)), ended=ended
+    )
+
+
+def _member(equations: _Equations, found: Solution) -> Member:
+    value = float(found.unknown[-1]) * equations.span
+    apexes = found.unknown[:-1].reshape(-1, 6)
+    leg, law = equations.tools(value)
+    residual, _, slopes = stacked(leg, law, apexes)
+    worst = float(np.max(np.abs(residual)))
+    return Member(value=value, cycle=described(leg, law, apexes, slopes, worst))
+
+
+def _changes(members: list[Member]) -> list[Change]:
+    """Changes of stability, by interpolation of the largest multiplier between neighbours."""
+    found = []
+    for before, after in pairwise(members):
+        if before.cycle.stable != after.cycle.stable:
+            sizes = [abs(one.cycle.multipliers[0]) - 1.0 for one in (before, after)]
+            share = sizes[0] / (sizes[0] - sizes[1])
+            worse = after if before.cycle.stable else before
+            found.append(
+                Change(
+                    value=before.value + share * (after.value - before.value),
+                    multiplier=worse.cycle.multipliers[0],
+                    stable_after=after.cycle.stable,
+                )
+            )
+    return found
