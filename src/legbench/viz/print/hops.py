@@ -1,10 +1,12 @@
 """Pictures of hops: figures of their own, no window."""
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from legbench.modes.basin import Fate, Question
+from legbench.modes.hop_family import HopFamily, Setting
 from legbench.signals import Floats, Ints
 from legbench.viz.print._matplotlib import (
     BoundaryNorm,
@@ -24,18 +26,23 @@ FATES = {
     Fate.FAULT: ("#6a1b9a", "controller loses step"),
     Fate.BURIED: ("#e0e0e0", "foot under the ground"),
 }
+LABELS = {
+    Setting.Z2: "$z_2$, middle of the set points [rad]",
+    Setting.DZ2: r"$\Delta z_2$, amplitude of the push [rad]",
+    Setting.DAMPING: "dampers over those of the design [-]",
+    Setting.MISMATCH: "$(k_1 - k_2) / k$ [-]",
+}
 
 
-def plot_return(heights: Floats, fixed: float | None, title: str, path: Path) -> None:
-    """The return map of the apex height: (n, 2) of before and after [m]."""
+def plot_return(heights: Floats, fixed: Floats, title: str, path: Path) -> None:
+    """The return map of the apex height: before and after (n, 2), of the periodic hop, too [m]."""
     with styled():
         figure = Figure(figsize=(4.6, 4.4), layout="constrained")
         axes = figure.subplots()
         span = [float(np.min(heights)), float(np.max(heights))]
         axes.plot(span, span, lw=0.8, color=GREY, label="same height again")
         axes.plot(*heights.T, "o-", ms=3, lw=0.9, color=RADIAL, label="hops in a row")
-        if fixed is not None:
-            axes.plot(fixed, fixed, "o", ms=7, mfc="none", color="k", ls="", label="periodic hop")
+        axes.plot(*fixed.T, "o", ms=7, mfc="none", color="k", ls="", label="periodic hop")
         axes.legend(frameon=False)
         axes.set(
             xlabel="apex of the centre of mass [m]",
@@ -76,4 +83,27 @@ def plot_basin(question: Question, fates: Ints, path: Path) -> None:
         axes.set(
             xlabel=labels[0], ylabel=labels[1], title=f"{question.design.name}: where a hop leads"
         )
+        save_figure(figure, path, DPI)
+
+
+def plot_family(family: HopFamily, title: str, path: Path) -> None:
+    """Apex heights and the largest multiplier over a setting, dotted where hops are not stable."""
+    with styled():
+        figure = Figure(figsize=(5.6, 6.0), layout="constrained")
+        upper, lower = figure.subplots(2, 1, sharex=True)
+        for first, last in pairwise(family.members):
+            stable = first.cycle.stable and last.cycle.stable
+            look = {"lw": 1.6 if stable else 1.2, "ls": "-" if stable else ":", "color": RADIAL}
+            values = [first.value, last.value]
+            for before, after in zip(first.cycle.apexes, last.cycle.apexes, strict=True):
+                upper.plot(values, [before.height, after.height], **look)
+            lower.plot(values, [abs(one.cycle.multipliers[0]) for one in (first, last)], **look)
+        lower.axhline(1.0, lw=0.8, color=GREY)
+        for change in family.changes:
+            lower.plot(change.value, 1.0, "o", ms=6, mfc="white", color=RADIAL)
+        upper.plot([], [], lw=1.6, color=RADIAL, label="stable")
+        upper.plot([], [], lw=1.2, ls=":", color=RADIAL, label="not stable")
+        upper.legend(frameon=False)
+        upper.set(ylabel="apex of the centre of mass [m]", title=title)
+        lower.set(xlabel=LABELS[family.setting], ylabel="size of the largest multiplier")
         save_figure(figure, path, DPI)
