@@ -36,6 +36,8 @@ def main() -> int:
             skipped += 1
             continue
         seen += 1
+        if seen % 500 == 0:
+            print(f"{seen} hops, {bad} wrong, {grazing} graze", file=sys.stderr, flush=True)
         errors.append(verdict.error)
         if not verdict.same or verdict.error > BOUND:
             grazing += verdict.grazes

@@ -23,7 +23,10 @@ PROTOTYPE, TABLE_2 = MODELS / "prototype.toml", MODELS / "table2.toml"
     [
         (("modes", "--z2", "2.6"), ("set point z2 = 2.6 rad", "allows (-2.2, 0.9)")),
         (("modes", "--z2", "nan"), ("z2 is nan rad; it must be a number",)),
-        (("modes", "--at", "50"), ("mode does not exist at 50 J", "the knee reaches its limit of 0.3 rad")),
+        (
+            ("modes", "--at", "50"),
+            ("mode does not exist at 50 J", "the knee reaches its limit of 0.3 rad"),
+        ),
         (("modes", "--at", "-1"), ("at is -1 J; it must be positive",)),
         (("modes", "--energy", "-1"), ("energy is -1 J; it must be positive",)),
         (("modes", "--reach", "0"), ("reach is 0 rad; it must be positive",)),

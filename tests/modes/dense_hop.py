@@ -1,9 +1,9 @@
 """Hops by an independent path: DOP853 on the interpreted equations, events on dense output.
 
 Nothing is shared with the compiled leg but the design and the settings. Steps end where a stop
-begins or ends to push; the controller is its rules, not levels of a probe; every condition is looked at on
-the interpolant of each step, and where two looks may hide a double crossing, its largest value is
-searched between them.
+begins or ends to push; the controller is its rules, not levels of a probe; every condition is
+looked at on the interpolant of each step, and where two looks may hide a double crossing, its
+largest value is searched between them.
 """
 
 import math
@@ -232,7 +232,10 @@ class DenseHop:
         self.story.events.append(("touchdown" if self.flies else "liftoff", self.time))
         q, v = self.y[:2], self.y[2:]
         pairs = list(zip(self.arm, q, v, strict=True))
-        arm = (sum(a * math.sin(x) for a, x, _ in pairs), -sum(a * math.cos(x) for a, x, _ in pairs))
+        arm = (
+            sum(a * math.sin(x) for a, x, _ in pairs),
+            -sum(a * math.cos(x) for a, x, _ in pairs),
+        )
         rate = (
             sum(a * math.cos(x) * w for a, x, w in pairs),
             sum(a * math.sin(x) * w for a, x, w in pairs),

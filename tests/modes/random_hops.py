@@ -44,7 +44,7 @@ class Verdict:
     error: float
     """Largest difference of the apexes, in the map's units; 0 if none was reached [-]."""
     grazes: bool
-    """Whether hops beside this one are told differently, or far apart."""
+    """Whether DOP853 tells hops beside this one in another way, or far apart."""
     why: str
     """The two stories, where they differ."""
 
@@ -55,9 +55,7 @@ def random_case(random: np.random.Generator) -> Case:
 
     def scaled(segment: Segment) -> Segment:
         mass, inertia = (float(random.uniform(0.8, 1.25)) for _ in range(2))
-        return replace(
-            segment, mass=mass * segment.mass, inertia=mass * inertia * segment.inertia
-        )
+        return replace(segment, mass=mass * segment.mass, inertia=mass * inertia * segment.inertia)
 
     k1, k2, d1, d2 = (float(x) for x in random.uniform(0.8, 1.25, 4))
     more = float(random.uniform(0.0, 2.0))
@@ -137,17 +135,14 @@ def compare(case: Case, tolerance: float) -> Verdict | None:
     except LegbenchError:
         return None
     story = told_by_compiled(leg, law, case.start)
-    start = case.start
-    other = DenseHop(leg.model, Rules(case.config, case.design)).run(
-        start.height, start.speed, *start.angles()
-    )
+    other = _dense(case, leg.model, case.start)
     wrong = str(done.ending) != story.ending or not _same(story, other)
     error = _apart(story, other)
     doubtful = wrong or error > 1e-6
     return Verdict(
         same=not wrong,
         error=error,
-        grazes=doubtful and _grazes(leg, law, start, story),
+        grazes=doubtful and _grazes(case, leg.model, other),
         why=f"{story}\n{other}" if doubtful else "",
     )
 
@@ -167,10 +162,12 @@ def _apart(one: Story, other: Story) -> float:
     return float(np.max(np.abs(np.subtract(one.apex, other.apex)) / UNITS))
 
 
-def _grazes(leg: TaylorLeg, law: JumpLaw, start: Apex, story: Story) -> bool:
+def _grazes(case: Case, model: LegModel, story: Story) -> bool:
+    """Whether DOP853 tells hops beside this one in another way, or far apart."""
     names = [name for name, _ in story.events]
     for row in np.vstack([np.eye(6), -np.eye(6)]):
-        beside = told_by_compiled(leg, law, Apex.of(start.vector() + NEIGHBOUR * row * UNITS))
+        start = Apex.of(case.start.vector() + NEIGHBOUR * row * UNITS)
+        beside = _dense(case, model, start)
         if [name for name, _ in beside.events] != names or beside.ending != story.ending:
             return True
         if _apart(story, beside) > STEEP * NEIGHBOUR:
@@ -179,3 +176,8 @@ def _grazes(leg: TaylorLeg, law: JumpLaw, start: Apex, story: Story) -> bool:
             if abs(at - then) > STEEP * NEIGHBOUR:
                 return True
     return False
+
+
+def _dense(case: Case, model: LegModel, start: Apex) -> Story:
+    rules = Rules(case.config, case.design)
+    return DenseHop(model, rules).run(start.height, start.speed, *start.angles())

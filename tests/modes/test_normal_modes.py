@@ -12,10 +12,11 @@ pytest.importorskip("heyoka")
 from legbench.design import LegDesign, load_design
 from legbench.errors import ConfigError
 from legbench.modes.carry import Carrier
+from legbench.modes.curve import curve_through
 from legbench.modes.family import Family, at_energy, follow
 from legbench.modes.linear import linear_modes
 from legbench.modes.scene import Holding, Scene, make_scene
-from legbench.modes.strict import check, curve_through, radial_line
+from legbench.modes.strict import check, radial_line
 
 MODELS = Path(__file__).parents[2] / "models"
 EXACT = exact_design()

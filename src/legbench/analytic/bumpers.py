@@ -33,17 +33,23 @@ class Bumpers:
         self._model, self._stops = model, model.stops
         self._touched = [False] * len(model.stops)
         self._pushing, self._free = [False, False], [False, False]
-        self.touched = False
+        self.touched, self._version = False, 0
 
     def find(self, q: Pair, v: Pair) -> None:
         """Tell by the law which limits a leg is beyond that is put somewhere."""
-        for index, stop in enumerate(self._stops):
+        found = []
+        for stop in self._stops:
             depth = stop.depth(q)
-            self._touched[index] = depth > AT_LIMIT or (depth > -AT_LIMIT and stop.speed(v) > 0.0)
-        self.touched = True in self._touched
+            found.append(depth > AT_LIMIT or (depth > -AT_LIMIT and stop.speed(v) > 0.0))
+        if found != self._touched:
+            self._touched, self.touched = found, True in found
+            self._version += 1
 
     def lay(self, watch: Watch) -> None:
         """Watch the four events: to go beyond a limit, or to come back."""
+        if watch.version == self._version:
+            return
+        watch.version = self._version
         for index, (stop, beyond) in enumerate(zip(self._stops, self._touched, strict=True)):
             gain = stop.sign if beyond else -stop.sign
             if watch.gain[FIRST + index] != gain:
@@ -53,6 +59,7 @@ class Bumpers:
         """A joint has gone beyond a limit, or has come back."""
         self._touched[event - FIRST] ^= True
         self.touched = True in self._touched
+        self._version += 1
 
     def decide(self, watch: Watch, terms: PairTerms, motor: Pair, q: Pair, v: Pair) -> None:
         """Let those stops push of which the law asks it, after something has jumped."""
@@ -126,6 +133,12 @@ class Bumpers:
         Those stops act that are switched on, those of the leg in the air if `free`.
         """
         return self._turns(ops, terms, torque, q, v, self._free if free else self._pushing)
+
+    def released(self, terms: PairTerms, torque: Pair, q: Pair, v: Pair) -> Pair:
+        """Accelerations where those stops act, of the limits a joint is known to be beyond, that
+        would push.
+        """
+        return self._turns(SCALAR, terms, torque, q, v, None)[1]
 
     def _asked(self, terms: PairTerms, motor: Pair, q: Pair, v: Pair) -> list[float]:
         """What the law asks of each joint's stop, where those act that would push."""

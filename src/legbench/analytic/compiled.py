@@ -23,11 +23,14 @@ from legbench.analytic.places import (
     DAMPING,
     FREE_COUPLING,
     FREE_INERTIA,
+    FRICTION,
     GRAVITY,
     INERTIA,
     LEVEL,
     MOMENT,
+    MOTOR,
     PROBE,
+    SHARPNESS,
     SMOOTH,
     STIFFNESS,
     Event,
@@ -60,12 +63,12 @@ def varied_integrator(tolerance: float = TOLERANCE) -> Any:
     return copy.deepcopy(_varied(tolerance))
 
 
-def smooth_integrator(tolerance: float, lanes: int, *, varied: bool) -> Any:
+def smooth_integrator(tolerance: float, *, varied: bool, friction: bool) -> Any:
     """A fresh integrator of several legs side by side without stops and events.
 
-    `varied` adds the derivatives by the first nine parameters.
+    `varied` adds the derivatives by the nine parameters of a leg, and by its friction if any.
     """
-    return copy.deepcopy(_smooth(tolerance, lanes, varied))
+    return copy.deepcopy(_smooth(tolerance, hy.recommended_simd_size(), varied, friction))
 
 
 @cache
@@ -98,15 +101,16 @@ def _varied(tolerance: float) -> Any:
             tol=tolerance,
             fast_math=True,
             compact_mode=True,  # slower, but compiled in a second instead of a minute
+            opt_level=1,  # no slower than the highest, and compiled in half the time
         )
 
     return kept(f"varied {tolerance!r} {system} {seeds}", build)
 
 
 @cache
-def _smooth(tolerance: float, lanes: int, varied: bool) -> Any:
-    system = smooth_system()
-    seeds = [hy.par[place] for place in range(MOTOR_PLACE)] if varied else []
+def _smooth(tolerance: float, lanes: int, varied: bool, friction: bool) -> Any:
+    system = smooth_system(friction=friction)
+    seeds = [hy.par[place] for place in smooth_seeds(friction=friction)] if varied else []
 
     def build() -> Any:
         return hy.taylor_adaptive_batch(
@@ -118,6 +122,11 @@ def _smooth(tolerance: float, lanes: int, varied: bool) -> Any:
         )
 
     return kept(f"smooth {tolerance!r} {lanes} {system} {seeds}", build)
+
+
+def smooth_seeds(*, friction: bool) -> list[int]:
+    """Places of the parameters by which legs side by side are differentiated."""
+    return [*range(MOTOR), *(range(FRICTION, SHARPNESS) if friction else ())]
 
 
 def terms_of(model: LegModel, regime: Regime) -> PairTerms:
@@ -158,7 +167,3 @@ def parameters_of(model: LegModel, regime: Regime, probe: Pair) -> list[float]:
     values[GRAVITY] = model.floating.gravity
     values[LEVEL:] = [1.0] * len(Event)
     return values
-
-
-MOTOR_PLACE = SMOOTH - 2
-"""Place of the motors, after the nine parameters of a leg."""

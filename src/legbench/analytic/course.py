@@ -23,6 +23,7 @@ from legbench.analytic.equations import (
     Pair,
     Term,
     contact_force,
+    free_foot_acceleration,
     pair_acceleration,
     pair_kinetic,
     sweep,
@@ -33,7 +34,7 @@ from legbench.analytic.model import LegModel
 from legbench.analytic.places import HEIGHT, MOTOR, SPEED, Event, Kind, Watched
 from legbench.analytic.state import LegState, Regime
 from legbench.analytic.variation import Variation
-from legbench.analytic.watch import NUDGE, OFF, PAIRS, Watch
+from legbench.analytic.watch import NUDGE, OFF, Watch
 from legbench.design.statics import GRAVITY
 from legbench.errors import PlantFault
 
@@ -55,6 +56,13 @@ SEEN = {
     Event.FELL_BACK: Watched.FELL,
 }
 """Conditions on angles, which may hold already when a piece begins."""
+LINEAR = (
+    *(Event.RISE, Event.FALL, Event.FELL, Event.FELL_BACK),
+    *(Event.KNEE_LOW, Event.KNEE_HIGH, Event.HIP_LOW, Event.HIP_HIGH),
+)
+"""Events of angles; they can be near zero only where they were laid anew or the leg was put."""
+PROBED = 2
+"""Number of those that look at the probe [-]."""
 KINDS = {Regime.FLIGHT: Kind.FLIGHT, Regime.STANCE: Kind.STANCE}
 """The compiled equations that a regime begins with; the fixed ones for all others."""
 
@@ -109,6 +117,7 @@ class Course:
         self._watches: dict[tuple[Regime, bool], Watch] = {}
         self._variation = Variation(tolerance) if model.ops is DUAL else None
         self._levels, self._turn, self._blind, self._lean = SILENT, 0.0, 0.0, NEVER
+        self._fresh = 0
         self.motor: Pair = (0.0, 0.0)
 
     def start(self, state: LegState) -> None:
@@ -229,20 +238,10 @@ class Course:
 
     def _due(self) -> int | None:
         """Guard every event against the zero it starts on; one whose condition holds already."""
-        watch, (q1, q2) = self.watch, self._q
-        watch.restore()
-        reading = self.probe[0] * q1 + self.probe[1] * q2
-        lean, knee, low, high = q1 + q2, q2 - q1, watch.low, watch.high
-        due = None
-        if not (
-            low[0] < reading < high[0]
-            and low[1] < lean < high[1]
-            and low[2] < knee < high[2]
-            and low[3] < q1 < high[3]
-        ):
-            due = self._near((reading, lean, knee, q1))
-        if self._levels.turns:
-            self._guard_turn()
+        watch = self.watch
+        if watch.moved:
+            watch.restore()
+        due = self._near() if self._fresh else None
         if self.bumpers.touched:
             self.bumpers.guard(watch, self.terms, self.plain_motor, self._q, self._v)
         if self._free:
@@ -250,13 +249,20 @@ class Course:
             due = contact if due is None else due
         return due
 
-    def _near(self, readings: tuple[float, ...]) -> int | None:
-        """Guard the events that are near; one whose condition holds already."""
+    def _near(self) -> int | None:
+        """Guard what has been laid anew or jumped; one whose condition holds already."""
+        guard, (q1, q2), (p1, p2) = self.watch.guard, self._q, self.probe
+        reading, lean, knee = p1 * q1 + p2 * q2, q1 + q2, q2 - q1
         due = None
-        for reading, pair in zip(readings, PAIRS, strict=True):
-            for event in pair:
-                if self.watch.guard(event, reading) and event in SEEN and due is None:
-                    due = event
+        for event, value in zip(
+            LINEAR[: self._fresh], (reading, reading, lean, lean, knee, knee, q1, q1), strict=False
+        ):
+            if guard(event, value) and event in SEEN and due is None:
+                due = event
+        if self._levels.turns:
+            self._guard_turn()
+        if due is None:
+            self._fresh = 0
         return due
 
     def _contact(self) -> int | None:
@@ -309,15 +315,23 @@ class Course:
     def _force(self) -> float:
         """Vertical force on the standing foot, over the weight."""
         plain, q, v = self.plain, self._q, self._v
-        if self.bumpers.touched:
-            return plain.stance_force(self.plain_motor, q, v)[1] / self._weight
-        torque = plain.torque(self.plain_motor, q, v)
-        a = pair_acceleration(plain.ops, plain.stance, q, v, torque)
+        a = self._accelerations()
         return contact_force(plain.ops, plain.floating, q, v, a)[1] / self._weight
 
     def _released(self) -> float:
         """Acceleration that the standing foot would have if it were let go, over gravity."""
-        return self.plain.released_rise(self.plain_motor, self._q, self._v) / GRAVITY
+        plain, q, v = self.plain, self._q, self._v
+        torque = plain.torque(self.plain_motor, q, v)
+        a = self.bumpers.released(plain.falling, torque, q, v)
+        return free_foot_acceleration(plain.ops, plain.floating, q, v, a)[1] / GRAVITY
+
+    def _accelerations(self) -> Pair:
+        """Accelerations of the angles, where those stops act that are known to."""
+        plain, q, v = self.plain, self._q, self._v
+        torque = plain.torque(self.plain_motor, q, v)
+        if self.bumpers.touched:
+            return self.bumpers.turns(plain.ops, self.terms, torque, q, v)[1]
+        return pair_acceleration(plain.ops, self.terms, q, v, torque)
 
     def _guard_turn(self) -> None:
         """Watch the probe's next turn, which is the other kind after one that has just been."""
@@ -326,7 +340,7 @@ class Course:
         if self._turn == 0.0:
             towards = rate
             if abs(rate) <= NUDGE:
-                a = self.plain.acceleration(self.terms, self.plain_motor, self._q, self._v)
+                a = self._accelerations()
                 towards = p1 * a[0] + p2 * a[1]
             self._turn = -1.0 if towards > 0.0 else 1.0
         if self.watch.gain[Event.TURN] != self._turn:
@@ -363,6 +377,7 @@ class Course:
             return SEEN[Event(event)]
         if event == Event.TURN:
             self._turn = -self._turn
+            watch.lay(Event.TURN, self._turn, 0.0)
             return Watched.TURN
         if event <= Event.HIP_HIGH:
             self.bumpers.cross(event)
@@ -405,6 +420,7 @@ class Course:
         watch.pars[MOTOR : MOTOR + 2] = self.plain_motor
         if watch.flies:
             watch.pars[HEIGHT], watch.pars[SPEED] = self.point[1], self.drift[1]
+        self._fresh = len(LINEAR)
         watch.restore()
         watch.lay_bounds(Event.FELL, Event.FELL_BACK, -self._lean, self._lean, NEVER)
         self.bumpers.lay(watch)
@@ -414,7 +430,7 @@ class Course:
     def _lay(self, levels: Levels) -> None:
         """Watch other levels."""
         self._levels, watch = levels, self.watch
-        watch.restore()
+        self._fresh = max(self._fresh, PROBED)
         watch.lay_bounds(Event.FALL, Event.RISE, levels.lower, levels.upper, NEVER)
         if not levels.turns:
             self._turn = 0.0

@@ -20,6 +20,7 @@ from legbench.analytic.places import (
     FREE_COUPLING,
     FREE_INERTIA,
     FREE_PUSHES,
+    FRICTION,
     GAIN,
     GRAVITY,
     HEIGHT,
@@ -29,6 +30,7 @@ from legbench.analytic.places import (
     MOTOR,
     PROBE,
     PUSHES,
+    SHARPNESS,
     SPEED,
     STIFFNESS,
     Event,
@@ -47,10 +49,20 @@ def pair_at(place: int) -> Pair:
     return hy.par[place], hy.par[place + 1]
 
 
-def smooth_system() -> list[tuple[Any, Any]]:
-    """The equations of motion of two angles, without stops."""
+def smooth_system(*, friction: bool) -> list[tuple[Any, Any]]:
+    """The equations of motion of two angles, without stops.
+
+    Friction is Coulomb's, `-f_i tanh(s v_i)`, smooth for the sake of the series.
+    """
     q, v = STATE[:2], STATE[2:]
-    a = pair_acceleration(SYMBOLS, _terms(), q, v, _torque(q, v))
+    torque = _torque(q, v)
+    if friction:
+        rubbing, sharpness = pair_at(FRICTION), hy.par[SHARPNESS]
+        torque = (
+            torque[0] - rubbing[0] * hy.tanh(sharpness * v[0]),
+            torque[1] - rubbing[1] * hy.tanh(sharpness * v[1]),
+        )
+    a = pair_acceleration(SYMBOLS, _terms(), q, v, torque)
     return [(STATE[0], v[0]), (STATE[1], v[1]), (STATE[2], a[0]), (STATE[3], a[1])]
 
 

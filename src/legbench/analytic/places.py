@@ -15,6 +15,9 @@ INERTIA, COUPLING, MOMENT, STIFFNESS, DAMPING, MOTOR = 0, 2, 3, 5, 7, 9
 gravity [N m], stiffness [N m/rad], damping [N m s/rad], motor positions [rad]."""
 SMOOTH = 11
 """Number of the parameters of the equations of motion between events, those above [-]."""
+FRICTION, SHARPNESS = 11, 13
+"""Legs side by side only: Coulomb friction of both joints [N m], and how sharply it sets in with
+the rate [s/rad]."""
 PUSHES = 11
 """Knee and hip: whether the stop pushes, and its limit [rad]."""
 PROBE = 15

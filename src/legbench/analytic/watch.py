@@ -3,12 +3,12 @@
 An integrator looks for zeros of an event function's polynomial inside a step. A function that is
 zero where the step begins, because the event has just happened or because a level was laid where
 the leg stands, has no sign there, and its next zero in the same step would be lost. So each event
-has a side that it is known to be on. When a piece begins nearer to the zero than `NUDGE`, or on
-the wrong side of it by the error of the step before, the level is moved until the function is
-`NUDGE` on its own side; the event then happens that much later.
+has a side that it is known to be on, in two ways. An angle's level lies `2 NUDGE` lower for who
+falls than for who rises, so whoever has just crossed it is on the far side for the way back. And
+what is laid where the leg stands, or has been on the wrong side of zero by the error of the step
+before, is moved until it is `NUDGE` on its own side; the event then happens that much later.
 """
 
-import math
 from typing import final
 
 from legbench.analytic.compiled import event_integrator
@@ -17,20 +17,10 @@ from legbench.signals import Floats
 
 NUDGE = 1e-13
 """Distance from zero that tells a side from rounding, in units of the events' readings."""
+BACK = 2.0 * NUDGE
+"""How much further an angle or rate falls than it rises until a level is crossed."""
 OFF = (0.0, 1.0)
 """Gain and level of an event that is not watched."""
-PAIRS = (
-    (Event.RISE, Event.FALL),
-    (Event.FELL, Event.FELL_BACK),
-    (Event.KNEE_LOW, Event.KNEE_HIGH),
-    (Event.HIP_LOW, Event.HIP_HIGH),
-)
-"""Events that look at the same reading: probe, q1 + q2, knee, q1."""
-READINGS = len(PAIRS)
-PAIR_OF = {
-    int(event): (reading, *map(int, pair)) for reading, pair in enumerate(PAIRS) for event in pair
-}
-"""Reading of an event, and the two events that look at it."""
 
 
 @final
@@ -47,8 +37,8 @@ class Watch:
         pars: view of its parameters (n,).
         gain: gain of each event.
         level: level of each event, before the guard moves it.
-        low: largest of each reading of `PAIRS` at which one of its events is near.
-        high: smallest.
+        moved: events whose levels the guard has moved.
+        version: of the limits that are watched.
     """
 
     def __init__(self, kind: Kind, values: list[float], tolerance: float) -> None:
@@ -61,27 +51,15 @@ class Watch:
         self.pars: Floats = self.integrator.pars
         self.pars[:] = values[: len(self.pars)]
         self.gain, self.level = [0.0] * len(Event), [1.0] * len(Event)
-        self.low, self.high = [-math.inf] * READINGS, [math.inf] * READINGS
-        self._moved: list[int] = []
+        self.moved: list[int] = []
+        self.version = -1
 
     def lay(self, event: int, gain: float, level: float) -> None:
         """Watch `gain * reading` rise through a level."""
         self.gain[event], self.level[event] = gain, level
-        self.pars[GAIN + event], self.pars[LEVEL + event] = gain, level
-        pair = PAIR_OF.get(event)
-        if pair is not None:
-            self._bound(*pair)
-
-    def _bound(self, reading: int, first: int, second: int) -> None:
-        """Find the range in which neither event of a reading is near."""
-        low, high = -math.inf, math.inf
-        for event in (first, second):
-            level = self.level[event]
-            if self.gain[event] > 0.0:
-                high = min(high, level - NUDGE)
-            elif self.gain[event] < 0.0:
-                low = max(low, NUDGE - level)
-        self.low[reading], self.high[reading] = low, high
+        self.pars[GAIN + event] = gain
+        back = BACK if gain < 0.0 and event <= Event.HIP_HIGH else 0.0
+        self.pars[LEVEL + event] = level + back
 
     def lay_bounds(self, fall: int, rise: int, lower: float, upper: float, never: float) -> None:
         """Watch a reading fall through a lower and rise through an upper level, unless `never`."""
@@ -92,10 +70,9 @@ class Watch:
 
     def restore(self) -> None:
         """Put the levels back that the guard has moved."""
-        if self._moved:
-            for event in self._moved:
-                self.pars[LEVEL + event] = self.level[event]
-            self._moved.clear()
+        for event in self.moved:
+            self.lay(event, self.gain[event], self.level[event])
+        self.moved.clear()
 
     def guard(self, event: int, reading: float) -> bool:
         """Put an event on its own side of zero; whether it was beyond by more than rounding."""
@@ -103,5 +80,5 @@ class Watch:
         if ahead <= -NUDGE:
             return False
         self.pars[LEVEL + event] = self.gain[event] * reading + NUDGE
-        self._moved.append(event)
+        self.moved.append(event)
         return ahead > NUDGE

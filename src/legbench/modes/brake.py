@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from typing import final
 
 import numpy as np
-from scipy.optimize import root_scalar
 
 from legbench.errors import ConfigError
 from legbench.modes.carry import Carrier
 from legbench.modes.continuation import Solution, correct
 from legbench.modes.monodromy import Monodromy, monodromy
+from legbench.modes.roots import bracketed
 from legbench.modes.scene import Scene
 from legbench.signals import Floats
 
@@ -134,12 +134,10 @@ class BrakeShooting:
 
     def with_energy(self, first: Floats, last: Floats, energy: float) -> BrakeOrbit:
         """The orbit of an energy [J] that lies between those of two unknowns (3,)."""
-        share = root_scalar(
-            lambda share: self.energy(self.between(first, last, share)) - energy,
-            bracket=(0.0, 1.0),
-            xtol=1e-13,
-        ).root
-        return self.orbit(self.between(first, last, float(share)))
+        share = bracketed(
+            lambda share: self.energy(self.between(first, last, share)) - energy, 0.0, 1.0, 1e-13
+        )
+        return self.orbit(self.between(first, last, share))
 
 
 def _unit(vector: Floats) -> Floats:

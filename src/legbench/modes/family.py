@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.optimize import root_scalar
 
 from legbench.errors import ConfigError
 from legbench.modes.brake import RESIDUAL, BrakeOrbit, BrakeShooting
 from legbench.modes.continuation import AGAIN, LOST, Solution, Stride, tangent_of, trace
 from legbench.modes.linear import LinearMode, linear_modes
+from legbench.modes.roots import bracketed
 from legbench.modes.scene import Scene
 from legbench.modes.seed import APART, FIRST, first_unknown, gap
 from legbench.signals import Floats
@@ -265,8 +265,8 @@ def _located(
     def off(share: float) -> float:
         return shooting.orbit(shooting.nearly(first, last, share)).monodromy.trace - level
 
-    share = root_scalar(off, bracket=(0.0, 1.0), xtol=1e-9).root
-    return shooting.orbit(shooting.nearly(first, last, float(share)))
+    share = bracketed(off, 0.0, 1.0, 1e-9)
+    return shooting.orbit(shooting.nearly(first, last, share))
 
 
 def _warnings(

@@ -9,12 +9,12 @@ dz2. So the cycles form a curve. Every cycle is a response to motors of its own 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
 
 from legbench.errors import ConfigError
 from legbench.modes.continuation import AGAIN, LOST, Solution, Stride, correct, tangent_of, trace
 from legbench.modes.linear import RADIAL
 from legbench.modes.response import CLOSED, SAMPLES, Response, Switched
+from legbench.modes.roots import bracketed
 from legbench.modes.scene import Scene
 from legbench.signals import Floats
 
@@ -114,7 +114,7 @@ class _Law:
         def off(time: float) -> float:
             return sign * self.torque(at(time), motor) + self.threshold
 
-        time = float(brentq(off, 0.0, unit / LOOKED, xtol=1e-12))
+        time = bracketed(off, 0.0, unit / LOOKED, 1e-12)
         return float(grid[passed[0]]) + time, at(time)
 
     def cycle(self, unknown: Floats) -> Response:
