@@ -12,7 +12,7 @@ from legbench.analytic import LegModel
 from legbench.analytic.taylor import TaylorLeg
 from legbench.control import JumpConfig
 from legbench.design import LegDesign
-from legbench.errors import ConfigError
+from legbench.errors import ConfigError, DesignError
 from legbench.modes.continuation import AGAIN, LOST, Solution, Stride, correct, tangent_of, trace
 from legbench.modes.cycles import Cycle, described, stacked
 from legbench.modes.drive import JumpLaw
@@ -101,7 +101,8 @@ def tools_at(
     Settings of the controller leave the leg as it is: `same` is then used again.
 
     Raises:
-        ConfigError: a value that leg or controller refuse.
+        ConfigError: a value that the controller refuses, or no leg can have.
+        DesignError: springs that do not carry the leg.
     """
     match setting:
         case Setting.Z2:
@@ -161,8 +162,9 @@ class _Equations:
             ends = [
                 self._ends(apexes, value + sign * DIFFERENCE * self.span) for sign in (1.0, -1.0)
             ]
-        except ConfigError as error:
-            self.why = str(error)
+        except (ConfigError, DesignError) as error:
+            # What has happened; what follows the semicolon is advice for who chose the start.
+            self.why = str(error).partition(";")[0]
             return np.full(size, np.nan), np.zeros((size, size + 1))
         by_setting = (ends[0] - ends[1]) / (2.0 * DIFFERENCE)
         return residual, np.column_stack([slope, by_setting])
