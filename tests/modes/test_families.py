@@ -166,7 +166,9 @@ def test_damping_that_leaves_no_mode_is_named() -> None:
         follow_damped(scene, "radial", 0.0, (0.01, 0.01))
 
 
-def switched(scene: Scene, response: Response, state: np.ndarray, damping: object) -> np.ndarray:
+def switched(
+    scene: Scene, response: Response, state: np.ndarray, damping: tuple[float, float]
+) -> np.ndarray:
     """State after one period of the motors, by another integration."""
     for sign, time in ((1.0, response.folded), (-1.0, response.stretched)):
         motor = motors_at(scene, sign * response.dz2)

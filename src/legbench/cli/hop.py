@@ -26,7 +26,8 @@ from legbench.modes.basin import Axis, Fate, Question, map_basin
 from legbench.modes.cycles import LONGEST, Cycle, end_of, find_cycle, repeats
 from legbench.modes.drive import JumpLaw
 from legbench.modes.hop import Apex, Ending, return_map, settle
-from legbench.modes.hop_family import HopFamily, Setting, follow_hop, tools_at
+from legbench.modes.hop_family import HopFamily, follow_hop
+from legbench.modes.hop_setting import Setting, tools_at
 from legbench.signals import Ints
 
 WHY = {
@@ -60,7 +61,7 @@ class HopArguments:
     hops: int = 60
     """Hops until the leg should be periodic."""
     period: int | None = None
-    """After how many hops the motion is to repeat; none: as it settles."""
+    """Number of hops after which the motion is to repeat; none: as it settles."""
     family: Setting | None = None
     """Setting over which the periodic hop is followed, from its present value to --to."""
     to: float | None = None
@@ -185,7 +186,7 @@ def _driven(flags: HopArguments, design: LegDesign) -> tuple[dict[str, Any], lis
 
 
 def _start(flags: HopArguments, model: LegModel) -> Apex:
-    """Where the hops begin: relaxed and upright, by default 30 mm over standing."""
+    """The apex to begin with: relaxed and upright, by default 30 mm over standing."""
     z2 = flags.jump.z2 + flags.jump.dz2
     q = (-z2 * math.sqrt(0.5), z2 * math.sqrt(0.5))
     standing = model.mass_centre_from_hip(q)[1] - model.foot_from_hip(q)[1]

@@ -9,7 +9,8 @@ from legbench.design import LegDesign
 from legbench.modes.cycles import Cycle
 from legbench.modes.fixed_point import UNITS, FixedPoint
 from legbench.modes.hop import NAMES, Apex
-from legbench.modes.hop_family import SPANS, HopFamily
+from legbench.modes.hop_family import HopFamily
+from legbench.modes.hop_setting import SPANS
 
 LINES = 12
 """Rows of a table, about [-]."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from legbench.modes.continuation import AGAIN, Solution, Stride, trace
+from legbench.modes.continuation import AGAIN, LOST, MANY, Solution, Stride, trace
 from legbench.modes.family import Family, Passing
 from legbench.modes.monodromy import energy_slope
 from legbench.modes.periodic import CLOSED, PeriodicOrbit, Shooting
@@ -31,7 +31,7 @@ class Branch:
     side: int
     """1 or -1: which way along the eigenvector."""
     orbits: tuple[PeriodicOrbit, ...]
-    """By growing distance from the mode."""
+    """Its orbits, by growing distance from the mode."""
     ended: str
     """Why there are no more."""
 
@@ -117,5 +117,5 @@ def _followed(
         passing=passing,
         side=side,
         orbits=tuple(orbits),
-        ended=halted if ended == AGAIN else ended,
+        ended={AGAIN: halted, LOST: "no orbit continues it", MANY: f"{most} orbits"}[ended],
     )

@@ -29,7 +29,7 @@ MAX_STEPS = 20_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Carried:
-    """Where a state has come to, and how that depends on where and how it began."""
+    """A state after some time, and how it depends on where and how it began."""
 
     end: Floats
     """q1, q2, v1, v2 (4,) [rad, rad/s]."""

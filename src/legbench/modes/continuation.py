@@ -82,6 +82,8 @@ def tangent_of(slope: Floats, along: Floats) -> Floats:
 
 AGAIN = "a shorter step"
 """Answer of a visitor who refuses a solution but may take one that is nearer."""
+MANY = "as many as were asked for"
+"""End of a curve with the largest number of solutions."""
 LOST = "no solution continues it"
 """End of a curve that Newton's method does not get beyond."""
 Visit = Callable[[Solution], str | None]
@@ -93,8 +95,8 @@ def trace(
 ) -> str:
     """Follow a curve from its first solution on, which is not visited; says why it ended.
 
-    That is what the visitor said, `LOST`, `AGAIN` once steps are too short for another one, or
-    that there are as many solutions as were asked for.
+    That is what the visitor said, `MANY`, `LOST`, or `AGAIN` once steps are too short for another
+    solution.
     """
     last, step = first, stride.first
     for _ in range(stride.most - 1):
@@ -107,7 +109,7 @@ def trace(
         if said is not None:
             return said
         last, step = found, min(1.3 * step, stride.longest)
-    return f"{stride.most} solutions"
+    return MANY
 
 
 def _next(

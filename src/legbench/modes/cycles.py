@@ -41,12 +41,12 @@ class Cycle:
 
     @property
     def period(self) -> int:
-        """After how many hops it repeats [-]."""
+        """Number of hops after which it repeats [-]."""
         return len(self.apexes)
 
     @property
     def duration(self) -> float:
-        """Of all hops together [s]."""
+        """Duration of all hops together [s]."""
         return sum(hop.duration for hop in self.hops)
 
     @property
@@ -131,7 +131,7 @@ def multiplied(slopes: Sequence[Floats]) -> tuple[Floats, Floats]:
 
 
 def repeats(apexes: Sequence[Apex], longest: int = LONGEST) -> int | None:
-    """After how many hops the last apexes repeat; none if not within `longest`."""
+    """Number of hops after which the last apexes repeat; none if not within `longest`."""
     rows = np.array([apex.vector() for apex in apexes]) / UNITS
     for period in range(1, longest + 1):
         last = rows[-2 * longest :]
@@ -143,7 +143,7 @@ def repeats(apexes: Sequence[Apex], longest: int = LONGEST) -> int | None:
 def end_of(
     leg: TaylorLeg, drive: AbstractDrive, cycle: Cycle, hops: int
 ) -> tuple[list[Apex], Cycle | None]:
-    """Where a hop goes that is nudged along its largest multiplier's direction.
+    """Nudge a hop along its largest multiplier's direction, and follow it to its end.
 
     Returns:
         The apexes on the way, fewer than asked for if the leg stops hopping, and the cycle in which

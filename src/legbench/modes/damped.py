@@ -11,7 +11,7 @@ import numpy as np
 
 from legbench.errors import ConfigError
 from legbench.modes.carry import Carrier
-from legbench.modes.continuation import AGAIN, LOST, Solution, Stride, tangent_of, trace
+from legbench.modes.continuation import AGAIN, LOST, MANY, Solution, Stride, tangent_of, trace
 from legbench.modes.periodic import CLOSED, PeriodicOrbit, Shooting
 from legbench.modes.scene import Scene
 from legbench.modes.seed import first_unknown
@@ -25,7 +25,7 @@ class DampedFamily:
     name: str
     """`radial` or `polar`."""
     damping: tuple[float, float]
-    """Of the joints [N m s/rad]."""
+    """Dampers of both joints [N m s/rad]."""
     orbits: tuple[PeriodicOrbit, ...]
     ended: str
     """Why there are no more."""
@@ -76,7 +76,7 @@ def follow_damped(
     )
     ended = trace(shooting.equations, first, Stride(first=0.03, most=most), CLOSED, visit)
     lost = f"the family ends at {orbits[-1].energy:.4g} J: no orbit continues it"
-    said = {AGAIN: halted, LOST: lost}
+    said = {AGAIN: halted, LOST: lost, MANY: f"{most} orbits"}
     return DampedFamily(
         name=name, damping=damping, orbits=tuple(orbits), ended=said.get(ended, ended)
     )

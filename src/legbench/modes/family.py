@@ -14,7 +14,7 @@ import numpy as np
 
 from legbench.errors import ConfigError
 from legbench.modes.brake import RESIDUAL, BrakeOrbit, BrakeShooting
-from legbench.modes.continuation import AGAIN, LOST, Solution, Stride, tangent_of, trace
+from legbench.modes.continuation import AGAIN, LOST, MANY, Solution, Stride, tangent_of, trace
 from legbench.modes.linear import LinearMode, linear_modes
 from legbench.modes.roots import bracketed
 from legbench.modes.scene import Scene
@@ -59,7 +59,7 @@ class Family:
     shooting: BrakeShooting
     orbits: tuple[BrakeOrbit, ...]
     passings: tuple[Passing, ...]
-    """By growing amplitude."""
+    """Orbits at which the trace passes a level, by growing amplitude."""
     ended: str
     """Why there are no more."""
     warnings: tuple[str, ...]
@@ -167,6 +167,8 @@ def _grow(
     ended = trace(shooting.equations, first, stride, RESIDUAL, visit)
     if ended == AGAIN:
         return halted
+    if ended == MANY:
+        return f"{stride.most} orbits"
     if ended == LOST:
         return f"the family ends at {orbits[-1].energy:.4g} J: no orbit continues it"
     return ended

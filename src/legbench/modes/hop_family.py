@@ -1,23 +1,31 @@
 """A periodic hop followed over one setting of controller or leg, with its stability."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from enum import StrEnum
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import final
 
 import numpy as np
 
-from legbench.analytic import LegModel
 from legbench.analytic.taylor import TaylorLeg
 from legbench.control import JumpConfig
 from legbench.design import LegDesign
 from legbench.errors import ConfigError, DesignError
-from legbench.modes.continuation import AGAIN, LOST, Solution, Stride, correct, tangent_of, trace
+from legbench.modes.continuation import (
+    AGAIN,
+    LOST,
+    MANY,
+    Solution,
+    Stride,
+    correct,
+    tangent_of,
+    trace,
+)
 from legbench.modes.cycles import Cycle, described, stacked
 from legbench.modes.drive import JumpLaw
 from legbench.modes.fixed_point import UNITS
 from legbench.modes.hop import Apex, return_map
+from legbench.modes.hop_setting import SPANS, Setting, tools_at, value_of
 from legbench.signals import Floats
 
 CLOSED = 1e-8
@@ -32,23 +40,6 @@ AGAIN_NEAR, AGAIN_AFTER = 0.03, 5
 """How near a family comes to one of its hops, and how many hops later, when it has closed [-]."""
 
 
-class Setting(StrEnum):
-    """What is varied."""
-
-    Z2 = "z2"
-    """Middle of the set points [rad]."""
-    DZ2 = "dz2"
-    """Amplitude of the push [rad]."""
-    DAMPING = "damping"
-    """Factor on both dampers [-]; 1 is the design."""
-    MISMATCH = "mismatch"
-    """Difference of the springs over their mean, `(k1 - k2) / k` [-]."""
-
-
-SPANS = {Setting.Z2: 0.1, Setting.DZ2: 0.1, Setting.DAMPING: 1.0, Setting.MISMATCH: 0.1}
-"""Changes of a setting that count as large."""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Member:
     """A periodic hop at one value of the setting."""
@@ -59,12 +50,12 @@ class Member:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Change:
-    """Where stability changes between two hops of a family."""
+    """Change of stability between two hops of a family."""
 
     value: float
-    """Of the setting, at which the largest multiplier has the size 1."""
+    """Value of the setting at which the largest multiplier has the size 1."""
     multiplier: complex
-    """That multiplier: near +1, near -1, or one of a pair."""
+    """The largest multiplier: near +1, near -1, or one of a pair."""
     stable_after: bool
     """Whether hops beyond it are stable."""
 
@@ -87,56 +78,6 @@ class HopFamily:
     changes: tuple[Change, ...]
     ended: str
     """Why there are no more."""
-
-
-def tools_at(
-    design: LegDesign,
-    jump: JumpConfig,
-    setting: Setting,
-    value: float,
-    same: TaylorLeg | None = None,
-) -> tuple[TaylorLeg, JumpLaw]:
-    """The leg and its law with a setting at some value; the law knows the leg.
-
-    Settings of the controller leave the leg as it is: `same` is then used again.
-
-    Raises:
-        ConfigError: a value that the controller refuses, or no leg can have.
-        DesignError: springs that do not carry the leg.
-    """
-    match setting:
-        case Setting.Z2:
-            jump = replace(jump, z2=value)
-        case Setting.DZ2:
-            jump = replace(jump, dz2=value)
-        case Setting.DAMPING:
-            if not value >= 0.0:
-                raise ConfigError(f"damping is {value:g} times the design's; it cannot be negative")
-            design = replace(design, damping=(value * design.damping[0], value * design.damping[1]))
-        case Setting.MISMATCH:
-            if not -2.0 < value < 2.0:
-                raise ConfigError(f"mismatch is {value:g}; a spring has no stiffness beyond +-2")
-            mean = 0.5 * sum(design.stiffness)
-            stiffness = (mean * (1.0 + 0.5 * value), mean * (1.0 - 0.5 * value))
-            design = replace(design, stiffness=stiffness)
-    law = JumpLaw(jump, design)
-    if same is None or setting in (Setting.DAMPING, Setting.MISMATCH):
-        same = TaylorLeg(LegModel.of(design), probe=law.probe)
-    return same, law
-
-
-def value_of(design: LegDesign, jump: JumpConfig, setting: Setting) -> float:
-    """Present value of a setting."""
-    match setting:
-        case Setting.Z2:
-            return jump.z2
-        case Setting.DZ2:
-            return jump.dz2
-        case Setting.DAMPING:
-            return 1.0
-        case Setting.MISMATCH:
-            first, second = design.stiffness
-            return 2.0 * (first - second) / (first + second)
 
 
 @final
@@ -207,45 +148,72 @@ def follow_hop(
     if to == value:
         raise ConfigError(f"{setting} is {value:g} already; a family needs another value to go to")
     equations = _Equations(design, jump, setting)
-    size = 6 * start.period
-    row = np.eye(size + 1)[size]
-    apexes = np.array([apex.vector() for apex in start.apexes]) / UNITS
-    guess = np.append(apexes.ravel(), value / equations.span)
-    first = correct(equations, guess, row, float(guess[-1]), CLOSED)
-    if first is None:
-        raise ConfigError(
-            f"the hop cannot be followed in {setting}: {equations.why or 'it is lost'}"
-        )
-    members, passed = [_member(equations, first)], [first.unknown]
-    sign = np.sign(to - value)
-
-    def visit(found: Solution) -> str | None:
-        equations.why = ""
-        member = _member(equations, found)
-        members.append(member)
-        older = passed[:-AGAIN_AFTER]
-        if older and min(np.max(np.abs(found.unknown - one)) for one in older) < AGAIN_NEAR:
-            return f"it comes back to a hop that it has passed, at {setting} = {member.value:.4g}"
-        passed.append(found.unknown)
-        if progress is not None:
-            progress(min(99, int(100.0 * abs((member.value - value) / (to - value)))), 100)
-        if (member.value - to) * sign >= 0.0:
-            return f"{setting} = {to:g}"
-        return f"it turned back past {value:g}" if (member.value - value) * sign < 0.0 else None
-
+    first = _first(equations, start, value)
+    walk = _Walk(equations, first, value, to, progress)
+    along = np.sign(to - value) * np.eye(len(first.unknown))[-1]
     begin = Solution(
-        unknown=first.unknown, slope=first.slope, tangent=tangent_of(first.slope, sign * row)
+        unknown=first.unknown, slope=first.slope, tangent=tangent_of(first.slope, along)
     )
     stride = Stride(first=STEP, longest=STEP * 3.0, shortest=1e-3, most=MOST)
-    ended = trace(equations, begin, stride, CLOSED, visit)
-    if ended in (LOST, AGAIN):
-        ended = f"no hop continues it at {setting} = {members[-1].value:.4g}"
+    ended = trace(equations, begin, stride, CLOSED, walk.visit)
+    if ended == MANY:
+        ended = f"{MOST} hops"
+    elif ended in (LOST, AGAIN):
+        ended = f"no hop continues it at {setting} = {walk.members[-1].value:.4g}"
         ended += f": {equations.why}" if equations.why else ""
     if progress is not None:
         progress(100, 100)
     return HopFamily(
-        setting=setting, members=tuple(members), changes=tuple(_changes(members)), ended=ended
+        setting=setting,
+        members=tuple(walk.members),
+        changes=tuple(_changes(walk.members)),
+        ended=ended,
     )
+
+
+def _first(equations: _Equations, start: Cycle, value: float) -> Solution:
+    """The hop at the present value of the setting, as a solution of the equations."""
+    apexes = np.array([apex.vector() for apex in start.apexes]) / UNITS
+    guess = np.append(apexes.ravel(), value / equations.span)
+    row = np.eye(len(guess))[-1]
+    first = correct(equations, guess, row, float(guess[-1]), CLOSED)
+    if first is None:
+        why = equations.why or "it is lost"
+        raise ConfigError(f"the hop cannot be followed in {equations.setting}: {why}")
+    return first
+
+
+@final
+class _Walk:
+    """The hops that a family has passed, and when it has gone far enough."""
+
+    def __init__(
+        self,
+        equations: _Equations,
+        first: Solution,
+        value: float,
+        to: float,
+        progress: Callable[[int, int], None] | None,
+    ) -> None:
+        self.members = [_member(equations, first)]
+        self._equations, self._from, self._to = equations, value, to
+        self._passed, self._progress = [first.unknown], progress
+
+    def visit(self, found: Solution) -> str | None:
+        """Take a hop; says why it is the last one, if it is."""
+        self._equations.why = ""
+        setting, member = self._equations.setting, _member(self._equations, found)
+        self.members.append(member)
+        older = self._passed[:-AGAIN_AFTER]
+        if older and min(np.max(np.abs(found.unknown - one)) for one in older) < AGAIN_NEAR:
+            return f"it comes back to a hop that it has passed, at {setting} = {member.value:.4g}"
+        self._passed.append(found.unknown)
+        share = (member.value - self._from) / (self._to - self._from)
+        if self._progress is not None:
+            self._progress(min(99, int(100.0 * abs(share))), 100)
+        if share >= 1.0:
+            return f"{setting} = {self._to:g}"
+        return f"it turned back past {self._from:g}" if share < 0.0 else None
 
 
 def _member(equations: _Equations, found: Solution) -> Member:

@@ -15,7 +15,7 @@ from legbench.design.statics import motor_holding
 from legbench.errors import ConfigError
 from legbench.modes.brake import beyond_limits
 from legbench.modes.carry import Carrier
-from legbench.modes.continuation import AGAIN, LOST, Solution, Stride, correct, trace
+from legbench.modes.continuation import AGAIN, LOST, MANY, Solution, Stride, correct, trace
 from legbench.modes.linear import RADIAL, linear_modes
 from legbench.modes.scene import SUPPORTED, Scene
 from legbench.signals import Floats
@@ -43,13 +43,13 @@ class Response:
     polar: float
     """Half of the range of z1 [rad]."""
     multipliers: tuple[complex, ...]
-    """Of the map from one period to the next, the largest first."""
+    """Multipliers of the map from one period to the next, the largest first [-]."""
     outside: str
     """Joint that is beyond its limit on the way, and where; empty if none is."""
 
     @property
     def freq(self) -> float:
-        """Of the motors and of the leg [Hz]."""
+        """Frequency of the motors and of the leg [Hz]."""
         return 1.0 / (self.folded + self.stretched)
 
     @property
@@ -141,6 +141,15 @@ class Switched:
         return square
 
 
+def _check(damping: tuple[float, float], dz2: float) -> None:
+    if not dz2 > 0.0:
+        raise ConfigError(f"dz2 is {dz2:g} rad; motors that do not move excite nothing")
+    if not min(damping) > 0.0:
+        raise ConfigError(
+            f"damping is {damping} N m s/rad; without it nothing bounds the response at resonance"
+        )
+
+
 def respond(
     scene: Scene,
     damping: tuple[float, float],
@@ -164,17 +173,11 @@ def respond(
         ConfigError: an amplitude or a damping that is not positive, or one at which no response
             is found.
     """
-    if not dz2 > 0.0:
-        raise ConfigError(f"dz2 is {dz2:g} rad; motors that do not move excite nothing")
-    if not min(damping) > 0.0:
-        raise ConfigError(
-            f"damping is {damping} N m s/rad; without it nothing bounds the response at resonance"
-        )
+    _check(damping, dz2)
     switched = Switched(scene, damping)
     equations = switched.equations(dz2)
     begin = np.array([*scene.rest, 0.0, 0.0, 1.0 / fastest])
-    row = np.eye(5)[4]
-    solved = correct(equations, begin, row, 1.0 / fastest, CLOSED)
+    solved = correct(equations, begin, np.eye(5)[4], 1.0 / fastest, CLOSED)
     if solved is None:
         raise ConfigError(f"no response to motors of {dz2:g} rad is found; take a smaller dz2")
     found: list[Response] = []
@@ -194,5 +197,6 @@ def respond(
     if visit(solved) == AGAIN:
         raise ConfigError(f"motors of {dz2:g} rad take the leg too far: {halted}")
     ended = trace(equations, solved, Stride(first=0.01, longest=0.02, most=most), CLOSED, visit)
-    said = {AGAIN: halted, LOST: f"no response continues it at {found[-1].freq:.4g} Hz"}
+    lost = f"no response continues it at {found[-1].freq:.4g} Hz"
+    said = {AGAIN: halted, LOST: lost, MANY: f"{most} responses"}
     return ResponseCurve(dz2=dz2, responses=tuple(found), ended=said.get(ended, ended))

@@ -11,7 +11,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from legbench.errors import ConfigError
-from legbench.modes.continuation import AGAIN, LOST, Solution, Stride, correct, tangent_of, trace
+from legbench.modes.continuation import (
+    AGAIN,
+    LOST,
+    MANY,
+    Solution,
+    Stride,
+    correct,
+    tangent_of,
+    trace,
+)
 from legbench.modes.linear import RADIAL
 from legbench.modes.response import CLOSED, SAMPLES, Response, Switched
 from legbench.modes.roots import bracketed
@@ -136,6 +145,16 @@ class _Law:
         return switched.described(start, (times[0], times[1]), dz2, path, product)
 
 
+def _check(scene: Scene, threshold: float, dz2: float, largest: float) -> None:
+    limit = min(scene.model.stiffness) * dz2
+    if not 0.0 < threshold < limit:
+        raise ConfigError(
+            f"threshold is {threshold:g} N m; it must be positive and below k dz2 = {limit:.3g} N m"
+        )
+    if not largest > dz2:
+        raise ConfigError(f"the largest dz2 is {largest:g} rad; it must exceed the first, {dz2:g}")
+
+
 def ride(
     scene: Scene,
     damping: tuple[float, float],
@@ -158,13 +177,7 @@ def ride(
     Raises:
         ConfigError: a threshold that the law cannot pass, amplitudes out of order, or no cycle.
     """
-    limit = min(scene.model.stiffness) * dz2
-    if not 0.0 < threshold < limit:
-        raise ConfigError(
-            f"threshold is {threshold:g} N m; it must be positive and below k dz2 = {limit:.3g} N m"
-        )
-    if not largest > dz2:
-        raise ConfigError(f"the largest dz2 is {largest:g} rad; it must exceed the first, {dz2:g}")
+    _check(scene, threshold, dz2, largest)
     law = _Law(Switched(scene, damping), threshold)
     row = np.eye(7)[6]
     solved = correct(law.equations, law.settle(dz2), row, dz2, CLOSED)
@@ -189,5 +202,6 @@ def ride(
     )
     stride = Stride(first=0.02, longest=0.05, most=most)
     ended = trace(law.equations, first, stride, CLOSED, visit)
-    said = {AGAIN: halted, LOST: f"no cycle continues it at dz2 = {found[-1].dz2:.4g} rad"}
+    lost = f"no cycle continues it at dz2 = {found[-1].dz2:.4g} rad"
+    said = {AGAIN: halted, LOST: lost, MANY: f"{most} cycles"}
     return RiddenCurve(threshold=threshold, cycles=tuple(found), ended=said.get(ended, ended))

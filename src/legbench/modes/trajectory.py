@@ -31,7 +31,7 @@ class OrbitPath:
     index: int
     """Its place in the family, from 0 [-]."""
     energy: float
-    """Above rest [J]."""
+    """Energy above rest [J]."""
     period: float
     """[s]"""
     stable: bool | None

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from legbench.modes.basin import Fate, Question
-from legbench.modes.hop_family import HopFamily, Setting
+from legbench.modes.hop_family import HopFamily
+from legbench.modes.hop_setting import Setting
 from legbench.signals import Floats, Ints
 from legbench.viz.print._matplotlib import (
     BoundaryNorm,
