@@ -36,7 +36,7 @@ def main() -> int:
             skipped += 1
             continue
         seen += 1
-        if seen % 500 == 0:
+        if seen % 100 == 0:
             print(f"{seen} hops, {bad} wrong, {grazing} graze", file=sys.stderr, flush=True)
         errors.append(verdict.error)
         if not verdict.same or verdict.error > BOUND:

@@ -51,6 +51,7 @@ def test_each_leg_moves_as_if_it_were_alone(regime: Regime) -> None:
     models, motors = some_legs(), some_motors()
     lanes = Lanes(models, regime)
     lanes.start(STARTS)
+    found = STARTS
     for tick in range(1, 301):
         commands = motors + 0.05 * np.sin(0.05 * tick)
         found = lanes.go(0.001 * tick, commands)

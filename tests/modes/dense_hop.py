@@ -7,11 +7,12 @@ largest value is searched between them.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from dense_rules import SCALE, Condition, Rules  # pyright: ignore[reportMissingImports]
 from scipy.integrate import DOP853
 from scipy.optimize import brentq, minimize_scalar
 
@@ -24,17 +25,11 @@ from legbench.analytic.equations import (
     touchdown_rates,
 )
 from legbench.analytic.stops import Stop
-from legbench.control import JumpConfig, LegTargets
-from legbench.design import LegDesign
-from legbench.design.statics import Support
 
 LOOKS = 8
 """Parts of a step that are looked at."""
 BLIND = 2e-4
 """Shortest stance or flight [s]."""
-SCALE = math.sqrt(0.5)
-Condition = Callable[[float, Sequence[float]], float]
-"""Function of time and state that is positive once the event is due."""
 
 
 @dataclass
@@ -46,76 +41,6 @@ class Story:
     apex: tuple[float, ...] = ()
     closest: float = math.inf
     """How near a condition came to its event without one: small when the hop grazes [-]."""
-
-
-class Rules:
-    """The jump controller's rules on the angles of a leg, in continuous time."""
-
-    def __init__(self, config: JumpConfig, design: LegDesign) -> None:
-        targets = LegTargets(designs=design, support=Support.FOOT)
-        self.config, (self.k1, self.k2) = config, design.stiffness
-        folded = targets.motor_at(config.z2 + config.dz2, "z2 + dz2")
-        stretched = targets.motor_at(config.z2 - config.dz2, "z2 - dz2")
-        self.motors = {"push": tuple(stretched.tolist()), "": tuple(folded.tolist())}
-        rest = targets.link_at_rest(folded)
-        self.standing = -self.torque(self.motors[""], rest.tolist())
-        self.phase, self.since, self.loaded, self.extreme = "flight", 0.0, False, 0.0
-
-    def torque(self, motor: Any, q: Any) -> float:
-        """Modal spring torque along z2 [N m]."""
-        return SCALE * (self.k2 * (motor[1] - q[1]) - self.k1 * (motor[0] - q[0]))
-
-    @property
-    def motor(self) -> Any:
-        """Where the motors are [rad]."""
-        return self.motors.get(self.phase, self.motors[""])
-
-    def load(self, q: Any) -> float:
-        """Share of the load of standing."""
-        return -self.torque(self.motor, q) / self.standing
-
-    def fold(self, q: Any) -> float:
-        """Motor less deflection along z2 [rad]."""
-        motor = SCALE * (self.motor[1] - self.motor[0])
-        return motor - self.torque(self.motor, q) / min(self.k1, self.k2)
-
-    def conditions(self) -> dict[str, Condition]:
-        """What ends the phase."""
-        c = self.config
-        match self.phase:
-            case "flight" if self.loaded:
-                return {
-                    "unloaded": lambda _, y: c.touchdown_load - self.load(y[:2]),
-                    "touched": lambda t, _: t - self.since - c.touchdown_time,
-                }
-            case "flight":
-                return {"loaded": lambda _, y: self.load(y[:2]) - c.touchdown_load}
-            case "compress":
-                return {"turned": lambda _, y: self.extreme - self.fold(y[:2]) - c.apex_turn}
-            case "push":
-                return {
-                    "released": lambda _, y: c.release_load - self.load(y[:2]),
-                    "turned": lambda _, y: self.fold(y[:2]) - self.extreme - c.apex_turn,
-                }
-            case _:
-                return {"waited": lambda t, _: t - self.since - c.release_time}
-
-    def look(self, q: Any) -> None:
-        """Keep the extreme of the fold."""
-        if self.phase == "compress":
-            self.extreme = max(self.extreme, self.fold(q))
-        elif self.phase == "push":
-            self.extreme = min(self.extreme, self.fold(q))
-
-    def obey(self, what: str, time: float, q: Any) -> None:
-        """Go over to what comes next."""
-        if what in ("loaded", "unloaded"):
-            self.loaded, self.since = what == "loaded", time
-            return
-        before = {"touched": "compress", "waited": "flight", "released": "release"}
-        after = "push" if self.phase == "compress" else "release"
-        self.phase = before.get(what, after)
-        self.since, self.loaded, self.extreme = time, False, self.fold(q)
 
 
 class DenseHop:
@@ -167,7 +92,7 @@ class DenseHop:
                 return False
             conditions["contact"] = lambda t, y: -self.foot(t, y)[0]
         else:
-            conditions["contact"] = lambda _, y: -hold(model, motor, y[:2], y[2:])
+            conditions["contact"] = lambda _, y: -hold(model, motor, *_pairs(y))
         for name, condition in conditions.items():
             if name not in ("apex", "touched", "waited", "contact") and (
                 condition(self.time, self.y) > 1e-12
@@ -176,11 +101,11 @@ class DenseHop:
         if not self.flies and not blind and conditions["contact"](self.time, self.y) > 0.0:
             self._switch()
             return False
-        self.pushing, beyond = [], [stop.depth(self.y[:2]) > 0.0 for stop in model.stops]
+        self.pushing, beyond = [], [stop.depth(_pairs(self.y)[0]) > 0.0 for stop in model.stops]
         for stop, past in zip(model.stops, beyond, strict=True):
             sign = -1.0 if past else 1.0
             conditions[f"{stop} {past}"] = lambda _, y, stop=stop, sign=sign: (
-                sign * stop.depth(y[:2]) - 1e-12
+                sign * stop.depth(_pairs(y)[0]) - 1e-12
             )
             if past:
                 pushes = self._asked(stop, self.y)[0] > 0.0
@@ -196,7 +121,7 @@ class DenseHop:
 
     def _asked(self, asking: Stop | None, y: Sequence[float]) -> tuple[float, tuple[float, float]]:
         """What the law asks of a stop before its own push, and accelerations [rad/s^2]."""
-        q, v = (y[0], y[1]), (y[2], y[3])
+        q, v = _pairs(y)
         terms = self.model.falling if self.flies else self.model.stance
         torque, asked = self.model.torque(self.rules.motor, q, v), 0.0
         a = pair_acceleration(SCALAR, terms, q, v, torque)
@@ -230,7 +155,7 @@ class DenseHop:
 
     def _switch(self) -> None:
         self.story.events.append(("touchdown" if self.flies else "liftoff", self.time))
-        q, v = self.y[:2], self.y[2:]
+        q, v = _pairs(self.y)
         pairs = list(zip(self.arm, q, v, strict=True))
         arm = (
             sum(a * math.sin(x) for a, x, _ in pairs),
@@ -324,7 +249,7 @@ class DenseHop:
         """A crossing between two looks that both see none."""
         if seen < -0.2:
             return None
-        best = minimize_scalar(
+        best: Any = minimize_scalar(
             lambda t: -at(t), bounds=(begin, end), method="bounded", options={"xatol": 1e-9}
         )
         if -best.fun > 0.0:
@@ -334,4 +259,10 @@ class DenseHop:
 
 
 def _root(at: Any, begin: float, end: float) -> float:
-    return float(brentq(at, begin, end, xtol=1e-14, rtol=1e-14))
+    solve: Any = brentq
+    return float(solve(at, begin, end, xtol=1e-14, rtol=1e-14))
+
+
+def _pairs(y: Sequence[float]) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Angles and rates of a state."""
+    return (y[0], y[1]), (y[2], y[3])

@@ -14,7 +14,8 @@ pytest.importorskip("heyoka")
 
 from random_hops import compare, random_case  # pyright: ignore[reportMissingImports]
 
-from legbench.analytic.course import Course, Levels
+from legbench.analytic.course import Course
+from legbench.analytic.lookout import Levels
 from legbench.analytic.places import PUSHES, Event
 from legbench.analytic.taylor import MAP_TOLERANCE, TaylorLeg, Watched
 from legbench.modes.drive import JumpLaw, Passive

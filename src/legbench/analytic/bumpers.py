@@ -33,6 +33,8 @@ class Bumpers:
         self._model, self._stops = model, model.stops
         self._touched = [False] * len(model.stops)
         self._pushing, self._free = [False, False], [False, False]
+        self._acting: list[Stop | None] = [None, None]
+        """The stop that each joint is beyond."""
         self.touched, self._version = False, 0
 
     def find(self, q: Pair, v: Pair) -> None:
@@ -42,8 +44,8 @@ class Bumpers:
             depth = stop.depth(q)
             found.append(depth > AT_LIMIT or (depth > -AT_LIMIT and stop.speed(v) > 0.0))
         if found != self._touched:
-            self._touched, self.touched = found, True in found
-            self._version += 1
+            self._touched = found
+            self._changed()
 
     def lay(self, watch: Watch) -> None:
         """Watch the four events: to go beyond a limit, or to come back."""
@@ -58,6 +60,13 @@ class Bumpers:
     def cross(self, event: int) -> None:
         """A joint has gone beyond a limit, or has come back."""
         self._touched[event - FIRST] ^= True
+        self._changed()
+
+    def _changed(self) -> None:
+        self._acting = [None, None]
+        for index, (stop, beyond) in enumerate(zip(self._stops, self._touched, strict=True)):
+            if beyond:
+                self._acting[index // 2] = stop
         self.touched = True in self._touched
         self._version += 1
 
@@ -91,7 +100,7 @@ class Bumpers:
         for first, inertia, pushing in found:
             asked = self._asked(inertia, motor, q, v)
             for joint in (0, 1):
-                stop = self._acting(joint)
+                stop = self._acting[joint]
                 if stop is None:
                     watch.lay(first + joint, *OFF)
                     continue
@@ -111,19 +120,12 @@ class Bumpers:
 
     def _switch(self, watch: Watch) -> None:
         for joint in (0, 1):
-            stop = self._acting(joint)
+            stop = self._acting[joint]
             place = PUSHES + 2 * joint
             watch.pars[place] = float(stop is not None and self._pushing[joint])
             watch.pars[place + 1] = 0.0 if stop is None else stop.limit
             if watch.held:
                 watch.pars[FREE_PUSHES + joint] = float(stop is not None and self._free[joint])
-
-    def _acting(self, joint: int) -> Stop | None:
-        """The stop that a joint is beyond."""
-        for index in (2 * joint, 2 * joint + 1):
-            if index < len(self._touched) and self._touched[index]:
-                return self._stops[index]
-        return None
 
     def turns(
         self, ops: Ops, terms: PairTerms, torque: Pair, q: Pair, v: Pair, *, free: bool = False
@@ -157,7 +159,7 @@ class Bumpers:
         a = pair_acceleration(ops, terms, q, v, torque)
         found: list[Term] = [0.0, 0.0]
         for joint in (0, 1):
-            stop = self._acting(joint)
+            stop = self._acting[joint]
             if stop is None:
                 continue
             turn = stop.turn(q, v, a)
@@ -169,5 +171,5 @@ class Bumpers:
 
     def sign(self, joint: int) -> float:
         """1 for a joint beyond its lower limit, -1 beyond its upper one, else 0."""
-        stop = self._acting(joint)
+        stop = self._acting[joint]
         return 0.0 if stop is None else stop.sign

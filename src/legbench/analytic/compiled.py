@@ -140,6 +140,18 @@ def terms_of(model: LegModel, regime: Regime) -> PairTerms:
             return model.stance
 
 
+def steady_point(model: LegModel, regime: Regime) -> Pair:
+    """The point that moves steadily, seen from the hip, per direction of the angles [m]."""
+    floating = model.floating
+    match regime:
+        case Regime.FLIGHT:
+            return floating.first[0] / floating.mass, floating.first[1] / floating.mass
+        case Regime.HANGING:
+            return 0.0, 0.0
+        case _:
+            return floating.reach, floating.reach
+
+
 def foot_from_centre(model: LegModel) -> Pair:
     """Foot tip seen from the centre of mass, per direction of the angles [m]."""
     floating = model.floating

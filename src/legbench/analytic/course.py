@@ -12,71 +12,51 @@ that instant. A model on dual numbers (`ops=DUAL`) makes time, angles and rates 
 variational equations then go the same way piece by piece (`variation`).
 """
 
-from typing import NamedTuple, final
+from typing import final
 
 from legbench.analytic._heyoka import heyoka as hy
 from legbench.analytic.bumpers import Bumpers
-from legbench.analytic.compiled import TOLERANCE, foot_from_centre, parameters_of, terms_of
+from legbench.analytic.compiled import (
+    TOLERANCE,
+    foot_from_centre,
+    parameters_of,
+    steady_point,
+    terms_of,
+)
 from legbench.analytic.contact import MIN_PHASE
 from legbench.analytic.dual import DUAL, floats, without_gradients
 from legbench.analytic.equations import (
     Pair,
-    Term,
-    contact_force,
-    free_foot_acceleration,
-    pair_acceleration,
-    pair_kinetic,
     sweep,
     sweep_rate,
     touchdown_rates,
+)
+from legbench.analytic.lookout import (
+    CONTACT,
+    KINDS,
+    NEVER,
+    SEEN,
+    SILENT,
+    TIE,
+    TURN,
+    Levels,
+    Lookout,
 )
 from legbench.analytic.model import LegModel
 from legbench.analytic.places import HEIGHT, MOTOR, SPEED, Event, Kind, Watched
 from legbench.analytic.state import LegState, Regime
 from legbench.analytic.variation import Variation
-from legbench.analytic.watch import NUDGE, OFF, Watch
-from legbench.design.statics import GRAVITY
+from legbench.analytic.watch import Watch
 from legbench.errors import PlantFault
 
-NEVER = 1e6
-"""Level that is never reached [rad]."""
 MAX_EVENTS = 10_000
 """Largest number of events that one integration may pass [-]."""
 MAX_STEPS = 100_000
 """Largest number of steps of one integration [-]; a leg takes about a hundred a second, a diverging
 one any number."""
 TIME_LIMIT = int(hy.taylor_outcome.time_limit)
-TIE = 1e-7
-"""Acceleration over gravity below which the released foot counts as rising: on the radial mode it
-vanishes together with the force [-]."""
-SEEN = {
-    Event.RISE: Watched.RISE,
-    Event.FALL: Watched.FALL,
-    Event.FELL: Watched.FELL,
-    Event.FELL_BACK: Watched.FELL,
-}
-"""Conditions on angles, which may hold already when a piece begins."""
-LINEAR = (
-    *(Event.RISE, Event.FALL, Event.FELL, Event.FELL_BACK),
-    *(Event.KNEE_LOW, Event.KNEE_HIGH, Event.HIP_LOW, Event.HIP_HIGH),
-)
-"""Events of angles; they can be near zero only where they were laid anew or the leg was put."""
-PROBED = 2
-"""Number of those that look at the probe [-]."""
-KINDS = {Regime.FLIGHT: Kind.FLIGHT, Regime.STANCE: Kind.STANCE}
-"""The compiled equations that a regime begins with; the fixed ones for all others."""
-
-
-class Levels(NamedTuple):
-    """Values of the probe at which an integration stops [rad]."""
-
-    upper: float = NEVER
-    lower: float = -NEVER
-    turns: bool = False
-    """Whether the probe's turns stop it, too."""
-
-
-SILENT = Levels()
+EVENTS = len(Event)
+"""Number of events that an integrator may watch [-]."""
 
 
 @final
@@ -85,7 +65,8 @@ class Course:
 
     Attributes:
         model: the leg.
-        plain: the leg without derivatives, on which decisions are made.
+        plain: the leg without derivatives, on which decisions are made; so are `plain_q`, `plain_v`
+            and `plain_motor`.
         time: where it is [s].
         regime: which equations hold.
         q: angles [rad].
@@ -96,6 +77,7 @@ class Course:
         drift: velocity of the steady point then [m/s].
         watch: the compiled regime.
         bumpers: the joint stops.
+        lookout: what is watched.
     """
 
     def __init__(
@@ -112,17 +94,14 @@ class Course:
         self.bumpers = Bumpers(self.plain)
         self._tolerance, self._min_phase = tolerance, min_phase
         self._arm = foot_from_centre(model)
-        self._plain_arm = floats(self._arm)
-        self._weight = self.plain.floating.mass * GRAVITY
         self._watches: dict[tuple[Regime, bool], Watch] = {}
         self._variation = Variation(tolerance) if model.ops is DUAL else None
-        self._levels, self._turn, self._blind, self._lean = SILENT, 0.0, 0.0, NEVER
-        self._fresh = 0
+        self.lookout = Lookout(self, self.plain, min_phase)
         self.motor: Pair = (0.0, 0.0)
 
     def start(self, state: LegState) -> None:
         """Put the leg somewhere."""
-        ops, along = self.model.ops, self._along(state.regime)
+        ops, along = self.model.ops, steady_point(self.model, state.regime)
         x, z = sweep(ops, state.q, along)
         point, drift = (state.trunk_pos[0] + x, state.trunk_pos[1] + z), (0.0, 0.0)
         if state.regime is Regime.FLIGHT:
@@ -141,7 +120,7 @@ class Course:
 
     def state(self) -> LegState:
         """The leg as a state."""
-        ops, along = self.model.ops, self._along(self.regime)
+        ops, along = self.model.ops, steady_point(self.model, self.regime)
         (x, z), (dx, dz) = self.centre() if self.watch.flies else (self.point, self.drift)
         inner, inner_vel = sweep(ops, self.q, along), sweep_rate(ops, self.q, self.v, along)
         return LegState(
@@ -169,22 +148,15 @@ class Course:
         """Foot tip seen from the centre of mass (forward, up) [m]."""
         return sweep(self.model.ops, q, self._arm)
 
-    def kinetic_energy(self) -> Term:
-        """Of the leg in flight or stance [J]."""
-        model, ops = self.model, self.model.ops
-        if not self.watch.flies:
-            return pair_kinetic(ops, model.stance, self.q, self.v)
-        dx, dz = self.centre()[1]
-        own = 0.5 * model.floating.mass * (dx * dx + dz * dz)
-        return own + pair_kinetic(ops, model.falling, self.q, self.v)
-
     def hold(self, motor: Pair) -> None:
         """Put the motors somewhere [rad]."""
         if motor != self.motor:
             self.motor, self.plain_motor = motor, floats(motor)
             self.watch.pars[MOTOR : MOTOR + 2] = motor
             if self.bumpers.touched:
-                self._decide()
+                self.bumpers.decide(
+                    self.watch, self.terms, self.plain_motor, self.plain_q, self.plain_v
+                )
 
     def switch(self) -> None:
         """Go over to the other side of a touchdown or lift-off."""
@@ -209,12 +181,12 @@ class Course:
         Raises:
             PlantFault: the integration failed.
         """
-        if levels is not self._levels:
-            self._lay(levels)
+        if levels is not self.lookout.levels:
+            self.lookout.lay(levels)
         for _ in range(MAX_EVENTS):
-            event = self._due()
+            event = self.lookout.due()
             if event is None:
-                end = min(self._blind, until) if self.time < self._blind else until
+                end = min(self.lookout.blind, until) if self.time < self.lookout.blind else until
                 if end > self.time:
                     event = self._piece(end)
             if event is not None:
@@ -227,126 +199,18 @@ class Course:
             "integration failed", f"integration failed at t = {self.time:.6f} s: the leg chatters"
         )
 
+    def watches(self) -> list[Watch]:
+        """Compiled regimes that the leg has been in so far."""
+        return list(self._watches.values())
+
     def march(self, step: float, count: int) -> None:
         """Take steps of one length whatever the error, blind to events."""
         for _ in range(count):
             self.watch.integrator.step(step)
         self.time = self.began + count * step
         q1, q2, v1, v2 = self.watch.state.tolist()
-        self.q = self._q = (q1, q2)
-        self.v = self._v = (v1, v2)
-
-    def _due(self) -> int | None:
-        """Guard every event against the zero it starts on; one whose condition holds already."""
-        watch = self.watch
-        if watch.moved:
-            watch.restore()
-        due = self._near() if self._fresh else None
-        if self.bumpers.touched:
-            self.bumpers.guard(watch, self.terms, self.plain_motor, self._q, self._v)
-        if self._free:
-            contact = self._contact()
-            due = contact if due is None else due
-        return due
-
-    def _near(self) -> int | None:
-        """Guard what has been laid anew or jumped; one whose condition holds already."""
-        guard, (q1, q2), (p1, p2) = self.watch.guard, self._q, self.probe
-        reading, lean, knee = p1 * q1 + p2 * q2, q1 + q2, q2 - q1
-        due = None
-        for event, value in zip(
-            LINEAR[: self._fresh], (reading, reading, lean, lean, knee, knee, q1, q1), strict=False
-        ):
-            if guard(event, value) and event in SEEN and due is None:
-                due = event
-        if self._levels.turns:
-            self._guard_turn()
-        if due is None:
-            self._fresh = 0
-        return due
-
-    def _contact(self) -> int | None:
-        """Guard touchdown or lift-off; the event if the leg cannot stay in its regime."""
-        watch = self.watch
-        if self.time < self._blind:
-            if watch.gain[Event.CONTACT] != 0.0:
-                watch.lay(Event.CONTACT, *OFF)
-            return None
-        if watch.flies:
-            return self._touchdown()
-        force = self._force()
-        if not watch.held:
-            if force < 0.0:
-                return Event.CONTACT
-            self._expect(force)
-            return None
-        released = self._released()
-        if force > 0.0 or released > -TIE:
-            return Event.RECOVER if force > 0.0 else Event.CONTACT
-        for event, reading in ((Event.CONTACT, released), (Event.RECOVER, force)):
-            watch.lay(event, 1.0, 0.0)
-            watch.guard(event, reading)
-        return None
-
-    def _touchdown(self) -> int | None:
-        """Guard touchdown; the event if the foot is through the ground and sinking."""
-        watch, elapsed = self.watch, float(self.watch.integrator.time)
-        z, dz = float(self.point[1]), float(self.drift[1])
-        fallen = self.plain.floating.gravity * elapsed
-        height = z + (dz - 0.5 * fallen) * elapsed
-        height += sweep(self.plain.ops, self._q, self._plain_arm)[1]
-        if height > 0.0:
-            self._expect(height)
-            return None
-        arm_vel = sweep_rate(self.plain.ops, self._q, self._v, self._plain_arm)
-        if dz - fallen + arm_vel[1] < 0.0:
-            return Event.CONTACT
-        self._blind = self.time + self._min_phase  # under the ground and rising: look later
-        watch.lay(Event.CONTACT, *OFF)
-        return None
-
-    def _expect(self, reading: float) -> None:
-        """Watch height or force fall to zero."""
-        if self.watch.gain[Event.CONTACT] != -1.0:
-            self.watch.lay(Event.CONTACT, -1.0, 0.0)
-        if reading < NUDGE:
-            self.watch.guard(Event.CONTACT, reading)
-
-    def _force(self) -> float:
-        """Vertical force on the standing foot, over the weight."""
-        plain, q, v = self.plain, self._q, self._v
-        a = self._accelerations()
-        return contact_force(plain.ops, plain.floating, q, v, a)[1] / self._weight
-
-    def _released(self) -> float:
-        """Acceleration that the standing foot would have if it were let go, over gravity."""
-        plain, q, v = self.plain, self._q, self._v
-        torque = plain.torque(self.plain_motor, q, v)
-        a = self.bumpers.released(plain.falling, torque, q, v)
-        return free_foot_acceleration(plain.ops, plain.floating, q, v, a)[1] / GRAVITY
-
-    def _accelerations(self) -> Pair:
-        """Accelerations of the angles, where those stops act that are known to."""
-        plain, q, v = self.plain, self._q, self._v
-        torque = plain.torque(self.plain_motor, q, v)
-        if self.bumpers.touched:
-            return self.bumpers.turns(plain.ops, self.terms, torque, q, v)[1]
-        return pair_acceleration(plain.ops, self.terms, q, v, torque)
-
-    def _guard_turn(self) -> None:
-        """Watch the probe's next turn, which is the other kind after one that has just been."""
-        (p1, p2), (v1, v2) = self.probe, self._v
-        rate = p1 * v1 + p2 * v2
-        if self._turn == 0.0:
-            towards = rate
-            if abs(rate) <= NUDGE:
-                a = self._accelerations()
-                towards = p1 * a[0] + p2 * a[1]
-            self._turn = -1.0 if towards > 0.0 else 1.0
-        if self.watch.gain[Event.TURN] != self._turn:
-            self.watch.lay(Event.TURN, self._turn, 0.0)
-        if self._turn * rate > -NUDGE:
-            self.watch.guard(Event.TURN, rate)
+        self.q = self.plain_q = (q1, q2)
+        self.v = self.plain_v = (v1, v2)
 
     def _piece(self, until: float) -> int | None:
         """Integrate to `until` or to the next event."""
@@ -354,18 +218,18 @@ class Course:
         # max_steps by its place: by name it costs a fifth of a short call.
         outcome = int(integrator.propagate_until(float(until - self.began), MAX_STEPS)[0])
         event = None if outcome == TIME_LIMIT else -outcome - 1
-        if event is not None and not 0 <= event < len(Event):
+        if event is not None and not 0 <= event < EVENTS:
             raise PlantFault(
                 "integration failed",
                 f"integration failed at t = {self.began + integrator.time:.6f} s: the state runs "
                 "away",
             )
         q1, q2, v1, v2 = self.watch.state.tolist()
-        self._q, self._v = (q1, q2), (v1, v2)
+        self.plain_q, self.plain_v = (q1, q2), (v1, v2)
         if self._variation is not None:
-            self._variation.carry(self, self._q, self._v, until, event)
+            self._variation.carry(self, self.plain_q, self.plain_v, until, event)
             return event
-        self.q, self.v = self._q, self._v
+        self.q, self.v = self.plain_q, self.plain_v
         # The end to the last bit, or whoever waits for it waits for ever.
         self.time = until if event is None else self.began + float(integrator.time)
         return event
@@ -374,20 +238,21 @@ class Course:
         """What an event says to the outside; those of the stops are dealt with here."""
         watch = self.watch
         if event in SEEN:
-            return SEEN[Event(event)]
-        if event == Event.TURN:
-            self._turn = -self._turn
-            watch.lay(Event.TURN, self._turn, 0.0)
+            return SEEN[event]
+        if event == TURN:
+            self.lookout.turned()
             return Watched.TURN
         if event <= Event.HIP_HIGH:
             self.bumpers.cross(event)
             self.bumpers.lay(watch)
-            self._decide()
+            self.bumpers.decide(
+                self.watch, self.terms, self.plain_motor, self.plain_q, self.plain_v
+            )
         elif event == Event.RECOVER:
             self._load(held=False)
-        elif event != Event.CONTACT:
+        elif event != CONTACT:
             self.bumpers.flip(watch, event)
-        elif watch.flies or watch.held or self._released() > -TIE:
+        elif watch.flies or watch.held or self.lookout.released() > -TIE:
             return Watched.CONTACT
         else:
             self._load(held=True)
@@ -396,7 +261,8 @@ class Course:
     def _put(
         self, regime: Regime, q: Pair, v: Pair, point: Pair, drift: Pair, lean: float = NEVER
     ) -> None:
-        self.q, self.v, self.point, self.drift, self._lean = q, v, point, drift, lean
+        self.q, self.v, self.point, self.drift = q, v, point, drift
+        self.lookout.lean = lean
         self.bumpers.find(floats(q), floats(v))
         self._enter(regime)
 
@@ -404,41 +270,26 @@ class Course:
         """Begin a regime here and now."""
         self.regime = regime
         self.terms = terms_of(self.plain, regime)
-        self._free = regime in KINDS
-        self._blind = self.since + self._min_phase if self._free else self.since
-        self._turn = 0.0
+        self.lookout.enter(regime, self.since)
         self._load(held=False)
 
     def _load(self, *, held: bool) -> None:
         """Put where the leg is into the integrator of its regime."""
         watch = self.watch = self._watch_of(held=held)
-        self._q, self._v, self.plain_motor = floats(self.q), floats(self.v), floats(self.motor)
+        self.plain_q, self.plain_v, self.plain_motor = (
+            floats(self.q),
+            floats(self.v),
+            floats(self.motor),
+        )
         self.began = self.time
         watch.integrator.time = 0.0
         watch.integrator.reset_cooldowns()
-        watch.state[:] = (*self._q, *self._v)
+        watch.state[:] = (*self.plain_q, *self.plain_v)
         watch.pars[MOTOR : MOTOR + 2] = self.plain_motor
         if watch.flies:
             watch.pars[HEIGHT], watch.pars[SPEED] = self.point[1], self.drift[1]
-        self._fresh = len(LINEAR)
-        watch.restore()
-        watch.lay_bounds(Event.FELL, Event.FELL_BACK, -self._lean, self._lean, NEVER)
-        self.bumpers.lay(watch)
-        self._lay(self._levels)
-        self._decide()
-
-    def _lay(self, levels: Levels) -> None:
-        """Watch other levels."""
-        self._levels, watch = levels, self.watch
-        self._fresh = max(self._fresh, PROBED)
-        watch.lay_bounds(Event.FALL, Event.RISE, levels.lower, levels.upper, NEVER)
-        if not levels.turns:
-            self._turn = 0.0
-            if watch.gain[Event.TURN] != 0.0:
-                watch.lay(Event.TURN, *OFF)
-
-    def _decide(self) -> None:
-        self.bumpers.decide(self.watch, self.terms, self.plain_motor, self._q, self._v)
+        self.lookout.move_to(watch)
+        self.bumpers.decide(self.watch, self.terms, self.plain_motor, self.plain_q, self.plain_v)
 
     def _watch_of(self, *, held: bool) -> Watch:
         found = self._watches.get((self.regime, held))
@@ -447,14 +298,3 @@ class Course:
             values = parameters_of(self.plain, self.regime, self.probe)
             found = self._watches[self.regime, held] = Watch(kind, values, self._tolerance)
         return found
-
-    def _along(self, regime: Regime) -> Pair:
-        """The steady point seen from the hip, per direction of the angles [m]."""
-        floating = self.model.floating
-        match regime:
-            case Regime.FLIGHT:
-                return floating.first[0] / floating.mass, floating.first[1] / floating.mass
-            case Regime.HANGING:
-                return 0.0, 0.0
-            case _:
-                return floating.reach, floating.reach

@@ -10,9 +10,10 @@ from typing import final
 
 from legbench.analytic.compiled import TOLERANCE, event_integrator
 from legbench.analytic.contact import MIN_PHASE
-from legbench.analytic.course import KINDS, SILENT, Course, Levels
+from legbench.analytic.course import Course
 from legbench.analytic.dual import DUAL
 from legbench.analytic.equations import Pair
+from legbench.analytic.lookout import KINDS, SILENT, Levels
 from legbench.analytic.model import LegModel
 from legbench.analytic.places import Kind, Watched
 from legbench.analytic.state import LegState, Regime, Transition

@@ -11,7 +11,7 @@ from enum import StrEnum
 import numpy as np
 
 from legbench.analytic.course import Course
-from legbench.analytic.equations import Pair
+from legbench.analytic.equations import Pair, pair_kinetic
 from legbench.analytic.model import LegModel
 from legbench.analytic.state import LegState, Regime, flying
 from legbench.analytic.taylor import TaylorLeg, Watched
@@ -153,9 +153,9 @@ def hop(leg: TaylorLeg, drive: AbstractDrive, start: Apex) -> Hop:
                 drive.ring(_probe(drive, course.q), course.time)
             elif what is Watched.CONTACT:
                 if course.regime is Regime.FLIGHT:
-                    lost += course.kinetic_energy()
+                    lost += _kinetic(course)
                     course.switch()
-                    lost -= course.kinetic_energy()
+                    lost -= _kinetic(course)
                     touchdown = course.time if math.isnan(touchdown) else touchdown
                 else:
                     course.switch()
@@ -193,6 +193,16 @@ def _reached(course: Course) -> Apex:
     """The section's numbers of a leg at its apex."""
     (_, height), (speed, _) = course.centre()
     return Apex.at(height, speed, course.q, course.v)
+
+
+def _kinetic(course: Course) -> float:
+    """Kinetic energy of a leg in flight or stance [J]."""
+    model, ops = course.model, course.model.ops
+    if course.regime is not Regime.FLIGHT:
+        return pair_kinetic(ops, model.stance, course.q, course.v)
+    dx, dz = course.centre()[1]
+    own = 0.5 * model.floating.mass * (dx * dx + dz * dz)
+    return own + pair_kinetic(ops, model.falling, course.q, course.v)
 
 
 def _probe(drive: AbstractDrive, q: Pair) -> float:
