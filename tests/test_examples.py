@@ -27,7 +27,7 @@ def printed(name: str, folder: Path) -> list[str]:
         capture_output=True,
         text=True,
         check=False,
-        timeout=60,
+        timeout=300,
         env=os.environ,
     )
     assert done.returncode == 0, done.stderr

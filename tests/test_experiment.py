@@ -240,7 +240,7 @@ def test_an_interrupted_command_leaves_a_whole_run(
             if any(path.stat().st_size > 20_000 for path in runs.glob("*/samples.arrows")):
                 started.set()
         process.send_signal(number)
-        out, err = process.communicate(timeout=60)
+        out, err = process.communicate(timeout=300)
     assert process.returncode == 0, err
     assert "Traceback" not in err
     summary = json.loads(out)

@@ -11,13 +11,16 @@ GONE = "process data lost"
 
 
 def answered(outcome: Outcome, gone: str | None) -> Outcome:
-    """Return how a run ended, as a fault if its plant had been gone by then.
+    """Return how a run ended, as a fault if it lasted its time and its plant had been gone by then.
+
+    A run that the user interrupts claims no time that it did not last; whether its drives are
+    without power is what the stop has to show.
 
     Args:
         outcome: what the loop says.
         gone: why the plant was gone, none if it was there.
     """
-    if gone is None or outcome.status == "fault":
+    if gone is None or outcome.status != "complete":
         return outcome
     return replace(outcome, status="fault", cause=GONE, message=gone)
 

@@ -55,7 +55,7 @@ def started(
         capture_output=True,
         text=True,
         check=False,
-        timeout=60,
+        timeout=300,
         env=environment,
         cwd=cwd,
     )

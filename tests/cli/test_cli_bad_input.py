@@ -64,7 +64,7 @@ def test_a_reader_that_has_gone(tmp_path: Path) -> None:
             stdout=writer,
             stderr=subprocess.PIPE,
             cwd=tmp_path,
-            timeout=60,
+            timeout=300,
             check=False,
         )
     finally:

@@ -102,7 +102,7 @@ def test_a_map_that_is_interrupted_ends_and_keeps_its_rows(tmp_path: Path) -> No
             assert process.poll() is None
             time.sleep(0.05)
         os.killpg(process.pid, signal.SIGINT)
-        _, said = process.communicate(timeout=60)
+        _, said = process.communicate(timeout=300)
     finally:
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGKILL)

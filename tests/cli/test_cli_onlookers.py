@@ -31,7 +31,7 @@ def ran(
     command += ["--duration", "0.6", "--out", str(tmp_path / "runs")]
     line = f"{shlex.join(command)} {redirect}"
     return subprocess.run(
-        ["sh", "-c", line], capture_output=True, text=True, timeout=60, cwd=tmp_path, check=False
+        ["sh", "-c", line], capture_output=True, text=True, timeout=300, cwd=tmp_path, check=False
     )
 
 

@@ -47,7 +47,7 @@ def held_elsewhere(
         assert process.stdout.readline() == "held\n"
         yield process
         process.stdin.close()
-        process.wait(10)
+        process.wait(60)
 
 
 def test_a_lock_touches_no_file_that_somebody_planted(tmp_path: Path) -> None:
@@ -102,7 +102,7 @@ def test_a_killed_holder_leaves_nothing_behind(tmp_path: Path) -> None:
     lock = ChannelLock("bus", tmp_path)
     with held_elsewhere("bus", tmp_path) as process:
         process.send_signal(signal.SIGKILL)
-        process.wait(10)
+        process.wait(60)
         lock.acquire()
     assert lock.held
     lock.release()

@@ -132,7 +132,8 @@ def test_an_emergency_of_either_drive_ends_the_run_and_is_that_drives(
 def test_lost_answers_are_counted_for_the_drive_that_lost_them(tmp_path: Path, place: int) -> None:
     with rig(tmp_path) as it:
         it.link.start()
-        now_ns = it.network.now_ns
+        # From one SYNC to the next: exactly one answer of each drive lies between them.
+        now_ns = it.network.now_ns // MS * MS
         it.network.inject(
             FrameFault(
                 kind=FrameFaultKind.WRONG_LENGTH,

@@ -17,6 +17,8 @@ from legbench.drives.setup.eds import dcf_text, eds_text
 
 canopen = pytest.importorskip("canopen")
 p402 = pytest.importorskip("canopen.profiles.p402")
+PATIENCE = 60.0
+"""Longest that anything may take on a busy machine [s]."""
 PER_RAD = (1 << 20) / (2.0 * math.pi)
 
 
@@ -58,6 +60,10 @@ class Pump:
 
 def node_of(pump: Pump, text: str, name: str) -> Any:
     class Node(p402.BaseNode402):
+        # These times are the machine's, not the bus's: they must outlast one that stands still.
+        TIMEOUT_RESET_FAULT = TIMEOUT_SWITCH_OP_MODE = PATIENCE
+        TIMEOUT_SWITCH_STATE_FINAL = TIMEOUT_SWITCH_STATE_SINGLE = PATIENCE
+
         def check_statusword(self, timeout: float | None = None) -> int:
             pump.cycle(self)
             return self.statusword

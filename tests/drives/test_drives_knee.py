@@ -44,6 +44,32 @@ def test_whatever_is_wished_the_knee_the_ranges_and_the_speed_are_kept(
             before = applied
 
 
+EXACT = st.tuples(st.integers(-15_000, 15_000), st.integers(-15_000, 15_000))
+
+
+@settings(derandomize=True, max_examples=1000)
+@given(last=EXACT, wish=EXACT, step=st.integers(1, 8000))
+def test_a_slewed_command_has_a_knee_between_the_last_and_the_wanted_one(
+    last: tuple[int, int], wish: tuple[int, int], step: int
+) -> None:
+    """In multiples of 2^-13 rad nothing is rounded: it is exactly so, and so within the range."""
+    unit, period = 2.0**-13, 2.0**-10
+    limits = SafetyLimits(
+        motor_range=((-1.125, 0.75), (-0.75, 1.125)),
+        motor_knee_range=(0.25, 2.0),
+        command_speed=step * unit / period,
+        waive=("command_speed",),
+    )
+    slewed, free = Guard(limits, period), Guard(replace(limits, command_speed=math.inf), period)
+    for guard in (slewed, free):
+        guard.start_at([unit * count for count in last])
+    applied, wanted = (guard.command([unit * count for count in wish]) for guard in (slewed, free))
+    knees = (unit * knee_of(last), knee_of(wanted))
+    assert min(knees) <= knee_of(applied) <= max(knees)
+    moved = [abs(new - unit * old) for new, old in zip(applied, last, strict=True)]
+    assert max(moved) <= step * unit
+
+
 @settings(derandomize=True, max_examples=300)
 @given(st.tuples(st.floats(*BOXES[0]), st.floats(*BOXES[1])))
 def test_a_projection_is_the_nearest_posture_that_the_knee_allows(

@@ -6,6 +6,7 @@ from pathlib import Path
 import can
 import pytest
 from drives_rig import LIMITS, MS, START, STIFFNESS, config, node, rig
+from file_log import FileLog
 
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.build import emulate
@@ -154,7 +155,7 @@ def test_the_same_run_gives_the_same_bytes(tmp_path: Path) -> None:
         log = tmp_path / f"{attempt}.log"
         network = emulate(config(), [Behaviour(start_pos=pos, seed=9) for pos in START])
         bus = LockstepBus("rig", network=network)
-        with BusLog(log, "can0") as lines:
+        with BusLog(FileLog(log), "can0") as lines:
             lock = ChannelLock("same", tmp_path)
             link = Link(bus, config(), LIMITS, stiffness=STIFFNESS, listener=lines, lock=lock)
             with link:

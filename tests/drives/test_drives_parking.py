@@ -7,6 +7,7 @@ import can
 import pytest
 from can_rig import Stage, experiment, stage
 from drives_rig import MS, rig
+from file_log import FileLog
 
 from legbench.control import JumpConfig
 from legbench.drives.emulated.bus import LockstepBus
@@ -15,6 +16,7 @@ from legbench.drives.master.parking import park
 from legbench.drives.master.port import Port
 from legbench.drives.protocol.cia402 import POWERED, DriveState
 from legbench.drives.protocol.frame import COB_INVALID
+from legbench.drives.transport.lock import ChannelLock
 from legbench.loop import run
 
 RPDO_1, SYNC, NMT_START = (0x1400, 1), 0x080, b"\x01"
@@ -25,7 +27,7 @@ LEAST = {0x000: 4, SYNC: 400, 0x201: 400, 0x202: 400, 0x77E: 40}
 def recorded(it: Stage, log: Path) -> list[can.Message]:
     """A run, its log from the NMT start to the last frame of `close`."""
     # Before the drives are configured, which no log may hold: it would undo what `close` does.
-    it.session.log_to(log)
+    it.session.log_to(FileLog(log))
     it.plant._lands = False
     assert run(it.plant, it.controller, 250).status == "complete"
     it.plant.close()
@@ -86,8 +88,8 @@ def test_parked_drives_are_configured_by_the_next_run(tmp_path: Path) -> None:
         for drive in it.network.drives:
             assert drive._values[RPDO_1] == COB_INVALID | (0x200 + drive.node_id)
             assert drive._pdos.rpdos == {}
-        again = type(it.link)(it.bus, it.config, stiffness=(1.0, 1.0))
-        again._lock = it.link._lock
+        lock = ChannelLock("rig", tmp_path)
+        again = type(it.link)(it.bus, it.config, stiffness=(1.0, 1.0), lock=lock)
         again.start()
         assert it.states == [DriveState.OPERATION_ENABLED] * 2
         again.close()

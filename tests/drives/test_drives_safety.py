@@ -11,7 +11,6 @@ from drives_rig import LIMITS, MS, START, Rig, config, rig
 
 from legbench.drives.emulated.faults import FrameFault, FrameFaultKind
 from legbench.drives.errors import BusError, DriveError
-from legbench.drives.master.bus_log import BusLog
 from legbench.drives.master.link import Link, LinkState
 from legbench.drives.master.port import Port
 from legbench.drives.master.sdo_port import SdoPort
@@ -520,11 +519,3 @@ def test_an_address_is_no_path_and_the_same_from_everywhere(
     first = ChannelLock.of_channel("slcan", where, tmp_path)
     monkeypatch.chdir(tmp_path)
     assert ChannelLock.of_channel("slcan", where, tmp_path).address == first.address
-
-
-def test_a_bus_log_may_be_closed_twice(tmp_path: Path) -> None:
-    log = BusLog(tmp_path / "bus.log", "can0")
-    log(can.Message(arbitration_id=0x80, is_extended_id=False))
-    log.close()
-    log.close()
-    assert log.error is None

@@ -150,7 +150,7 @@ def test_drives_in_fault_are_those_that_show_it() -> None:
 
 
 def enable(it: Drives) -> Tick:
-    return it.start_up().seek(Goal.ENABLED, it.axes, it.tick, "become enabled")
+    return it.start_up().enable(it.tick)
 
 
 def test_both_are_enabled_rung_by_rung_without_a_word_too_many() -> None:
@@ -160,6 +160,77 @@ def test_both_are_enabled_rung_by_rung_without_a_word_too_many() -> None:
     # Each word stands for two cycles; the start ends in the cycle that shows both enabled.
     assert it.done == [(0x06, 0x06)] * 2 + [(0x07, 0x07)] * 2 + [(0x0F, 0x0F)]
     assert all(axis.statusword == 0x1237 for axis in it.axes)
+
+
+@pytest.mark.parametrize("place", [0, 1])
+@pytest.mark.parametrize("status", [0x0231, 0x0240])
+def test_none_is_told_to_become_enabled_before_all_are_switched_on(place: int, status: int) -> None:
+    it = Drives()
+    it.stuck[place] = status
+    real = it.tick
+
+    def tick() -> Tick:
+        if it.ticks == 200:
+            it.stuck.clear()
+        return real()
+
+    it.tick = tick
+    enable(it)
+    waited = it.done[:200]
+    assert all(words[1 - place] in (0x06, 0x07) for words in waited)
+    assert waited[-1][1 - place] == 0x07
+    # Both get the word in the same cycle.
+    assert [words for words in it.done if 0x0F in words] == [(0x0F, 0x0F)]
+
+
+@pytest.mark.parametrize("place", [0, 1])
+@pytest.mark.parametrize(("cycles", "fails"), [(99, False), (100, True)])
+def test_one_may_be_enabled_100_ms_after_the_other_and_no_later(
+    place: int, cycles: int, fails: bool
+) -> None:
+    it = Drives()
+    real, alone = it.tick, 0
+
+    def tick() -> Tick:
+        nonlocal alone
+        if it.words[place] == 0x0F:
+            it.stuck = {place: 0x0233} if alone < cycles else {}
+            alone += 1
+        return real()
+
+    it.tick = tick
+    if not fails:
+        enable(it)
+        assert all(axis.statusword == 0x1237 for axis in it.axes)
+        return
+    with pytest.raises(PlantFault) as caught:
+        enable(it)
+    assert caught.value.cause == "drive not enabled"
+    assert alone == 100
+    assert str(caught.value) == (
+        f"drive '{NAMES[place]}' (node {place + 1}) is not enabled 100 ms after the other one: "
+        "0233h: switched on, voltage enabled, remote; the limit is enable_spread_ms in the bus "
+        "file; look at its brake, its supply and its error"
+    )
+
+
+def test_the_wait_for_the_slower_drive_is_a_time_whatever_the_period_is() -> None:
+    for period_us, ticks in ((500, 200), (2000, 50), (3000, 34)):
+        it = Drives()
+        it.bits[0] = FOLLOWS
+        real = it.tick
+
+        def tick(_it: Drives = it, _real: Any = real) -> Tick:
+            if _it.words[1] == 0x0F:
+                _it.stuck[1] = 0x0233
+            return _real()
+
+        bus = config(period_us=period_us, tpdo_deadline_us=period_us // 2)
+        up = StartUp(cast(Any, it), cast(Any, it), bus, read_only=False)
+        with pytest.raises(PlantFault, match="is not enabled 100 ms after the other one"):
+            up.enable(tick)
+        shown = [words for words in it.done if words == (0x0F, 0x0F)]
+        assert len(shown) == ticks
 
 
 @pytest.mark.parametrize("place", [0, 1])
@@ -254,7 +325,7 @@ def test_a_drive_that_is_limited_when_it_is_enabled_ends_it_at_once(place: int) 
     # On the way up the bit says nothing.
     it = Drives()
     it.stuck[place] = 0x0A33
-    with pytest.raises(DriveError, match="does not become enabled: 0A33h"):
+    with pytest.raises(PlantFault, match="is not enabled 100 ms after the other one: 0A33h"):
         enable(it)
 
 

@@ -11,6 +11,7 @@ from legbench.drives.emulated.faults import FrameFault, FrameFaultKind
 from legbench.drives.errors import DriveError
 from legbench.drives.master.link import LinkState
 from legbench.drives.protocol.cia402 import DriveState, Goal
+from legbench.errors import PlantFault
 
 OE, SOD = DriveState.OPERATION_ENABLED, DriveState.SWITCH_ON_DISABLED
 NAMES = ("hip", "knee")
@@ -29,16 +30,21 @@ def runs(it: Rig, node_id: int) -> list[tuple[int, int]]:
     return [(word, len(list(group))) for word, group in itertools.groupby(words)]
 
 
+def shown(it: Rig, node_id: int) -> list[int]:
+    """Low bytes of the statuswords that a drive has put on the wire, one a cycle."""
+    return [
+        frame.data[0] & 0x6F for _, frame in it.network.log or [] if frame.cob_id == 0x180 + node_id
+    ]
+
+
+ENABLED = 0x27
+
+
 @pytest.mark.parametrize(
     ("place", "deaf", "left"),
-    [
-        (0, 0x06, "switch on disabled"),
-        (1, 0x07, "ready to switch on"),
-        (0, 0x0F, "switched on"),
-        (1, 0x0F, "switched on"),
-    ],
+    [(0, 0x06, "switch on disabled"), (1, 0x07, "ready to switch on")],
 )
-def test_a_drive_that_does_not_go_on_is_named_with_the_state_it_is_stuck_in(
+def test_a_drive_that_does_not_switch_on_is_named_and_the_other_one_is_not_enabled(
     tmp_path: Path, place: int, deaf: int, left: str
 ) -> None:
     with rig(tmp_path, behaviours=pair(place, ignores=frozenset({deaf}))) as it:
@@ -47,10 +53,43 @@ def test_a_drive_that_does_not_go_on_is_named_with_the_state_it_is_stuck_in(
             it.link.start()
         # Two seconds of cycles, after the hundred in which process data settle.
         assert 2000 <= it.network.now_ns // MS - 150 <= 2250
-        # The other one has been enabled meanwhile, and is stopped with it.
         assert it.link.state is LinkState.STOPPED
-        assert OE not in it.states
-        assert max(word for word, _ in runs(it, 2 - place)) == 0x0F
+        assert it.states == [SOD, SOD]
+        for node_id in (1, 2):
+            assert ENABLED not in shown(it, node_id)
+            assert 0x0F not in [word for word, _ in runs(it, node_id)]
+
+
+@pytest.mark.parametrize("spread_ms", [None, 1, 20, 500])
+@pytest.mark.parametrize("place", [0, 1])
+def test_a_drive_is_never_enabled_alone_for_longer_than_the_bus_file_says(
+    tmp_path: Path, place: int, spread_ms: int | None
+) -> None:
+    """By default for 100 ms; both are stopped in the same cycle then, and the slow one is named."""
+    bus = config() if spread_ms is None else config(enable_spread_ms=spread_ms)
+    limit = spread_ms or 100
+    behaviours = pair(place, ignores=frozenset({0x0F}))
+    with rig(tmp_path, bus_config=bus, behaviours=behaviours) as it:
+        with pytest.raises(PlantFault) as caught:
+            it.link.start()
+        assert caught.value.cause == "drive not enabled"
+        assert str(caught.value).startswith(
+            f"drive '{NAMES[place]}' (node {place + 1}) is not enabled {limit} ms after the other "
+            "one: 0233h: switched on, voltage enabled"
+        )
+        assert it.states == [SOD, SOD]
+        assert ENABLED not in shown(it, place + 1)
+        # The cycles in which it was shown, and one or two for the quick stop to act.
+        alone = shown(it, 2 - place).count(ENABLED)
+        assert limit <= alone <= limit + 3
+        stops = {at for at, _, word in it.words() if word == 0x02}
+        first = min(stops)
+        assert {
+            node_id for at, node_id, word in it.words() if word == 0x02 and at < first + MS
+        } == {
+            1,
+            2,
+        }
 
 
 @pytest.mark.parametrize("lag_ms", [1, 4, 10])

@@ -20,7 +20,11 @@ class Leader(Lead):
     """Closes as a test says."""
 
     def __init__(self, stopped: StopReport | None, late: BaseException | None = None) -> None:
-        self.stopped, self.late, self.closed = stopped, late, 0
+        self._stopped, self.late, self.closed = stopped, late, 0
+
+    @property
+    def stopped(self) -> StopReport | None:
+        return self._stopped
 
     def close(self) -> None:
         self.closed += 1
@@ -91,7 +95,3 @@ def test_an_exception_on_its_way_or_out_of_closing_gets_the_trouble_once() -> No
     with pytest.raises(KeyboardInterrupt) as late, Leader(SILENT, KeyboardInterrupt()):
         pass
     assert late.value.__notes__ == [MUTE]
-
-
-def test_who_has_stopped_nothing_has_no_report() -> None:
-    assert Lead.stopped is None

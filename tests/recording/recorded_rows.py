@@ -58,6 +58,15 @@ def paced(parent: Path, *, realtime: bool) -> None:
         time.sleep(max(0.0, begin + row / RATE - time.monotonic()))
 
 
+def logged(parent: Path, *, realtime: bool) -> None:
+    """Write lines for ever, telling each after it was written, and no row."""
+    log = RunWriter.create(parent, {}, realtime=realtime).log("lines.log")
+    for number in range(10_000_000):
+        log.write(b"%d\n" % number)
+        os.write(1, b"%d\n" % number)
+        time.sleep(1e-4)
+
+
 def starved(parent: Path, *, realtime: bool) -> None:
     """Append until no file may grow any more, then close as a control loop would."""
     resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, resource.RLIM_INFINITY))
@@ -77,5 +86,5 @@ def until_full(writer: RunWriter) -> None:
 
 
 if __name__ == "__main__":
-    program = {"paced": paced, "starved": starved}[sys.argv[1]]
+    program = {"paced": paced, "starved": starved, "logged": logged}[sys.argv[1]]
     program(Path(sys.argv[2]), realtime=sys.argv[3] == "process")

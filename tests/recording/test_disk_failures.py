@@ -48,7 +48,7 @@ def check_starved(run: Path, appended: int, message: str) -> None:
 @pytest.mark.parametrize("kind", ["thread", "process"])
 def test_a_file_that_may_not_grow(tmp_path: Path, kind: str) -> None:
     command = [sys.executable, recorded_rows.__file__, "starved", str(tmp_path), kind]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=300)
     appended, message = done.stdout.splitlines()
     (run,) = tmp_path.iterdir()
     assert "File too large [EFBIG]" in message

@@ -104,7 +104,7 @@ def try_fault(
         opened.plant,
         RunWriter.create(out, {"plant": "can"} | opened.facts, name="trial") as writer,
     ):
-        opened.start_log(writer.path)
+        opened.start_log(writer)
         outcome = _viewed(trial, opened, chosen, writer, start_view)
         strike_ns = network.now_ns if trial.gone or trial.interrupted else STRIKE_NS
         ticks = outcome.cycles + opened.events()["bus"]["skipped_cycles"]

@@ -12,7 +12,7 @@ from legbench.drives.master.bring_up import BringUp
 from legbench.drives.master.sdo_port import SdoPort
 from legbench.drives.master.sdo_stop import SdoStop, leave_operational
 from legbench.drives.master.session import Session
-from legbench.drives.master.stop_report import Lead
+from legbench.drives.master.stop_report import Lead, StopReport
 from legbench.drives.protocol.cia402 import (
     DriveState,
     Goal,
@@ -149,9 +149,15 @@ class _Master(Lead):
         self._port, self._up, self._node = session.port(), up, node
         self._sdo = up.sdo(node)
         self._begun = self._closed = False
+        self._stopped: StopReport | None = None
         self._timebase = session.timebase
         self._beat = heartbeat_frame(session.config.master_id, NmtState.OPERATIONAL)
         self._rest_ns = min(LOOK_NS, 1_000_000 * session.config.master_heartbeat_ms // 2)
+
+    @property
+    def stopped(self) -> StopReport | None:
+        """Report of the stop of the drive; none if it was never started."""
+        return self._stopped
 
     def start(self) -> None:
         """Start the node; from this first heartbeat on the drive's watchdog runs (1016h)."""
@@ -208,10 +214,10 @@ class _Master(Lead):
         with shielded() as shield:
             port, nodes, hold = self._port, (self._node,), shield.hold
             stop = SdoStop(port, nodes, hold, beat=self._beat, rest_ns=self._rest_ns)
-            self.stopped = stop.run()
+            self._stopped = stop.run()
             order = self._up.pre_operational
-            again = leave_operational(order, port, nodes, self.stopped, hold)
-            self.stopped = again or self.stopped
+            again = leave_operational(order, port, nodes, self._stopped, hold)
+            self._stopped = again or self._stopped
             self._closed = True
 
     def command(self, controlword: int) -> None:

@@ -1,15 +1,18 @@
 """How punctual the cycle is: wake-up latency and exchange time, nothing enabled."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
 
 from legbench.drives.errors import DriveError
+from legbench.drives.master.bus_log import LOG_FAILED, BusLog
 from legbench.drives.master.link import Link, Sample
 from legbench.drives.master.session import Session
 from legbench.limits.safety import SafetyLimits
+from legbench.plants import BUS_LOG
 from legbench.recording.writer import RunWriter
 from legbench.signals import Command, Floats, Observation
 
@@ -64,7 +67,7 @@ def measure(
         session: of the bus.
         stiffness: of the series springs [N m/rad].
         cycles: how many.
-        writer: takes a row a cycle, as in a run; none measures without recording.
+        writer: takes a row a cycle and every frame, as in a run; none measures without recording.
 
     Raises:
         PlantFault: another master leads the drives, whose punctuality is not ours.
@@ -72,7 +75,12 @@ def measure(
         RecordingError: the recording failed.
     """
     session.bring_up().listen()
-    with session.link(SafetyLimits(), stiffness, read_only=True) as link:
+    with (
+        _bus_log(session, writer) as log,
+        session.link(SafetyLimits(), stiffness, read_only=True) as link,
+    ):
+        if log is not None:
+            link.tell(log)
         began_ns = link.start().time_ns
         if link.listening:
             raise DriveError(
@@ -80,6 +88,18 @@ def measure(
                 "end it, or run jitter on its computer"
             )
         return measure_link(session, link, cycles, writer, began_ns)
+
+
+@contextmanager
+def _bus_log(session: Session, writer: RunWriter | None) -> Iterator[BusLog | None]:
+    """Log of the frames of a measurement, as a run has one; one that failed is an event."""
+    if writer is None:
+        yield None
+        return
+    with BusLog(writer.log(BUS_LOG), session.channel) as log:
+        yield log
+    if log.error is not None:
+        writer.event(0.0, LOG_FAILED, error=log.error)
 
 
 def measure_link(

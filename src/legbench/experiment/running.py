@@ -180,7 +180,7 @@ def _begin(writer: RunWriter, ready: Prepared) -> None:
         (writer.path / "leg.xml").write_text(ready.xml, encoding="utf-8")
         for guest in guests_of(ready.experiment):
             (writer.path / guest.name).write_bytes(guest.content)
-        ready.opened.start_log(writer.path)
+        ready.opened.start_log(writer)
     except OSError as error:
         raise RecordingError(f"{writer.path}: {error}") from error
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import final
 
 from legbench.errors import PlantFault
-from legbench.limits.knee import along, knee_of, project
+from legbench.limits.knee import knee_of, project
 from legbench.limits.plausibility import LinkWatch, MotorWatch
 from legbench.limits.safety import START_TOLERANCE, UNLIMITED, SafetyLimits
 from legbench.limits.shortfall import Shortfall
@@ -69,14 +69,15 @@ class Guard:
         if knee is not None:
             knee = (min(knee[0], knee_of(last)), max(knee[1], knee_of(last)))
             wanted = project(wanted, knee, boxes)
+        # Both steps are cut at the same length, so they keep their order and come no farther apart:
+        # the knee of what is applied lies between that of the last command and that of the wanted
+        # one, and needs no look of its own.
         applied = tuple(
             [
                 min(max(value, before - step), before + step)
                 for value, before in zip(wanted, last, strict=True)
             ]
         )
-        if knee is not None and not knee[0] <= knee_of(applied) <= knee[1]:
-            applied = along(last, wanted, step)
         if applied != asked:
             self.shortfall.count(asked, wanted, applied)
         self.applied = applied

@@ -52,14 +52,3 @@ def project(wanted: Sequence[float], knee: Range, boxes: Sequence[Range]) -> tup
 def _nearest(knee: Range, excess: float) -> float:
     """End of the range that a position was short of (positive excess) or beyond."""
     return knee[0] if excess > 0.0 else knee[1]
-
-
-def along(last: Sequence[float], wanted: Sequence[float], step: float) -> tuple[float, float]:
-    """Go from `last` straight towards `wanted`, no position by more than `step` [rad].
-
-    Between two points that keep a knee range, the straight way keeps it as well.
-    """
-    farthest = max(abs(a - b) for a, b in zip(wanted, last, strict=True))
-    share = 1.0 if farthest <= step else step / farthest
-    first, second = (b + share * (a - b) for a, b in zip(wanted, last, strict=True))
-    return first, second

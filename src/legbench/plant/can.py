@@ -9,7 +9,7 @@ from legbench.drives.master.link import Link, LinkState, Sample
 from legbench.drives.master.session import Session
 from legbench.plant.abstract import AbstractPlant
 from legbench.plant.gone_drive import gone_drive
-from legbench.plant.landing import PATIENCE, STILL_RANGE, Landing, land
+from legbench.plant.landing import Landing, land
 from legbench.plant.start import Start
 from legbench.plant.velocity import VelocityEstimate
 from legbench.signals import Command, Floats, Observation
@@ -130,12 +130,7 @@ class CanPlant(AbstractPlant):
             period=self.period,
             interrupted=interrupted,
         )
-        if landing.rested or landing.interrupted:
-            return None
-        return (
-            f"the leg still swung by more than {STILL_RANGE:g} rad after {PATIENCE:g} s in its "
-            "rest posture; its power went then"
-        )
+        return landing.trouble
 
     def _lead(self, motor_pos: Sequence[float]) -> tuple[Sequence[float], Sequence[float]]:
         sample = self._exchange(np.array(motor_pos))

@@ -42,7 +42,7 @@ class CanChoice:
     """Safety limits, by default those of limits.toml beside the bus file [a limits file]."""
     end: End = End.REST
     """End of a run whose time is over: rest leads the leg to its start posture and waits until it
-    is still, for 10 s at most; stop is a quick stop at the last row, in mid-flight, too."""
+    is still, for 30 s at most; stop is a quick stop at the last row, in mid-flight, too."""
     faults: tuple[Fault, ...] = ()
     """Faults to inject into the emulated leg in this process, on its virtual time."""
 

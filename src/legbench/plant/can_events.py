@@ -3,6 +3,7 @@
 from dataclasses import asdict
 from typing import Any
 
+from legbench.drives.master.bus_log import LOG_FAILED
 from legbench.drives.master.stop_report import StopReport
 from legbench.plant.can import CanPlant
 
@@ -12,7 +13,7 @@ def bus_events(plant: CanPlant) -> dict[str, dict[str, Any]]:
     link, log = plant.link, plant.session.log
     events: dict[str, dict[str, Any]] = {}
     if log is not None and log.error is not None:
-        events["bus log not written"] = {"error": log.error}
+        events[LOG_FAILED] = {"error": log.error}
     if link.listener_error is not None:
         events["onlooker failed"] = {"who": "listener", "error": link.listener_error}
     if link.stopped is not None and link.stopped != StopReport():

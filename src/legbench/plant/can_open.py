@@ -92,7 +92,7 @@ def open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
         plant=plant,
         clock=CanClock(plant),
         facts=_facts(choice, config, limits, granted),
-        start_log=lambda run: session.log_to(run / BUS_LOG),
+        start_log=lambda writer: session.log_to(writer.log(BUS_LOG)),
         events=lambda: limits_events(waived, link.shortfall) | bus_events(plant),
         realtime=not session.virtual,
         gone=lambda: gone_drive(link),

@@ -2,8 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any, ClassVar, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
 
 from legbench.clock import AbstractClock, VirtualClock
 from legbench.design import LegDesign
@@ -11,6 +10,9 @@ from legbench.mjcf.options import BuildOptions
 from legbench.plant.abstract import AbstractPlant
 from legbench.plant.start import Start
 from legbench.servo import ServoConfig
+
+if TYPE_CHECKING:
+    from legbench.recording.writer import RunWriter
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,7 +25,7 @@ class Leg:
     servo: ServoConfig
 
 
-def _no_log(run: Path) -> None:
+def _no_log(writer: "RunWriter") -> None:
     """Most plants log nothing of their own."""
 
 
@@ -41,8 +43,8 @@ class OpenPlant:
     """What paces it if nobody asks for another pace."""
     facts: dict[str, Any] = field(default_factory=dict)
     """What a run has to say of it."""
-    start_log: Callable[[Path], None] = _no_log
-    """Begin to log into a run folder, such as raw frames."""
+    start_log: Callable[["RunWriter"], None] = _no_log
+    """Begin to log beside the rows of a run, such as raw frames, with `RunWriter.log`."""
     events: Callable[[], dict[str, dict[str, Any]]] = dict
     """What a run on it has to tell in the end, by name."""
     realtime: bool = False

@@ -5,7 +5,8 @@ a crash tore. A run folder holds
 
 - `run.json`, the manifest: what ran, on what, how it ended;
 - `samples.arrows` while the run is written, `samples.parquet` once it is closed;
-- `events.jsonl`, one line a rare event.
+- `events.jsonl`, one line a rare event;
+- logs of the plant, such as `bus.log`, that grow beside the rows.
 
 Importing this package costs nothing: pyarrow comes with the modules above.
 """

@@ -3,6 +3,8 @@
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
+from legbench.closing import Closing
+from legbench.recording.files import Appender
 from legbench.recording.rows import BATCH_ROWS, Block
 
 MAX_WAITING = 60_000 // BATCH_ROWS
@@ -22,6 +24,27 @@ class Kept:
     """First failure of the samples, after which no more rows are written."""
     events_error: Exception | None = None
     """First failure of the events; rows are written all the same."""
+
+
+class AbstractLog(Closing):
+    """Lines beside the rows of a run, such as raw frames, written where the rows are written.
+
+    A log whose disk fails, or is so slow that no more may wait for it, ends with its last whole
+    line; the run goes on.
+    """
+
+    @property
+    @abstractmethod
+    def error(self) -> str | None:
+        """Why the log ended before its run, None if it did not; final after `close`."""
+
+    @abstractmethod
+    def write(self, line: bytes) -> None:
+        """Take one whole line; never waits, never raises."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Wait until every line is written or lost; may be called twice, never raises."""
 
 
 class AbstractDisk(ABC):
@@ -45,6 +68,10 @@ class AbstractDisk(ABC):
     @abstractmethod
     def event(self, line: bytes) -> None:
         """Take one whole line for the events; never waits."""
+
+    @abstractmethod
+    def log(self, file: Appender) -> AbstractLog:
+        """Begin a log in a file, which is the log's from now on; raises OSError."""
 
     @abstractmethod
     def finish(self) -> None:

@@ -7,13 +7,15 @@ processor; it records through `process_disk.ProcessDisk`.
 
 import threading
 from collections import deque
+from collections.abc import Callable
 from queue import SimpleQueue
 from typing import Final, final
 
 import pyarrow as pa
 
-from legbench.recording.abstract_disk import MAX_WAITING, AbstractDisk
+from legbench.recording.abstract_disk import MAX_WAITING, AbstractDisk, AbstractLog
 from legbench.recording.files import Appender
+from legbench.recording.logs import ThreadLog
 from legbench.recording.rows import ONE_LEG_ROWS, Block, RowLayout
 from legbench.recording.store import Store
 from legbench.recording.stream import encode_schema
@@ -24,7 +26,7 @@ POOL: Final = 20
 
 @final
 class Disk(AbstractDisk):
-    """Writes the blocks and events of one run in a thread of its own.
+    """Writes the blocks, events and logs of one run in a thread of its own.
 
     One thread hands over, one other writes, and each counter has one writer: no locks.
     """
@@ -35,7 +37,7 @@ class Disk(AbstractDisk):
         """Write the opening of the stream and start the thread; raises OSError."""
         self._samples, self._events = samples, events
         self._rows = rows
-        self._queue: SimpleQueue[Block | bytes | None] = SimpleQueue()
+        self._queue: SimpleQueue[Block | bytes | Callable[[], None] | None] = SimpleQueue()
         self._spare: deque[Block] = deque(Block(rows) for _ in range(POOL))
         self._handed = self._returned = 0
         self._ended = False
@@ -60,6 +62,10 @@ class Disk(AbstractDisk):
         """Take one whole line for the events; never waits."""
         self._queue.put(line)
 
+    def log(self, file: Appender) -> AbstractLog:
+        """Begin a log in a file, which is the log's from now on."""
+        return ThreadLog(self._store.log(file), self._queue.put, self._thread)
+
     def finish(self) -> None:
         """Write what waits and the end mark, then end the thread."""
         self._queue.put(None)
@@ -76,9 +82,11 @@ class Disk(AbstractDisk):
         while (item := self._queue.get()) is not None:
             if isinstance(item, bytes):
                 self._store.event(item)
-            else:
+            elif isinstance(item, Block):
                 self._store.write(item.columns())
                 self._recycle(item)
+            else:
+                item()
         self._store.finish()
         self._ended = True
 

@@ -7,15 +7,35 @@ writes what is still in the queue, without an end mark, and ends.
 
 import os
 import socket
+import struct
 import sys
 from collections.abc import Iterator
+from contextlib import ExitStack
+from typing import Final
 
 import numpy as np
 import pyarrow as pa
 
 from legbench.recording.files import Appender
-from legbench.recording.process_disk import END, EVENT, REPORT, ROWS, UNKNOWN, longest_packet
+from legbench.recording.log_file import RingDrain
+from legbench.recording.process_disk import (
+    END,
+    EVENT,
+    LOG,
+    LOG_END,
+    REPORT,
+    ROWS,
+    UNKNOWN,
+    longest_packet,
+)
+from legbench.recording.ring import Ring
 from legbench.recording.store import Store
+
+NOTHING: Final = b""
+"""A packet that has not come, within `LOOK_EVERY`."""
+LOOK_EVERY: Final = struct.pack("ll", 0, 100_000)
+"""Time after which logs are looked at though no packet has come, as before the first row: 0.1 s
+as a `timeval` of the system's."""
 
 
 def main(arguments: list[str]) -> int:
@@ -36,36 +56,55 @@ def main(arguments: list[str]) -> int:
 
 def _serve(master: socket.socket, store: Store, columns: int, longest: int) -> bool:
     """Write packet by packet; whether the run has ended, rather than its process."""
-    line = b""
-    for packet in _packets(master, longest):
-        kind, content = packet[:1], packet[1:]
-        if kind == END:
-            return True
-        if kind == ROWS:
-            store.write(np.frombuffer(content).reshape(columns, -1))
-        elif kind == EVENT:
-            line += content
-            if line.endswith(b"\n"):
-                store.event(line)
-                line = b""
-        try:
-            master.send(_report(store, ended=False), socket.MSG_DONTWAIT)
-        except OSError:
-            # Nobody reads reports now, or ever again; packets may still be there.
-            continue
+    line, logs = b"", list[RingDrain]()
+    with ExitStack() as closing:
+        for packet, descriptors in _packets(master, longest):
+            kind, content = packet[:1], packet[1:]
+            for log in logs:
+                log.drain(everything=kind != NOTHING)
+            if kind == END:
+                return True
+            if kind == ROWS:
+                store.write(np.frombuffer(content).reshape(columns, -1))
+            elif kind == EVENT:
+                line += content
+                if line.endswith(b"\n"):
+                    store.event(line)
+                    line = b""
+            elif kind == LOG:
+                ring, file = descriptors
+                logs.append(RingDrain(Ring(ring), store.log(_grown(file))))
+                closing.callback(logs[-1].close)
+                master.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, LOOK_EVERY)
+            elif kind == LOG_END:
+                logs[content[0]].close()
+            if kind == NOTHING:
+                continue
+            try:
+                # Whoever ends a log waits for the report that it is closed.
+                master.send(
+                    _report(store, ended=False), 0 if kind == LOG_END else socket.MSG_DONTWAIT
+                )
+            except OSError:
+                # Nobody reads reports now, or ever again; packets may still be there.
+                continue
     return False
 
 
-def _packets(master: socket.socket, longest: int) -> Iterator[bytes]:
+def _packets(master: socket.socket, longest: int) -> Iterator[tuple[bytes, list[int]]]:
+    """Packets with the descriptors that came with them; an empty one when none came for a while."""
     while True:
         try:
-            packet = master.recv(longest)
+            packet, descriptors, _, _ = socket.recv_fds(master, longest, 2)
+        except BlockingIOError:
+            yield NOTHING, []
+            continue
         except ConnectionResetError:
             # Told once, when the other end has gone with unread reports; the queue comes after it.
             continue
         if not packet:
             return
-        yield packet
+        yield packet, list(descriptors)
 
 
 def _grown(descriptor: int) -> Appender:

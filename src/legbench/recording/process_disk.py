@@ -2,7 +2,8 @@
 
 A thread would hold the interpreter's lock when the loop wants it, and lose the processor while
 it does. Blocks go as packets over a socket whose queue is the kernel's: handing one over is one
-system call, and what is in the queue is written even if the loop's process is killed.
+system call, and what is in the queue is written even if the loop's process is killed. Lines of a
+log, which come five a cycle, go through memory that both share.
 """
 
 import os
@@ -11,18 +12,24 @@ import struct
 import subprocess
 import sys
 from collections import deque
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Final, final
 
 import pyarrow as pa
 
-from legbench.recording.abstract_disk import MAX_WAITING, AbstractDisk, Kept
+from legbench.recording.abstract_disk import MAX_WAITING, AbstractDisk, AbstractLog, Kept
 from legbench.recording.files import Appender
+from legbench.recording.logs import RingLog
+from legbench.recording.ring import Ring
 from legbench.recording.rows import BATCH_ROWS, ONE_LEG_ROWS, Block, RowLayout
 from legbench.recording.stream import encode_schema
 
 ROWS, EVENT, END = b"R", b"E", b"F"
 """First byte of a packet: rows of a block, (part of) a line of events, the end of the run."""
+LOG, LOG_END = b"L", b"C"
+"""First byte of a packet: a new log, with its memory and its file; the end of a log, its number."""
 QUEUE: Final = 1 << 20
 """Asked for in the kernel [bytes]; it grants what `net.core.wmem_max` allows, about a second."""
 REPORT: Final = struct.Struct("<qddii?")
@@ -49,6 +56,7 @@ class ProcessDisk(AbstractDisk):
         self.kept = Kept()
         self._samples, self._events = samples, events
         self._waiting: deque[bytes] = deque()
+        self._logs = 0
         self._ended = False
         samples.append(encode_schema(schema))
         self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -81,17 +89,35 @@ class ProcessDisk(AbstractDisk):
         for begin in range(0, len(line), size):
             self._send(EVENT + line[begin : begin + size])
 
+    def log(self, file: Appender) -> AbstractLog:
+        """Begin a log in a file, which is the process's from now on; raises OSError."""
+        ring = Ring.create()
+        try:
+            self._socket.setblocking(True)
+            while self._waiting:
+                self._socket.send(self._waiting.popleft())
+            socket.send_fds(self._socket, [LOG], [ring.fd, file.fd])
+        except OSError:
+            ring.close()
+            raise
+        finally:
+            self._socket.setblocking(False)
+            file.close()
+        self._logs += 1
+        return RingLog(ring, partial(self._end_log, self._logs - 1, ring))
+
+    def _end_log(self, number: int, ring: Ring) -> None:
+        """Have a log written and closed; returns when it is, or when nobody writes any more."""
+        if self._socket.fileno() < 0:
+            return
+        try:
+            self._settle(LOG_END + bytes([number]), lambda: ring.closed)
+        finally:
+            self._socket.setblocking(False)
+
     def finish(self) -> None:
         """Have everything written and the end mark, wait for the process to end."""
-        self._socket.setblocking(True)
-        try:
-            for packet in (*self._waiting, END):
-                self._socket.send(packet)
-            while report := self._socket.recv(REPORT.size):
-                self._take(report)
-        except OSError as error:
-            self._lose(error)
-        self._waiting.clear()
+        self._settle(END, lambda: self._ended)
         status = self._process.wait()
         if not self._ended:
             self._lose(RuntimeError(f"the recording process ended early, with status {status}"))
@@ -101,6 +127,22 @@ class ProcessDisk(AbstractDisk):
         self._socket.close()
         self._samples.close()
         self._events.close()
+
+    def _settle(self, packet: bytes, done: Callable[[], bool]) -> None:
+        """Send what waits and a packet, wait until a report says that it is done."""
+        self._socket.setblocking(True)
+        self._waiting.append(packet)
+        try:
+            while self._waiting:
+                self._socket.send(self._waiting.popleft())
+            while not done():
+                report = self._socket.recv(REPORT.size)
+                if not report:
+                    break
+                self._take(report)
+        except OSError as error:
+            self._lose(error)
+        self._waiting.clear()
 
     def _send(self, packet: bytes) -> None:
         """Send what waits, oldest first, as far as the kernel's queue takes it."""

@@ -1,4 +1,4 @@
-"""The files that a run grows by: batches of rows and lines of events, synced once a second."""
+"""The files that a run grows by, synced once a second: rows, lines of events, and logs."""
 
 import time
 from typing import Final, final
@@ -8,6 +8,7 @@ import pyarrow as pa
 
 from legbench.recording.abstract_disk import Kept
 from legbench.recording.files import Appender
+from legbench.recording.log_file import LogFile
 from legbench.recording.rows import BATCH_ROWS
 from legbench.recording.stream import END_MARK, BatchEncoder
 from legbench.signals import Floats
@@ -28,6 +29,7 @@ class Store:
         """Prepare for rows of `schema_for`; the opening of the stream has been written."""
         self.kept = Kept()
         self._samples, self._events, self._schema = samples, events, schema
+        self._logs: list[LogFile] = []
         self._synced = time.monotonic()
         # The first call is slow: not while rows wait.
         nothing = np.zeros((len(schema), BATCH_ROWS))
@@ -63,6 +65,12 @@ class Store:
             self.kept.events_error = self.kept.events_error or error
         self._sync(every=SYNC_EVERY)
 
+    def log(self, file: Appender) -> LogFile:
+        """Begin a log in a file, which is synced with the others from now on."""
+        log = LogFile(file)
+        self._logs.append(log)
+        return log
+
     def finish(self, *, end: bool = True) -> None:
         """Write the end mark, unless the run was cut off, and wait for the disk."""
         try:
@@ -85,3 +93,5 @@ class Store:
             self._events.sync()
         except OSError as error:
             self.kept.events_error = self.kept.events_error or error
+        for log in self._logs:
+            log.sync()

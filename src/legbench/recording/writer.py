@@ -11,7 +11,7 @@ from typing import Any, Self, final
 
 from legbench.errors import ConfigError, PlantFault, RecordingError
 from legbench.interrupts import shielded
-from legbench.recording.abstract_disk import AbstractDisk
+from legbench.recording.abstract_disk import AbstractDisk, AbstractLog
 from legbench.recording.archive import write_archive
 from legbench.recording.description import layout_of
 from legbench.recording.disk import Disk
@@ -130,6 +130,22 @@ class RunWriter:
         if self._closed:
             raise self._refusal()
         self._disk.event(encode_event(time, name, detail))
+
+    def log(self, name: str) -> AbstractLog:
+        """Begin a log of lines beside the rows, such as raw frames, in the file `name`.
+
+        Writing to it never waits: lines go the way of the rows, and with a process for them every
+        line that was written is kept even if this process dies. Close it before the run.
+
+        Raises:
+            RecordingError: there can be no such file, or the run is closed.
+        """
+        if self._closed:
+            raise self._refusal()
+        try:
+            return self._disk.log(append_to(self.path / name))
+        except OSError as error:
+            raise RecordingError(f"{self.path / name}: {reason(error)}") from error
 
     def close(self, status: str = COMPLETE, cause: str | None = None) -> None:
         """End the run: write what waits, make the archive, say in `run.json` how it ended.

@@ -1,66 +1,45 @@
-"""Raw frames in candump's log format, written beside the telemetry."""
+"""Raw frames in candump's log format, beside the telemetry."""
 
-from pathlib import Path
 from typing import final
 
 import can
 
 from legbench.closing import Closing
-from legbench.drives.errors import BusError
+from legbench.recording.abstract_disk import AbstractLog
 
-FLUSH_FRAMES = 500
-"""Number of frames between two flushes of the log: about 100 ms of a busy bus."""
+LOG_FAILED = "bus log not written"
+"""Event of a run whose log ends before it does."""
 
 
 @final
 class BusLog(Closing):
-    """A listener for `Port` that appends lines such as `(0.001055) can0 080#`.
+    """A listener for `Port` that writes lines such as `(0.001055) can0 080#` to a log of the run.
 
-    `canplayer`, `cansniffer` and python-can's `CanutilsLogReader` read it. A disk that fails ends
-    the log, never the cycle; `error` then says why.
+    `canplayer`, `cansniffer` and python-can's `CanutilsLogReader` read it. Its disk neither holds
+    up a cycle nor ends one: where it fails, the log ends, and `error` says why.
     """
 
-    def __init__(self, path: Path, channel: str) -> None:
-        """Create the log.
-
-        Raises:
-            BusError: it cannot be written.
-        """
+    def __init__(self, log: AbstractLog, channel: str) -> None:
+        """Begin; the log is closed with this one."""
         self._channel = "".join(letter for letter in channel if letter.isalnum()) or "can"
-        self.error: str | None = None
-        self._lines: list[str] = []
-        try:
-            self._file = path.open("x", encoding="ascii")
-        except OSError as error:
-            raise BusError(f"{path}: cannot write a bus log: {error.strerror}") from None
+        self._log, self._write = log, log.write
+
+    @property
+    def error(self) -> str | None:
+        """Why frames are missing at the end of the log, None if none are."""
+        return self._log.error
 
     def __call__(self, message: can.Message) -> None:
         """Add one frame to the log."""
         if message.is_error_frame:
             name = f"{0x20000000 | message.arbitration_id:08X}"
+        elif message.is_extended_id:
+            name = f"{message.arbitration_id:08X}"
         else:
-            width = 8 if message.is_extended_id else 3
-            name = f"{message.arbitration_id:0{width}X}"
+            name = f"{message.arbitration_id:03X}"
         data = "R" if message.is_remote_frame else message.data.hex().upper()
-        self._lines.append(f"({message.timestamp:.6f}) {self._channel} {name}#{data}\n")
-        if len(self._lines) >= FLUSH_FRAMES:
-            self._flush()
-
-    def _flush(self) -> None:
-        lines, self._lines = self._lines, []
-        if self.error is None:
-            try:
-                self._file.writelines(lines)
-                self._file.flush()
-            except OSError as error:
-                self.error = error.strerror or str(error)
+        self._write(f"({message.timestamp:.6f}) {self._channel} {name}#{data}\n".encode())
 
     def close(self) -> None:
-        """Write what waits; may be called twice, never raises."""
-        if self._file.closed:
-            return
-        self._flush()
-        try:
-            self._file.close()
-        except OSError as error:
-            self.error = self.error or error.strerror
+        """Wait until every frame is written or lost; may be called twice, never raises."""
+        self._log.close()

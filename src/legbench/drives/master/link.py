@@ -18,13 +18,17 @@ from typing import final
 import can
 
 from legbench.drives.errors import DriveError
+from legbench.drives.master.enabling import enable
+from legbench.drives.master.ending import Ending, StopOnError
+from legbench.drives.master.limited_motion import LimitedMotion
+from legbench.drives.master.link_parts import LinkParts
 from legbench.drives.master.link_state import LinkState
 from legbench.drives.master.move import missed, move
 from legbench.drives.master.opening import Opening
 from legbench.drives.master.port import Listener, Port
-from legbench.drives.master.sample import Sample, sample_of
-from legbench.drives.master.tick import Tick
-from legbench.drives.protocol.cia402 import Goal
+from legbench.drives.master.sample import Sample
+from legbench.drives.master.stop_report import Lead, StopReport
+from legbench.drives.master.ticks import Ticks
 from legbench.drives.setup.config import BusConfig, check_start_speed
 from legbench.drives.setup.wire import check_load
 from legbench.drives.transport.lock import ChannelLock
@@ -37,16 +41,12 @@ from legbench.limits.shortfall import Shortfall
 
 
 @final
-class Link(Opening):
+class Link(Lead):
     """Cyclic link of one master to its drives over a bus.
 
     Attributes:
-        state: state of the link.
-        fault: first fault, which ended the link.
-        stopped: report of the stop of the drives, none before it.
-        skipped_total: ticks without SYNC since the start.
-        not_parked: command frames that `close` failed to switch off, see `master.parking`.
-        listening: read-only, and another master sends SYNC: this one sends nothing.
+        cycle: exchange of process data with the drives.
+        bring_up: SDO access to the drives.
     """
 
     def __init__(
@@ -77,14 +77,74 @@ class Link(Opening):
             ConfigError: the bus cannot carry the schedule.
         """
         check_load(config)
-        port = Port(bus, timebase or timebase_of(bus), listener)
-        lock = lock or ChannelLock(str(bus.channel_info))
-        super().__init__(port, config, limits or SafetyLimits(), lock, read_only=read_only)
-        self._stiffness = tuple(float(value) for value in stiffness)
-        self._guard = Guard(self._limits, config.period)
-        self.skipped_total = 0
-        self._last = Tick(0, 0, 0, 0, False)
-        self._expected: list[tuple[float, ...]] = []
+        self._port = Port(bus, timebase or timebase_of(bus), listener)
+        parts = LinkParts.wired(
+            self._port,
+            config,
+            limits or SafetyLimits(),
+            lock or ChannelLock(str(bus.channel_info)),
+            read_only=read_only,
+        )
+        self._parts, self._config, self._status = parts, config, parts.status
+        self.cycle, self.bring_up = parts.cycle, parts.bring_up
+        self._supervisor, self._start_up = parts.supervisor, parts.start_up
+        self._opening, self._ending = Opening(parts), Ending(parts)
+        self._stop_on_error = StopOnError(self._ending)
+        self._ticks = Ticks(parts)
+        self._guard = Guard(parts.limits, config.period)
+        self._motion = LimitedMotion(parts.cycle, self._guard, stiffness)
+
+    # --- what has become of it ---------------------------------------------------------------
+
+    @property
+    def state(self) -> LinkState:
+        """State of the link."""
+        return self._status.state
+
+    @property
+    def fault(self) -> PlantFault | None:
+        """First fault, which ended the link; none so far."""
+        return self._status.fault
+
+    @property
+    def stopped(self) -> StopReport | None:
+        """Report of the stop of the drives, none before it."""
+        return self._status.stopped
+
+    @property
+    def not_parked(self) -> list[str]:
+        """Command frames that `close` failed to switch off, see `master.parking`."""
+        return self._status.not_parked
+
+    @property
+    def listening(self) -> bool:
+        """Whether this link is read-only and another master sends SYNC: this one sends nothing."""
+        return self._status.listening
+
+    @property
+    def skipped_total(self) -> int:
+        """Number of ticks without SYNC since the start."""
+        return self._ticks.skipped_total
+
+    @property
+    def listener_error(self) -> str | None:
+        """Error that a listener raised, in one line; the listener is not called again."""
+        return self._port.listener_error
+
+    @property
+    def shortfall(self) -> Shortfall:
+        """Counts of the commands that the limits changed before they were applied."""
+        return self._guard.shortfall
+
+    # --- begin and end -----------------------------------------------------------------------
+
+    def tell(self, listener: Listener) -> None:
+        """Show every frame to a listener from now on, or from when the drives are configured."""
+        self._opening.show_frames_to(listener)
+
+    def open(self) -> None:
+        """Take the channel, check and configure the drives; raises as `Opening.run`."""
+        self._opening.run()
 
     def start(self, *, clear_faults: bool = False) -> Sample:
         """Open if need be, let process data settle, enable all drives where they stand.
@@ -101,42 +161,32 @@ class Link(Opening):
             raise DriveError(
                 f"a link that is {self.state.name.lower()} cannot start; make a new one"
             )
-        if not self._read_only and self.cycle.led_by_another():
+        parts, ticks = self._parts, self._ticks
+        if not parts.read_only and self.cycle.led_by_another():
             self._supervisor.alone()  # A master that has come since `open` keeps the drives.
-        self.state = LinkState.CYCLIC
-        try:
-            self._start_up.settle(self._settling_tick)
-            if not self._read_only:
-                self._enable(clear_faults=clear_faults)
-        except PlantFault as error:
-            self._end(error)
-            raise
-        except BaseException:
-            self.stop()
-            raise
-        return self._sample()
+        self._status.state = LinkState.CYCLIC
+        with self._stop_on_error:
+            self._start_up.settle(ticks.settling)
+            if not parts.read_only:
+                enable(parts, ticks, self._motion, self._guard, clear_faults=clear_faults)
+        return self._motion.sample(ticks.last)
 
-    def _enable(self, *, clear_faults: bool) -> None:
-        up = self._start_up
-        self._leads = True
-        if clear_faults:
-            words = "leave its fault, whose cause still stands"
-            up.seek(Goal.FAULT_RESET, up.faulted(), self._watched_tick, words)
-        for axis in up.faulted():
-            text = self.bring_up.error_text(axis.node)
-            raise DriveError(
-                f"drive '{axis.node.name}' (node {axis.node.node_id}) is in fault: {text}; remove "
-                "the cause, then start with a fault reset"
-            )
-        sample = self._sample()
-        self._check(sample)
-        self._guard.check_start(sample.motor_pos)
-        up.seek(Goal.ENABLED, self.cycle.axes, self._watched_tick, "become enabled")
-        # The guard begins from the targets that the drives hold, not from their encoders.
-        held = tuple(axis.target_pos for axis in self.cycle.axes)
-        self._guard.start_at(held)
-        self._expected = [held] * 2
-        self.state = LinkState.RUNNING
+    def stop(self) -> None:
+        """Quick stop of all drives in this cycle, then no power, then a look whether it is gone.
+
+        Raises no error; `stopped` tells how it has ended. No signal gets in between: a ^C that
+        comes meanwhile is raised at the end. While the stop is not verified, calling it again
+        repeats it. Drives that another master took before this one led them are left to it.
+        """
+        self._ending.stop()
+
+    def close(self) -> None:
+        """Stop, leave the drives parked in pre-operational, release the channel; raises no error.
+
+        A second call does nothing. A stop that is not verified is repeated, in the end over SDO. A
+        link that only looks leaves the drives of another master alone.
+        """
+        self._ending.close()
 
     # --- the cycle ---------------------------------------------------------------------------
 
@@ -147,22 +197,15 @@ class Link(Opening):
             PlantFault: a watchdog or a limit; all drives have been stopped by then.
         """
         self._refuse_ended()
-        try:
-            if self.state is LinkState.CYCLIC:
-                self._watched_tick()
+        with self._stop_on_error:
+            tick = self._ticks.watched()
+            if self._status.state is LinkState.CYCLIC:
                 self._start_up.idle()
-                return self._sample()
-            self._watched_tick()
+                return self._motion.sample(tick)
             self._supervisor.states()
-            self.cycle.notices.statuswords(self.cycle.axes, self._last.time_ns)
-            sample = self._sample()
-            self._check(sample)
-        except PlantFault as error:
-            self._end(error)
-            raise
-        except BaseException:
-            self.stop()
-            raise
+            self.cycle.notices.statuswords(self.cycle.axes, tick.time_ns)
+            sample = self._motion.sample(tick)
+            self._motion.check(sample)
         return sample
 
     def look(self) -> Sample:
@@ -175,18 +218,12 @@ class Link(Opening):
             DriveError: the link is not read-only, or not started.
         """
         self._refuse_ended()
-        if not self._read_only:
+        if not self._parts.read_only:
             raise DriveError("this link may lead drives; limits have to watch it: use exchange")
-        try:
-            self._settling_tick()
+        with self._stop_on_error:
+            tick = self._ticks.settling()
             self._start_up.idle()
-        except PlantFault as error:
-            self._end(error)
-            raise
-        except BaseException:
-            self.stop()
-            raise
-        return self._sample()
+        return self._motion.sample(tick)
 
     def command(self, motor_pos: Sequence[float]) -> tuple[float, ...]:
         """Send a command for the coming period; what of it was applied [rad].
@@ -196,35 +233,19 @@ class Link(Opening):
             DriveError: the drives are not enabled.
         """
         self._refuse_ended()
-        if self.state is not LinkState.RUNNING:
+        if self._status.state is not LinkState.RUNNING:
             raise DriveError(
-                "this link is read-only" if self._read_only else "the drives are not enabled"
+                "this link is read-only" if self._parts.read_only else "the drives are not enabled"
             )
-        try:
-            applied = self._guard.command(motor_pos)
-            words = []
-            for axis, target in zip(self.cycle.axes, applied, strict=True):
-                axis.aim(target)
-                words.append(axis.machine.controlword)
-            self._expected = [self._expected[-1], applied]
+        with self._stop_on_error:
+            applied, words = self._motion.aim(motor_pos)
             self._supervisor.sent(complete=self.cycle.send(words))
-        except PlantFault as error:
-            self._end(error)
-            raise
-        except BaseException:
-            self.stop()
-            raise
         return applied
 
     def forget_wish(self) -> tuple[float, ...]:
         """Measure the next step of the command from what was applied last; returns that [rad]."""
         self._guard.forget_wish()
         return self._guard.applied
-
-    @property
-    def shortfall(self) -> Shortfall:
-        """Counts of the commands that the limits changed before they were applied."""
-        return self._guard.shortfall
 
     def move_to(self, motor_pos: Sequence[float], speed: float | None = None) -> Sample:
         """Go to a posture at a speed [rad/s], `start_speed` of the bus file by default.
@@ -241,42 +262,13 @@ class Link(Opening):
         sample = move(self, self._guard, wanted, pace * self._config.period)
         error = missed(self._guard, wanted)
         if error is not None:
-            self._end(error)
+            self._ending.end(error)
             raise error
         return sample
 
-    def _tick(self) -> Tick:
-        self._last = tick = self.cycle.follow() if self.listening else self.cycle.tick()
-        self.skipped_total += tick.skipped
-        return tick
-
-    def _settling_tick(self) -> Tick:
-        tick = self._tick()
-        self._supervisor.alone()
-        return tick
-
-    def _watched_tick(self) -> Tick:
-        tick = self._tick()
-        self._supervisor.bus(tick)
-        self._supervisor.drives()
-        return tick
-
-    def _sample(self) -> Sample:
-        return sample_of(self.cycle, self._last, self._stiffness, self._guard.applied)
-
-    def _check(self, sample: Sample) -> None:
-        self._guard.check(
-            motor_pos=sample.motor_pos,
-            joint_pos=sample.link_pos,
-            spring_torque=sample.spring_torque,
-            expected_pos=self._expected[0] if self._expected else None,
-            temperature=sample.temperature,
-            fresh=sample.fresh,
-            elapsed=1 + sample.skipped,
-        )
-
     def _refuse_ended(self) -> None:
-        if self.fault is not None:
-            raise self.fault
-        if self.state not in (LinkState.CYCLIC, LinkState.RUNNING):
-            raise DriveError(f"the link is {self.state.name.lower()}; start it first")
+        status = self._status
+        if status.fault is not None:
+            raise status.fault
+        if status.state not in (LinkState.CYCLIC, LinkState.RUNNING):
+            raise DriveError(f"the link is {status.state.name.lower()}; start it first")

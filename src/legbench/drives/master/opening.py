@@ -1,67 +1,41 @@
 """The opening of a link: the channel is taken, the drives are checked and configured."""
 
-from legbench.drives.master.ending import Ending
+from typing import final
+
+from legbench.drives.master.link_parts import LinkParts
 from legbench.drives.master.link_state import LinkState
-from legbench.drives.master.port import Listener, Port
+from legbench.drives.master.port import Listener
 from legbench.drives.master.preparation import prepare_to_move, read_temperatures, refuse_led
 from legbench.drives.master.read_only import may_pace, may_read
-from legbench.drives.master.start_up import StartUp
-from legbench.drives.master.supervisor import Supervisor
-from legbench.drives.setup.config import BusConfig
 from legbench.drives.setup.master_watch import check_master_watch
-from legbench.drives.transport.lock import ChannelLock
-from legbench.limits.safety import SafetyLimits
 
 LISTEN_NS = 100_000_000
 """Time that a read-only link listens for another master's SYNC and for heartbeats [ns]."""
 
 
-class Opening(Ending):
-    """Base class of a link: what it does before process data begins and before anything moves."""
+@final
+class Opening:
+    """Opening of a link: its work before process data begins and before anything moves."""
 
-    def __init__(
-        self,
-        port: Port,
-        config: BusConfig,
-        limits: SafetyLimits,
-        lock: ChannelLock,
-        *,
-        read_only: bool,
-    ) -> None:
-        """Wire the parts; nothing is sent.
+    def __init__(self, parts: LinkParts) -> None:
+        """Prepare to open a link with these parts; nothing is sent."""
+        self._parts = parts
+        self._waiting: Listener | None = None
 
-        Args:
-            port: port of the bus.
-            config: drives on the bus.
-            limits: limits that the link enforces.
-            lock: lock that `open` takes.
-            read_only: observe; change nothing in a drive, see `master.read_only`.
-        """
-        super().__init__(port, config, lock, read_only=read_only)
-        self._limits = limits
-        self._supervisor = Supervisor(self.cycle, config, limits, port.timebase)
-        self._start_up = StartUp(port, self.cycle, config, read_only=read_only)
-        self._told: Listener | None = None
-
-    def tell(self, listener: Listener) -> None:
+    def show_frames_to(self, listener: Listener) -> None:
         """Show every frame to a listener from now on, or from when the drives are configured.
 
         A log that holds their configuration would, played back, bring parked drives back to life.
         """
-        self._told = listener
-        if self.state is not LinkState.NEW:
-            self._port.listener = listener
+        self._waiting = listener
+        if self._parts.status.state is not LinkState.NEW:
+            self._parts.port.listener = listener
 
-    @property
-    def listener_error(self) -> str | None:
-        """Error that a listener raised, in one line; the listener is not called again."""
-        return self._port.listener_error
-
-    def open(self) -> None:
+    def run(self) -> None:
         """Take the channel, check who is there, write and read back the configuration.
 
         In read-only nothing is written, and the channel is taken only if SYNC has to come from
-        here.
+        here. A link that is open already is left as it is.
 
         Raises:
             ConfigError: a drive would go on for too long without its master.
@@ -70,22 +44,23 @@ class Opening(Ending):
                 read-only, is not configured.
             PlantFault: in read-only, somebody else is about to lead the drives.
         """
-        if self.state is not LinkState.NEW:
+        parts = self._parts
+        if parts.status.state is not LinkState.NEW:
             return
         try:
-            if self._read_only:
+            if parts.read_only:
                 self._prepare_to_look()
             else:
-                check_master_watch(self._config, speed=self._limits.command_speed)
-                self._hold()
-                prepare_to_move(self.bring_up, self._config)
-            read_temperatures(self.bring_up, self.cycle, self._config)
+                check_master_watch(parts.config, speed=parts.limits.command_speed)
+                parts.channel.take()
+                prepare_to_move(parts.bring_up, parts.config)
+            read_temperatures(parts.bring_up, parts.cycle, parts.config)
         except BaseException:
-            self._let_go()
+            parts.channel.release()
             raise
-        self.state = LinkState.CONFIGURED
-        if self._told is not None:
-            self._port.listener = self._told
+        parts.status.state = LinkState.CONFIGURED
+        if self._waiting is not None:
+            parts.port.listener = self._waiting
 
     def _prepare_to_look(self) -> None:
         """Prepare a read-only link: listen to another master's SYNC, or send SYNC if there is none.
@@ -95,19 +70,19 @@ class Opening(Ending):
             DriveError: a drive is not configured, or somebody leads it without SYNC.
             PlantFault: somebody else is about to lead them.
         """
-        self._port.may_send = may_read
-        now_ns = self._port.timebase.now_ns()
-        self.listening = self.cycle.hears_sync(now_ns + LISTEN_NS)
-        self._start_up.listening = self.listening
-        if self.listening:
-            self.bring_up.lookout.rest()
+        parts, port = self._parts, self._parts.port
+        port.may_send = may_read
+        listening = parts.cycle.hears_sync(port.timebase.now_ns() + LISTEN_NS)
+        parts.status.listening = parts.start_up.listening = listening
+        if listening:
+            parts.bring_up.lookout.rest()
         else:
-            self._hold()
-            self.bring_up.listen()
-        self.bring_up.identify()
-        self.bring_up.refuse_differences()
-        if self.listening:
+            parts.channel.take()
+            parts.bring_up.listen()
+        parts.bring_up.identify()
+        parts.bring_up.refuse_differences()
+        if listening:
             return
-        refuse_led(self.bring_up, self.cycle, self._config)
-        self._supervisor.alone()
-        self._port.may_send = may_pace(self._config.master_id)
+        refuse_led(parts.bring_up, parts.cycle, parts.config)
+        parts.supervisor.alone()
+        port.may_send = may_pace(parts.config.master_id)

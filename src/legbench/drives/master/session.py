@@ -1,7 +1,6 @@
 """A bus that is opened once and closed once, with a log that may begin later."""
 
 from collections.abc import Sequence
-from pathlib import Path
 from types import TracebackType
 from typing import final
 
@@ -21,6 +20,7 @@ from legbench.drives.transport.timebase import SystemTime, Timebase
 from legbench.drives.transport.virtual_bus import VirtualBus
 from legbench.interrupts import shielded
 from legbench.limits.safety import SafetyLimits
+from legbench.recording.abstract_disk import AbstractLog
 
 
 @final
@@ -62,6 +62,11 @@ class Session(Closing):
         """Whether time passes only while somebody waits for it."""
         return isinstance(self.bus, VirtualBus)
 
+    @property
+    def channel(self) -> str:
+        """Name of the bus in logs."""
+        return str(getattr(self.bus, "channel", "can"))
+
     def be_punctual(self, cpu: int | None = None) -> Granted | None:
         """Ask the system for real-time scheduling; returns none in virtual time.
 
@@ -73,13 +78,13 @@ class Session(Closing):
         self.timebase = SystemTime(1000 * granted.spin_us)
         return granted
 
-    def log_to(self, path: Path) -> None:
+    def log_to(self, log: AbstractLog) -> None:
         """Write every frame of all links from now on, or from when their drives are configured.
 
-        Raises:
-            BusError: there can be no file.
+        Args:
+            log: of the run, closed with this session.
         """
-        self.log = BusLog(path, str(getattr(self.bus, "channel", "can")))
+        self.log = BusLog(log, self.channel)
         for link in self._links:
             link.tell(self.log)
 
@@ -130,12 +135,21 @@ class Session(Closing):
         return tuple(lead.stopped for lead in self._leads if lead.stopped is not None)
 
     def close(self) -> None:
-        """Stop all drives, close the log, shut the bus down; may be called twice, raises no error.
+        """Stop all drives, shut the bus down, close the log; may be called twice, raises no error.
 
-        No signal gets in between: a ^C that comes meanwhile is raised at the end.
+        No signal gets in between: a ^C that comes meanwhile is raised at the end. The log comes
+        last: drives and channel wait for no disk, and a ^C ends the wait for it.
         """
         if self._closed:
             return
+        try:
+            self._let_go()
+        finally:
+            if self.log is not None:
+                self.log.close()
+
+    def _let_go(self) -> None:
+        """Stop all drives, shut the bus down, release the channel."""
         with shielded() as shield:
             for lead in self._leads:
                 try:
@@ -143,8 +157,6 @@ class Session(Closing):
                 except BaseException as error:  # The others have to be stopped, too.
                     shield.hold(error)
             self._closed = True
-            if self.log is not None:
-                self.log.close()
             try:
                 self.bus.shutdown()
             except BaseException as error:

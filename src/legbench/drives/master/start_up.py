@@ -6,27 +6,23 @@ from typing import final
 from legbench.drives.errors import DriveError
 from legbench.drives.master.axis_link import AxisLink
 from legbench.drives.master.cycle import Cycle
+from legbench.drives.master.enable_watch import EnableWatch, obeys
 from legbench.drives.master.port import Port
 from legbench.drives.master.tick import Tick
 from legbench.drives.protocol.cia402 import (
+    HOLD_CYCLES,
     DriveState,
     Goal,
-    StatusBit,
     decode_state,
     describe_statusword,
 )
 from legbench.drives.protocol.nmt import NmtCommand, nmt_frame
 from legbench.drives.setup.config import BusConfig
-from legbench.errors import PlantFault
 
 SETTLE_PATIENCE = 2000
 """Number of cycles within which process data has to become regular."""
 ENABLE_PATIENCE = 2000
 """Number of cycles within which all drives have to be enabled."""
-STILL_RANGE = 0.02
-"""Largest motion of a motor while it is enabled; beyond it the start-up ends [rad]."""
-IGNORE_PATIENCE = 5
-"""Number of cycles within which an enabled drive has to follow its target."""
 
 
 @final
@@ -87,7 +83,7 @@ class StartUp:
     def seek(
         self, goal: Goal, axes: Sequence[AxisLink], tick: Callable[[], Tick], words: str
     ) -> Tick:
-        """Lead drives to a goal, the rest stays where it is.
+        """Lead drives to a goal in which they have no power, the rest stays where it is.
 
         Raises:
             DriveError: one does not get there; `words` say what it was to do.
@@ -95,25 +91,66 @@ class StartUp:
         """
         for axis in axes:
             axis.machine.seek(goal)
+        last = self._lead(axes, tick, lambda: all(map(_off, axes)), _off, words)
+        for axis in axes:
+            axis.machine.seek(Goal.DISABLED)
+        self.idle()
+        return last
+
+    def enable(self, tick: Callable[[], Tick]) -> Tick:
+        """Enable all drives together, where they stand.
+
+        None is told to become enabled before all are switched on, which gives no torque; as soon
+        as one is, the others have `enable_spread_ms` of the bus file.
+
+        Raises:
+            DriveError: one does not get there, and none is enabled.
+            PlantFault: as `tick`, or as `EnableWatch.see`.
+        """
+        axes = self._cycle.axes
+        words = "become enabled"
+        watch = EnableWatch(axes, self._config)
+        for axis in axes:
+            axis.machine.seek(Goal.SWITCHED_ON)
+
+        seen = 0
+
+        def switched_on() -> bool:
+            nonlocal seen
+            watch.see()
+            seen = seen + 1 if all(map(_switched_on, axes)) else 0
+            # By then every drive has had its word for so long that all get the next one at once.
+            return seen >= HOLD_CYCLES
+
+        def reached() -> bool:
+            watch.see()
+            return all(map(obeys, axes))
+
+        self._lead(axes, tick, switched_on, _switched_on, words)
+        for axis in axes:
+            axis.machine.seek(Goal.ENABLED)
+        self.idle()
+        return self._lead(axes, tick, reached, obeys, words)
+
+    def _lead(
+        self,
+        axes: Sequence[AxisLink],
+        tick: Callable[[], Tick],
+        reached: Callable[[], bool],
+        there: Callable[[AxisLink], bool],
+        words: str,
+    ) -> Tick:
+        """Run cycles until drives have reached their goal; the last cycle is not ended."""
         refused: list[AxisLink] = []
-        stood = [axis.motor_pos for axis in axes]
-        ignored = 0
         for _ in range(ENABLE_PATIENCE):
             last = tick()
-            if goal is Goal.ENABLED:
-                ignored = ignored + 1 if any(map(_ignores, axes)) else 0
-                _check_still(axes, stood, ignored)
-            if all(_there(axis.machine.goal, axis.statusword) for axis in axes):
-                if goal is not Goal.ENABLED:
-                    for axis in axes:
-                        axis.machine.seek(Goal.DISABLED)
-                    self.idle()
+            if reached():
                 return last
             self.idle()
             refused = [axis for axis in axes if axis.machine.refused]
             if refused:
                 break
-        behind = [axis for axis in axes if not _there(axis.machine.goal, axis.statusword)]
+        behind = [axis for axis in axes if not there(axis)]
         slow = (refused or behind or list(axes))[0]
         raise DriveError(
             f"drive '{slow.node.name}' (node {slow.node.node_id}) does not {words}: "
@@ -121,36 +158,9 @@ class StartUp:
         )
 
 
-def _ignores(axis: AxisLink) -> bool:
-    """Whether a drive is enabled but does not follow its target."""
-    enabled = decode_state(axis.statusword) is DriveState.OPERATION_ENABLED
-    return enabled and not axis.statusword & StatusBit.FOLLOWS_COMMAND
+def _switched_on(axis: AxisLink) -> bool:
+    return decode_state(axis.statusword) is DriveState.SWITCHED_ON
 
 
-def _check_still(axes: Sequence[AxisLink], stood: Sequence[float], ignored: int) -> None:
-    """Check that no motor moves while drives are enabled; raises PlantFault."""
-    for axis, before in zip(axes, stood, strict=True):
-        who = f"drive '{axis.node.name}' (node {axis.node.node_id})"
-        moved = axis.motor_pos - before
-        if abs(moved) > STILL_RANGE:
-            raise PlantFault(
-                "moved while enabling",
-                f"{who} moved by {moved:.3f} rad while it was enabled, the limit is "
-                f"{STILL_RANGE:g} rad; look at its software limits and position offset",
-            )
-        enabled = decode_state(axis.statusword) is DriveState.OPERATION_ENABLED
-        limited = bool(axis.statusword & StatusBit.INTERNAL_LIMIT)
-        if enabled and (limited or (ignored > IGNORE_PATIENCE and _ignores(axis))):
-            raise PlantFault(
-                "command ignored",
-                f"{who} does not follow its target on enabling: "
-                f"{describe_statusword(axis.statusword)}",
-            )
-
-
-def _there(goal: Goal, statusword: int) -> bool:
-    state = decode_state(statusword)
-    if goal is Goal.ENABLED:
-        following = bool(statusword & StatusBit.FOLLOWS_COMMAND)
-        return state is DriveState.OPERATION_ENABLED and following
-    return state is DriveState.SWITCH_ON_DISABLED
+def _off(axis: AxisLink) -> bool:
+    return decode_state(axis.statusword) is DriveState.SWITCH_ON_DISABLED

@@ -1,10 +1,10 @@
-"""Report of a stop, and the base class of whoever leads drives and so has to stop them."""
+"""Report of a stop, and the interface of whoever leads drives and so has to stop them."""
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from types import TracebackType
+from typing import Self
 
-from legbench.closing import Closing
 from legbench.drives.errors import StopError
 
 
@@ -53,18 +53,20 @@ class StopReport:
         )
 
 
-class Lead(Closing):
-    """Base class of whatever gives drives power, and takes it away when its `with` ends.
+class Lead(ABC):
+    """Whatever gives drives power, and takes it away when its `with` ends."""
 
-    Attributes:
-        stopped: report of its last stop; none if it never had to stop anything.
-    """
-
-    stopped: StopReport | None = None
+    @property
+    @abstractmethod
+    def stopped(self) -> StopReport | None:
+        """Report of its last stop; none if it never had to stop anything."""
 
     @abstractmethod
     def close(self) -> None:
         """Take the power away, check that it is gone; may be called twice, raises no error."""
+
+    def __enter__(self) -> Self:
+        return self
 
     def __exit__(
         self,

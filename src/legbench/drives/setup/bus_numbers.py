@@ -13,12 +13,14 @@ BUS_NUMBERS: Mapping[str, tuple[int, int, str]] = {
     "sdo_timeout_ms": (1, 10_000, "ms"),
     "sdo_retries": (1, 10, ""),
     "settle_cycles": (1, 1000, "cycles"),
+    "enable_spread_ms": (1, 500, "ms"),
 }
 """Key -> lowest value, highest value, unit.
 
 CiA 301 knows 10 kbit/s to 1 Mbit/s. Five frames fill 200 us of the fastest bus, and a loop of 50 Hz
 leads no leg. Drives watch for three heartbeats, in the 16 bits of 1016h: 65 535 ms. A start waits
-2 000 cycles for regular process data, so that 1 000 in a row can come.
+2 000 cycles for regular process data, so that 1 000 in a row can come. Holding brakes of motors of
+this size open within 20 to 200 ms; half a second of one drive alone is no enabling any more.
 """
 SLOWEST_HEARTBEAT, SLOWEST_WAIVED = 100, 2000
 """Longest heartbeat of a drive, and where it is waived [ms]."""

@@ -209,6 +209,9 @@ class BusConfig:
     sdo_retries: int = 3
     settle_cycles: int = 20
     """Number of cycles with regular process data before a drive is enabled."""
+    enable_spread_ms: int = 100
+    """Longest time for which one drive may be enabled and another not yet [ms]; then both lose
+    their power. Drives tell within a few cycles, one with a holding brake once it has opened it."""
     start_speed: float = 2.0
     """Speed of the move to the start posture, before a run begins [rad/s]."""
     stated_bitrate: int | None = field(default=None, metadata={NOT_IN_FILES: True})

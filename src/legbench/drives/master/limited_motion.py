@@ -1,0 +1,62 @@
+"""The motion of all drives of a link, measured and commanded within the limits."""
+
+from collections.abc import Sequence
+from typing import final
+
+from legbench.drives.master.cycle import Cycle
+from legbench.drives.master.sample import Sample, sample_of
+from legbench.drives.master.tick import Tick
+from legbench.limits.guard import Guard
+
+
+@final
+class LimitedMotion:
+    """Motion of all drives of a link, held within the limits of its guard."""
+
+    def __init__(self, cycle: Cycle, guard: Guard, stiffness: Sequence[float]) -> None:
+        """Prepare to measure and command the drives of a cycle.
+
+        Args:
+            cycle: cycle of the drives.
+            guard: limits of their motion and of their commands.
+            stiffness: stiffness of the series springs, one a drive [N m/rad].
+        """
+        self._cycle, self._guard = cycle, guard
+        self._stiffness = tuple(float(value) for value in stiffness)
+        self._expected: list[tuple[float, ...]] = []
+
+    def begin(self) -> None:
+        """Begin to command from the targets that the drives hold, not from their encoders."""
+        held = tuple(axis.target_pos for axis in self._cycle.axes)
+        self._guard.start_at(held)
+        self._expected = [held] * 2
+
+    def sample(self, tick: Tick) -> Sample:
+        """Measurements of all drives after a tick."""
+        return sample_of(self._cycle, tick, self._stiffness, self._guard.applied)
+
+    def check(self, sample: Sample) -> None:
+        """Check measurements against the limits; raises PlantFault."""
+        self._guard.check(
+            motor_pos=sample.motor_pos,
+            joint_pos=sample.link_pos,
+            spring_torque=sample.spring_torque,
+            expected_pos=self._expected[0] if self._expected else None,
+            temperature=sample.temperature,
+            fresh=sample.fresh,
+            elapsed=1 + sample.skipped,
+        )
+
+    def aim(self, motor_pos: Sequence[float]) -> tuple[tuple[float, ...], list[int | None]]:
+        """Set the targets of all drives; returns them [rad] and the controlwords to send.
+
+        Raises:
+            PlantFault: the command is not finite or jumps too far.
+        """
+        applied = self._guard.command(motor_pos)
+        words: list[int | None] = []
+        for axis, target in zip(self._cycle.axes, applied, strict=True):
+            axis.aim(target)
+            words.append(axis.machine.controlword)
+        self._expected = [self._expected[-1], applied]
+        return applied, words
