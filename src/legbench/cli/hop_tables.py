@@ -146,7 +146,7 @@ def family_content(family: HopFamily) -> dict[str, Any]:
         "changes": [
             {
                 "value": change.value,
-                "multiplier": [change.multiplier.real, change.multiplier.imag],
+                "multiplier": _pairs(change.member.cycle.multipliers[:1])[0],
                 "stable_after": change.stable_after,
                 "kind": change.kind,
             }

@@ -36,6 +36,10 @@ STEP = 0.1
 """Longest arc between two hops, apexes in `UNITS` and the setting in its `SPANS` [-]."""
 MOST = 120
 """Largest number of hops of a family [-]."""
+MARGINAL = 1e-4
+"""How near to 1 the largest multiplier comes where a change of stability is solved for [-]."""
+LOOKS = 12
+"""Largest number of hops that are solved for at a change of stability [-]."""
 AGAIN_NEAR, AGAIN_AFTER = 0.03, 5
 """How near a family comes to one of its hops, and how many hops later, when it has closed [-]."""
 
@@ -52,19 +56,23 @@ class Member:
 class Change:
     """Change of stability between two hops of a family."""
 
-    value: float
-    """Value of the setting at which the largest multiplier has the size 1."""
-    multiplier: complex
-    """The largest multiplier: near +1, near -1, or one of a pair."""
+    member: Member
+    """The hop whose largest multiplier has the size 1, to `MARGINAL`."""
     stable_after: bool
     """Whether hops beyond it are stable."""
 
     @property
+    def value(self) -> float:
+        """Value of the setting there."""
+        return self.member.value
+
+    @property
     def kind(self) -> str:
         """What happens there, in words."""
-        if abs(self.multiplier.imag) > 1e-3:
+        multiplier = self.member.cycle.multipliers[0]
+        if abs(multiplier.imag) > 1e-3:
             return "a pair of multipliers, to hops that wander around it"
-        if self.multiplier.real < 0.0:
+        if multiplier.real < 0.0:
             return "a multiplier of -1, to hops of twice the period"
         return "a multiplier of +1"
 
@@ -166,7 +174,7 @@ def follow_hop(
     return HopFamily(
         setting=setting,
         members=tuple(walk.members),
-        changes=tuple(_changes(walk.members)),
+        changes=tuple(walk.changes()),
         ended=ended,
     )
 
@@ -205,15 +213,50 @@ class _Walk:
         setting, member = self._equations.setting, _member(self._equations, found)
         self.members.append(member)
         older = self._passed[:-AGAIN_AFTER]
+        self._passed.append(found.unknown)
         if older and min(np.max(np.abs(found.unknown - one)) for one in older) < AGAIN_NEAR:
             return f"it comes back to a hop that it has passed, at {setting} = {member.value:.4g}"
-        self._passed.append(found.unknown)
         share = (member.value - self._from) / (self._to - self._from)
         if self._progress is not None:
             self._progress(min(99, int(100.0 * abs(share))), 100)
         if share >= 1.0:
             return f"{setting} = {self._to:g}"
         return f"it turned back past {self._from:g}" if share < 0.0 else None
+
+    def changes(self) -> list[Change]:
+        """Changes of stability between neighbours, each solved for."""
+        pairs = zip(pairwise(self.members), pairwise(self._passed), strict=True)
+        return [
+            Change(member=self._marginal(before, after, *ends), stable_after=after.cycle.stable)
+            for (before, after), ends in pairs
+            if before.cycle.stable != after.cycle.stable
+        ]
+
+    def _marginal(self, before: Member, after: Member, first: Floats, last: Floats) -> Member:
+        """The hop between two, in `_passed` at `first` and `last`, whose multiplier has size 1."""
+        sizes, shares = [_excess(before), _excess(after)], [0.0, 1.0]
+        best = before if abs(sizes[0]) < abs(sizes[1]) else after
+        row = (last - first) / np.linalg.norm(last - first)
+        for count in range(LOOKS):
+            share = shares[0] - sizes[0] * (shares[1] - shares[0]) / (sizes[1] - sizes[0])
+            share = 0.5 * sum(shares) if count % 3 == 2 else share
+            guess = first + share * (last - first)
+            found = correct(self._equations, guess, row, float(row @ guess), CLOSED)
+            if found is None:
+                break
+            member = _member(self._equations, found)
+            size = _excess(member)
+            best = member if abs(size) < abs(_excess(best)) else best
+            if abs(size) < MARGINAL:
+                break
+            side = 0 if size * sizes[0] > 0.0 else 1
+            sizes[side], shares[side] = size, share
+        return best
+
+
+def _excess(member: Member) -> float:
+    """Size of the largest multiplier beyond 1 [-]."""
+    return abs(member.cycle.multipliers[0]) - 1.0
 
 
 def _member(equations: _Equations, found: Solution) -> Member:
@@ -223,21 +266,3 @@ def _member(equations: _Equations, found: Solution) -> Member:
     residual, _, slopes = stacked(leg, law, apexes)
     worst = float(np.max(np.abs(residual)))
     return Member(value=value, cycle=described(leg, law, apexes, slopes, worst))
-
-
-def _changes(members: list[Member]) -> list[Change]:
-    """Changes of stability, by interpolation of the largest multiplier between neighbours."""
-    found = []
-    for before, after in pairwise(members):
-        if before.cycle.stable != after.cycle.stable:
-            sizes = [abs(one.cycle.multipliers[0]) - 1.0 for one in (before, after)]
-            share = sizes[0] / (sizes[0] - sizes[1])
-            worse = after if before.cycle.stable else before
-            found.append(
-                Change(
-                    value=before.value + share * (after.value - before.value),
-                    multiplier=worse.cycle.multipliers[0],
-                    stable_after=after.cycle.stable,
-                )
-            )
-    return found

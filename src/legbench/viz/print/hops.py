@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from legbench.modes.basin import Fate, Question
-from legbench.modes.hop_family import HopFamily
+from legbench.modes.hop_family import HopFamily, Member
 from legbench.modes.hop_setting import Setting
 from legbench.signals import Floats, Ints
 from legbench.viz.print._matplotlib import (
@@ -87,18 +87,29 @@ def plot_basin(question: Question, fates: Ints, path: Path) -> None:
         save_figure(figure, path, DPI)
 
 
+def _with_changes(family: HopFamily) -> list[Member]:
+    """The hops of a family, those at which stability changes in their places."""
+    found, changes = list(family.members[:1]), list(family.changes)
+    for before, after in pairwise(family.members):
+        if before.cycle.stable != after.cycle.stable and changes:
+            found.append(changes.pop(0).member)
+        found.append(after)
+    return found
+
+
 def plot_family(family: HopFamily, title: str, path: Path) -> None:
     """Apex heights and the largest multiplier over a setting, dotted where hops are not stable."""
     with styled():
         figure = Figure(figsize=(5.6, 6.0), layout="constrained")
         upper, lower = figure.subplots(2, 1, sharex=True)
-        for first, last in pairwise(family.members):
-            stable = first.cycle.stable and last.cycle.stable
+        for first, last in pairwise(_with_changes(family)):
+            sizes = [abs(one.cycle.multipliers[0]) for one in (first, last)]
+            stable = sum(sizes) < 2.0
             look = {"lw": 1.6 if stable else 1.2, "ls": "-" if stable else ":", "color": RADIAL}
             values = [first.value, last.value]
             for before, after in zip(first.cycle.apexes, last.cycle.apexes, strict=True):
                 upper.plot(values, [before.height, after.height], **look)
-            lower.plot(values, [abs(one.cycle.multipliers[0]) for one in (first, last)], **look)
+            lower.plot(values, sizes, **look)
         lower.axhline(1.0, lw=0.8, color=GREY)
         for change in family.changes:
             lower.plot(change.value, 1.0, "o", ms=6, mfc="white", color=RADIAL)

@@ -1,6 +1,7 @@
 """Pictures of modes: figures of their own, no window."""
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -51,8 +52,10 @@ def plot_modes(
 def draw_backbone(axes: Axes, family: Family) -> None:
     """Energy over frequency: dotted where orbits are not stable, a ring where that changes."""
     colour = COLOURS[family.mode.name]
-    for first, last in zip(family.orbits, family.orbits[1:], strict=False):
-        stable = first.monodromy.stable and last.monodromy.stable
+    changes = [passing.orbit for passing in family.passings if passing.changes]
+    orbits = sorted([*family.orbits, *changes], key=lambda orbit: orbit.energy)
+    for first, last in pairwise(orbits):
+        stable = abs(first.monodromy.trace + last.monodromy.trace) < 4.0
         axes.plot(
             [1.0 / first.period, 1.0 / last.period],
             [first.energy, last.energy],
