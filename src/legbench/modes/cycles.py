@@ -92,16 +92,18 @@ def find_cycle(leg: TaylorLeg, drive: AbstractDrive, guess: Sequence[Apex]) -> C
         ConfigError: there is none, or a hop on the way to it does not return.
     """
     at = np.array([apex.vector() for apex in guess]) / UNITS
+    worst = np.inf
     for _ in range(NEWTON):
         residual, slope, slopes = stacked(leg, drive, at)
-        if np.max(np.abs(residual)) < CLOSED:
-            return described(leg, drive, at, slopes, float(np.max(np.abs(residual))))
+        worst = float(np.max(np.abs(residual)))
+        if worst < CLOSED:
+            return described(leg, drive, at, slopes, worst)
         change = np.linalg.lstsq(slope, residual, rcond=1e-9)[0]
         share = min(1.0, SHORTER / float(np.max(np.abs(change)) + 1e-300))
         at = at - share * change.reshape(at.shape)
     raise ConfigError(
         f"no hop of period {len(guess)} near apex height {guess[0].height:.4g} m: Newton's method "
-        f"is left with {np.max(np.abs(residual)):.2g}; start it from hops that are closer to one"
+        f"is left with {worst:.2g}; start it from hops that are closer to one"
     )
 
 

@@ -89,7 +89,7 @@ class _Law:
 
     def settle(self, dz2: float) -> Floats:
         """Unknowns (7,) near the cycle: the law followed from rest for a while."""
-        state = np.array([*self.switched.scene.rest, 0.0, 0.0])
+        state = start = np.array([*self.switched.scene.rest, 0.0, 0.0])
         times = [0.0, 0.0]
         # The first switch goes to the longer leg; torques are those of a leg that has just rested.
         sign = -1.0
