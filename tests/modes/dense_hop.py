@@ -46,8 +46,9 @@ class Story:
 class DenseHop:
     """One hop from an apex to the next."""
 
-    def __init__(self, model: LegModel, rules: Rules) -> None:
+    def __init__(self, model: LegModel, rules: Rules, longest: float = 4e-3) -> None:
         self.model, self.rules, self.story = model, rules, Story()
+        self.longest = longest
         first, mass = model.floating.first, model.floating.mass
         self.arm = tuple(model.floating.reach - s / mass for s in first)
         self.gravity = model.floating.gravity
@@ -114,7 +115,9 @@ class DenseHop:
                     sign * self._asked(stop, y)[0] - 1e-5
                 )
                 self.pushing += [stop] * pushes
-        what = self._integrate(end, conditions, 1e-3 if any(beyond) else 4e-3)
+        what = self._integrate(
+            end, conditions, min(self.longest, 1e-3) if any(beyond) else self.longest
+        )
         if what is None or what.startswith("Stop"):  # goes on with other stops
             return False
         return self._happen(what)

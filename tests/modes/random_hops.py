@@ -23,6 +23,8 @@ NEIGHBOUR = 1e-7
 """Size of the disturbances that tell a hop that grazes, in the map's units [-]."""
 STEEP = 1e3
 """Growth of such a disturbance in one hop beyond which a condition has been grazed [-]."""
+LOOKS_APART = (4e-3, 4e-4)
+"""Longest steps of DOP853: what it tells on the first is told on the second if it differs [s]."""
 SAME_TIME = 1e-6
 """Largest difference between two times of one event [s]."""
 
@@ -136,10 +138,14 @@ def compare(case: Case, tolerance: float) -> Verdict | None:
     except LegbenchError:
         return None
     story = told_by_compiled(leg, law, case.start)
-    other = _dense(case, leg.model, case.start)
-    wrong = str(done.ending) != story.ending or not _same(story, other)
-    error = _apart(story, other)
-    doubtful = wrong or error > 1e-6
+    doubtful, wrong, error, other = True, False, 0.0, Story()
+    for longest in LOOKS_APART:  # coarse looks may miss a turn that comes and goes between them
+        other = _dense(case, leg.model, case.start, longest)
+        wrong = str(done.ending) != story.ending or not _same(story, other)
+        error = _apart(story, other)
+        doubtful = wrong or error > 1e-6
+        if not doubtful:
+            break
     return Verdict(
         same=not wrong,
         error=error,
@@ -179,6 +185,6 @@ def _grazes(case: Case, model: LegModel, story: Story) -> bool:
     return False
 
 
-def _dense(case: Case, model: LegModel, start: Apex) -> Story:
+def _dense(case: Case, model: LegModel, start: Apex, longest: float = 4e-4) -> Story:
     rules = Rules(case.config, case.design)
-    return DenseHop(model, rules).run(start.height, start.speed, *start.angles())
+    return DenseHop(model, rules, longest).run(start.height, start.speed, *start.angles())

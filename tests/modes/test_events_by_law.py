@@ -12,6 +12,7 @@ from legbench.design import LegDesign, load_design
 
 pytest.importorskip("heyoka")
 
+from brute_basins import differing, random_question  # pyright: ignore[reportMissingImports]
 from random_hops import compare, random_case  # pyright: ignore[reportMissingImports]
 
 from legbench.analytic.course import Course
@@ -140,3 +141,10 @@ def test_a_leg_that_swings_over_between_two_events_has_fallen() -> None:
 
 def test_every_reading_has_its_place() -> None:
     assert [int(event) for event in Event] == list(range(len(Event)))
+
+
+@pytest.mark.parametrize(("name", "seed"), [("prototype", 3), ("optimal", 4)])
+def test_cells_of_a_basin_are_those_of_brute_force(name: str, seed: int) -> None:
+    question = random_question(design_of(name), seed, 9)
+    wrong, _ = differing(question, 3, seed)
+    assert wrong == []

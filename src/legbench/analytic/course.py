@@ -103,7 +103,8 @@ class Course:
         """Put the leg somewhere."""
         ops, along = self.model.ops, steady_point(self.model, state.regime)
         x, z = sweep(ops, state.q, along)
-        point, drift = (state.trunk_pos[0] + x, state.trunk_pos[1] + z), (0.0, 0.0)
+        height = 0.0 if state.regime.stands else state.trunk_pos[1] + z
+        point, drift = (state.trunk_pos[0] + x, height), (0.0, 0.0)
         if state.regime is Regime.FLIGHT:
             x, z = sweep_rate(ops, state.q, state.v, along)
             drift = state.trunk_vel[0] + x, state.trunk_vel[1] + z
@@ -163,8 +164,9 @@ class Course:
         ops, model = self.model.ops, self.model
         arm, arm_vel = sweep(ops, self.q, self._arm), sweep_rate(ops, self.q, self.v, self._arm)
         if self.watch.flies:
-            (x, z), (dx, dz) = self.centre()
-            self.point, self.drift = (x + arm[0], z + arm[1]), (0.0, 0.0)
+            (x, _), (dx, dz) = self.centre()
+            # The ground is where it is, also for a foot that was not looked at on its way through.
+            self.point, self.drift = (x + arm[0], 0.0), (0.0, 0.0)
             foot_vel = dx + arm_vel[0], dz + arm_vel[1]
             self.v = touchdown_rates(ops, model.stance, model.floating, self.q, self.v, foot_vel)
             regime = Regime.STANCE
@@ -219,11 +221,9 @@ class Course:
         outcome = int(integrator.propagate_until(float(until - self.began), MAX_STEPS)[0])
         event = None if outcome == TIME_LIMIT else -outcome - 1
         if event is not None and not 0 <= event < EVENTS:
-            raise PlantFault(
-                "integration failed",
-                f"integration failed at t = {self.began + integrator.time:.6f} s: the state runs "
-                "away",
-            )
+            at = self.began + float(integrator.time)
+            why = f"integration failed at t = {at:.6f} s: the state runs away"
+            raise PlantFault("integration failed", why)
         q1, q2, v1, v2 = self.watch.state.tolist()
         self.plain_q, self.plain_v = (q1, q2), (v1, v2)
         if self._variation is not None:

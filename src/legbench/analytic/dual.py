@@ -90,7 +90,7 @@ DUAL = Ops(sin=_sin, cos=_cos, sqrt=_sqrt)
 
 
 def without_gradients(value: Any) -> Any:
-    """The same constants as plain floats, computing with plain functions.
+    """Constants as plain floats, computing with plain functions.
 
     Args:
         value: a number, or tuples and frozen dataclasses of numbers.

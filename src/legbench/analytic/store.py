@@ -1,8 +1,8 @@
 """Compiled integrators kept on disk between processes.
 
 A file holds one pickled integrator under a name made of everything that decides it: the formulas,
-the versions of heyoka and Python, and the processor it was compiled for. Files are written aside
-and renamed, begin with the digest of their content, and are rebuilt when it does not fit. A folder
+the versions of heyoka and Python, and the processor it was compiled for. Files are whole or not
+there, begin with the digest of their content, and are rebuilt when it does not fit. A folder
 that cannot be written is no obstacle: the integrator is then compiled anew in each process.
 """
 
@@ -11,7 +11,6 @@ import os
 import pickle
 import platform
 import sys
-import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
@@ -19,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from legbench.analytic._heyoka import heyoka as hy
+from legbench.recording.files import write_whole
 
 DIGEST = hashlib.sha256().digest_size
 ENVIRONMENT = "LEGBENCH_CACHE"
@@ -26,6 +26,11 @@ ENVIRONMENT = "LEGBENCH_CACHE"
 
 PROCESSOR = ("model name", "flags", "Features", "CPU implementer", "CPU part")
 """Lines of Linux's `/proc/cpuinfo` that say what code a processor runs."""
+UNREADABLE = (
+    *(pickle.UnpicklingError, EOFError, ImportError, AttributeError),
+    *(ValueError, TypeError, RuntimeError),
+)
+"""What unpickling raises of a file that another build has written."""
 OTHERS_WRITE = 0o022
 """Permission of group or others to write."""
 
@@ -82,7 +87,7 @@ def _read(path: Path) -> Any:
         return None
     try:
         return pickle.loads(body)
-    except Exception:  # heyoka says in no one way that it cannot read what another build wrote
+    except UNREADABLE:
         return None
 
 
@@ -91,14 +96,7 @@ def _write(path: Path, content: Any) -> None:
     body = pickle.dumps(content)
     with suppress(OSError):
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        handle, aside = tempfile.mkstemp(dir=path.parent, suffix=".aside")
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(hashlib.sha256(body).digest() + body)
-            os.replace(aside, path)
-        except OSError:
-            os.unlink(aside)
-            raise
+        write_whole(path, hashlib.sha256(body).digest() + body)
 
 
 @contextmanager

@@ -133,48 +133,54 @@ def hop(leg: TaylorLeg, drive: AbstractDrive, start: Apex) -> Hop:
     course = leg.course
     _launch(course, start)
     touchdown = liftoff = math.nan
-    lost, ending = 0.0, Ending.FAULT
+    lost, ending = 0.0, None
     try:
         for _ in range(CALLS):
-            until, at_apex = min(HORIZON, drive.alarm), False
-            if course.regime is Regime.FLIGHT and not math.isnan(liftoff):
-                apex = course.apex_time()
-                if course.time <= apex <= until:
-                    until, at_apex = apex, True
-            course.hold(drive.motor)
-            what = course.go(until, drive.levels())
-            if what is None:
-                if at_apex and course.time < drive.alarm:
-                    ending = Ending.APEX if drive.settled else Ending.FAULT
-                    break
-                if course.time < drive.alarm:
-                    ending = Ending.STANDS
-                    break
-                drive.ring(_probe(drive, course.q), course.time)
-            elif what is Watched.CONTACT:
-                if course.regime is Regime.FLIGHT:
-                    lost += _kinetic(course)
-                    course.switch()
-                    lost -= _kinetic(course)
-                    touchdown = course.time if math.isnan(touchdown) else touchdown
-                else:
-                    course.switch()
-                    liftoff = course.time
-            elif what is Watched.FELL:
-                ending = Ending.FELL
+            what, ending = _pause(course, drive, flew=not math.isnan(liftoff))
+            if ending is not None:
                 break
+            if what is Watched.CONTACT and course.regime is Regime.FLIGHT:
+                lost += _kinetic(course)
+                course.switch()
+                lost -= _kinetic(course)
+                touchdown = course.time if math.isnan(touchdown) else touchdown
+            elif what is Watched.CONTACT:
+                course.switch()
+                liftoff = course.time
+            elif what is None:
+                drive.ring(_probe(drive, course.q), course.time)
             else:
                 drive.happen(what, _probe(drive, course.q), course.time)
     except PlantFault:
         ending = Ending.FAULT
     return Hop(
-        ending=ending,
+        ending=ending or Ending.FAULT,
         after=_reached(course) if ending is Ending.APEX else None,
         duration=course.time,
         touchdown=touchdown,
         liftoff=liftoff,
         impact=lost,
     )
+
+
+def _pause(
+    course: Course, drive: AbstractDrive, *, flew: bool
+) -> tuple[Watched | None, Ending | None]:
+    """Go on to the next event, alarm or ending; `flew` if the leg has let go of the ground."""
+    until, apex = min(HORIZON, drive.alarm), math.inf
+    if flew and course.regime is Regime.FLIGHT:
+        apex = course.apex_time()
+        if course.time <= apex <= until:
+            until = apex
+    course.hold(drive.motor)
+    what = course.go(until, drive.levels())
+    if what is Watched.FELL:
+        return what, Ending.FELL
+    if what is not None or course.time >= drive.alarm:
+        return what, None
+    if until == apex:
+        return what, Ending.APEX if drive.settled else Ending.FAULT
+    return what, Ending.STANDS
 
 
 def _launch(course: Course, start: Apex) -> None:
