@@ -151,7 +151,7 @@ def test_hop_makes_the_folder_that_it_writes_to(
     assert {path.name for path in out.iterdir()} == {"hop.json", "return.png"}
     (tmp_path / "file").write_text("", encoding="utf-8")
     done = called(capfd, "hop", PROTOTYPE, "--hops", "20", "--out", tmp_path / "file", "--json")
-    done.refused("file cannot be written")
+    done.refused("cannot write", "name a folder that you can write")
 
 
 @pytest.mark.parametrize(

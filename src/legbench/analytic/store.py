@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from legbench.analytic._heyoka import heyoka as hy
-from legbench.recording.files import write_whole
+from legbench.writing import write_whole
 
 DIGEST = hashlib.sha256().digest_size
 ENVIRONMENT = "LEGBENCH_CACHE"

@@ -5,7 +5,13 @@ from typing import Annotated
 
 from tyro.conf import subcommand
 
-from legbench.cli import drives_moving, drives_reading, drives_serving, drives_timing
+from legbench.cli import (
+    drives_moving,
+    drives_reading,
+    drives_service,
+    drives_serving,
+    drives_timing,
+)
 from legbench.cli.drives_reading import Bench
 from legbench.cli.parse import parse
 from legbench.interrupts import stop_on_interrupt
@@ -40,6 +46,18 @@ class DrivesArguments:
             subcommand("jog", description="move one motor a little, under all limits; IT MOVES"),
         ]
         | Annotated[
+            drives_service.Reset,
+            subcommand("reset", description="leave faults whose cause is gone; enables nothing"),
+        ]
+        | Annotated[
+            drives_service.Store,
+            subcommand("store", description="make the drives store what they hold (1010h)"),
+        ]
+        | Annotated[
+            drives_service.NodeId,
+            subcommand("node-id", description="give the only drive on the bus another node id"),
+        ]
+        | Annotated[
             drives_timing.Jitter,
             subcommand("jitter", description="how punctual the cycle is; enables nothing"),
         ]
@@ -60,7 +78,7 @@ class DrivesArguments:
 
 
 def main(arguments: list[str]) -> int:
-    """Do one action; 0 when it went well, 1 when something is not as it should be.
+    """Run one action; its exit status is 1 if something is not as it should be, else 0.
 
     ^C, SIGTERM and SIGHUP raise one KeyboardInterrupt, whatever the action is: drives that have
     power lose it on the way out, and later signals change nothing about that.

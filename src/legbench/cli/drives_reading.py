@@ -17,16 +17,16 @@ from legbench.plant.can_open import open_session
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bench:
-    """Which bus, and how to print."""
+    """Flags of every action on a bus: which bus it is, and how results are printed."""
 
     bus: Path = Path("hardware/leg.toml")
-    """Bus file."""
+    """Bus file, which describes the drives."""
     interface: str | None = None
-    """python-can's name of the interface; else the bus file's."""
+    """Name of the interface in python-can; by default the bus file's."""
     channel: str | None = None
-    """Such as can0; else the bus file's."""
+    """Channel of the interface, such as can0; by default the bus file's."""
     bitrate: int | None = None
-    """Bitrate of interfaces that set their own; else the bus file's [bit/s]."""
+    """Bitrate of interfaces that set their own; by default the bus file's [bit/s]."""
     design: Path = Path("models/optimal.toml")
     """Design file: springs, and the limits that no limits file may exceed."""
     limits: Path | None = None
@@ -42,15 +42,15 @@ class Bench:
         )
 
     def config(self) -> BusConfig:
-        """The bus file; raises ConfigError."""
+        """Drives of the bus file; raises ConfigError."""
         return load_bus(self.bus)
 
     def leg(self) -> LegDesign:
-        """The design; raises DesignError."""
+        """Design of the leg; raises DesignError."""
         return load_design(self.design)
 
     def session(self, *, leads: bool, read_only: bool = False) -> AbstractContextManager[Session]:
-        """The bus, open, its channel locked by whoever leads; raises ConfigError, BusError."""
+        """Open the bus; whoever leads drives locks its channel; raises ConfigError, BusError."""
         if leads:
             tell_waived(self.bus, None)
         choice = replace(self.choice, read_only=read_only)
@@ -59,13 +59,13 @@ class Bench:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scan:
-    """Who is on the bus; writes nothing."""
+    """List the nodes on the bus; nothing is written."""
 
     last: int = 127
     """Highest node id to ask."""
 
     def run(self, bench: Bench) -> int:
-        """Print every node; 1 if a node of the bus file is not there."""
+        """Print every node; 1 if a node of the bus file is not there, or two drives share an id."""
         from legbench.commissioning.scan import scan
         from legbench.drives.protocol.frame import LAST_NODE
 
@@ -83,18 +83,24 @@ class Scan:
                     f"{node.product:#010x}  serial {node.serial}  revision {node.revision}  "
                     f"{node.verdict}"
                 )
+        double = [node for node in found if node.answers > 1]
+        for node in double:
+            note(
+                f"{node.answers} drives answer as node {node.node_id}: disconnect all but one, "
+                "give it another node id with `legbench drives node-id`, then connect the next"
+            )
         missing = sorted(names - {node.verdict for node in found})
         for verdict in missing:
             note(
                 f"not there: {verdict}; look at its power, its wiring and the bitrate, "
                 f"{session.config.bitrate_text}"
             )
-        return 1 if missing else 0
+        return 1 if missing or double else 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Status:
-    """What the drives say of themselves, in words."""
+    """Print what the drives say of themselves, in words."""
 
     def run(self, bench: Bench) -> int:
         """Print state, mode, error and encoders of every drive."""
@@ -108,7 +114,8 @@ class Status:
         for node in nodes:
             heat = "" if node.temperature is None else f", {node.temperature:.1f} deg C"
             print(f"{node.name} (node {node.node_id}): {node.statusword}")
-            print(f"  mode {node.mode}, error {node.error}{heat}")
+            homed = {None: "", True: ", homed", False: ", NOT HOMED"}[node.homed]
+            print(f"  mode {node.mode}, error {node.error}{heat}{homed}")
             print(
                 f"  motor {node.motor_pos:+.4f} rad ({node.motor_counts} counts), "
                 f"link {node.link_pos:+.4f} rad ({node.link_counts} counts)"
@@ -118,7 +125,7 @@ class Status:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Budget:
-    """What the schedule of the bus file takes of the wire at worst; opens no bus.
+    """Compute the worst bus load of the schedule in the bus file; no bus is opened.
 
     It also says how soon every drive stands when its master is gone, and checks bus and limits
     files against each other.

@@ -13,6 +13,7 @@ from legbench.cli.output import note, print_json
 from legbench.errors import ConfigError
 
 if TYPE_CHECKING:
+    from legbench.drives.emulated.body import Body
     from legbench.drives.setup.config import BusConfig
 
 UNIX, SLCAN = "legbench_unix", "slcan"
@@ -28,6 +29,15 @@ def _at_bitrate(config: "BusConfig", bitrate: int | None) -> "BusConfig":
     return config if bitrate is None else replace(config, bitrate=bitrate)
 
 
+def only(config: "BusConfig", name: str) -> "BusConfig":
+    """Return a bus with one of its drives alone; raises ConfigError for another name."""
+    nodes = tuple(node for node in config.nodes if node.name == name)
+    if not nodes:
+        names = ", ".join(node.name for node in config.nodes)
+        raise ConfigError(f"no node '{name}' in the bus file; there are {names}")
+    return replace(config, nodes=nodes)
+
+
 def _print_state(as_json: bool, at: float, node: str, state: str) -> None:
     """Print the new state of a drive, `at` so many seconds after the start."""
     if as_json:
@@ -39,7 +49,7 @@ def _print_state(as_json: bool, at: float, node: str, state: str) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Emulate:
-    """An emulated leg for other processes, at --channel: a socket file for legbench_unix.
+    """Emulate a leg for other processes, at --channel: a socket file for legbench_unix.
 
     With --serve slcan it sits behind a pseudo terminal, as behind an adapter on a serial line, and
     --channel may name a link to it. With --interface it sits on that bus, such as socketcan on a
@@ -47,33 +57,32 @@ class Emulate:
     """
 
     serve: Literal["unix", "slcan"] = "unix"
-    """How other processes reach it: a socket file, or python-can's slcan on a terminal."""
+    """Way in which other processes reach it: a socket file, or python-can's slcan on a terminal."""
     bare: bool = False
-    """Nothing on the shafts: no MuJoCo."""
+    """Whether the shafts are bare, so that MuJoCo is not needed."""
+    only: str | None = None
+    """Name of the only drive of the bus file on this bus, bare, such as for `drives node-id`."""
     patience: int = 5
-    """Periods without SYNC or target that fault an enabled drive; more on a busy machine."""
+    """Number of periods without SYNC or target that fault a drive; more on a busy machine."""
     seconds: float = math.inf
-    """End after so long [s]."""
+    """Time after which the command ends [s]."""
 
     def run(self, bench: Bench) -> int:
         """Serve until ^C or SIGTERM, printing every change of a drive's state."""
         from legbench.commissioning.emulate import Server, serve
-        from legbench.control import JumpConfig
         from legbench.drives.emulated.bus_server import BusServer
-        from legbench.drives.emulated.network import Network, stiff_body
+        from legbench.drives.emulated.network import Network
         from legbench.drives.emulated.slcan_server import SlcanServer
         from legbench.drives.emulated.unix_server import UnixServer
-        from legbench.experiment import Experiment, start_of
         from legbench.interrupts import stop_on_interrupt
         from legbench.plant.can_open import open_session
-        from legbench.plant.emulated_leg import EmulatedLeg
 
         _check_time("seconds", self.seconds)
         self._check_way(bench)
-        chosen = Experiment(design=bench.leg(), controller=JumpConfig())
-        start = start_of(chosen)
-        body = stiff_body if self.bare else EmulatedLeg(chosen.design, chosen.options, start)
         config = _at_bitrate(bench.config(), bench.bitrate)
+        start_pos, body = self._leg(bench)
+        if self.only is not None:
+            config, start_pos = only(config, self.only), (0.0,)
         end = time.monotonic() + self.seconds
         where = None if bench.channel is None else Path(bench.channel)
 
@@ -95,7 +104,7 @@ class Emulate:
             serve(
                 config,
                 serve_at,
-                start_pos=tuple(start.motor_pos.tolist()),
+                start_pos=start_pos,
                 body=body,
                 patience=self.patience,
                 report=partial(_print_state, bench.json),
@@ -103,6 +112,19 @@ class Emulate:
                 stop=lambda: stop.is_set or time.monotonic() > end,
             )
         return 0
+
+    def _leg(self, bench: Bench) -> "tuple[tuple[float, ...], Body]":
+        """Motor positions at power-on [rad], and what hangs on the shafts."""
+        from legbench.control import JumpConfig
+        from legbench.drives.emulated.body import stiff_body
+        from legbench.experiment import Experiment, start_of
+        from legbench.plant.emulated_leg import EmulatedLeg
+
+        chosen = Experiment(design=bench.leg(), controller=JumpConfig())
+        start = start_of(chosen)
+        bare = self.bare or self.only is not None
+        body = stiff_body if bare else EmulatedLeg(chosen.design, chosen.options, start)
+        return tuple(start.motor_pos.tolist()), body
 
     def _check_way(self, bench: Bench) -> None:
         if self.serve == SLCAN and bench.interface is not None:
@@ -119,10 +141,10 @@ class Emulate:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Monitor:
-    """Listen beside a master, send nothing, tell what the drives say."""
+    """Listen beside a master without sending anything, and print what the drives report."""
 
     seconds: float = math.inf
-    """End after so long [s]."""
+    """Time after which the command ends [s]."""
     every: float = 0.2
     """Time between two looks [s]."""
 

@@ -36,30 +36,30 @@ WHY = {
     Ending.FAULT: "the controller has lost step, it takes vibration in flight for the ground; take "
     "a longer --touchdown-time",
 }
-"""What to say of a leg that does not come to its next apex."""
+"""Advice for each way in which a leg fails to come to its next apex."""
 LARGE = 250_000
 """Cells of a basin map beyond which it is asked whether that was meant [-]."""
 CELL_TIME = 0.004
-"""What one cell takes one process, about [s]."""
+"""Time that one cell takes one process, about [s]."""
 ENDING_HOPS = 400
-"""Hops after which a hop that is not stable should have come to its end [-]."""
+"""Number of hops after which one that is not stable should have come to its end [-]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HopArguments:
-    """Hopping as a map from apex to apex."""
+    """Compute the hopping of a leg as a map from apex to apex."""
 
     design: Annotated[Path, tyro.conf.Positional]
     """Design file."""
     passive: bool = False
-    """Motors held and no damping, instead of the jump controller."""
+    """Whether motors are held and damping is left out, instead of the jump controller."""
     rest: float = 0.9
-    """Passive: set point z2 of the standing leg, orthonormal [rad]."""
+    """Set point z2 of the standing leg, orthonormal, for passive hops [rad]."""
     jump: JumpConfig = field(default_factory=JumpConfig)
     height: float | None = None
     """Apex of the centre of mass to start from [m]; none: 30 mm over standing."""
     hops: int = 60
-    """Hops until the leg should be periodic."""
+    """Number of hops after which the leg should be periodic."""
     period: int | None = None
     """Number of hops after which the motion is to repeat; none: as it settles."""
     family: Setting | None = None
@@ -67,27 +67,27 @@ class HopArguments:
     to: float | None = None
     """Value of that setting at which the family ends [rad, or a factor]."""
     basin: int = 0
-    """Points a side of the basin map; 0: none."""
+    """Number of points on each side of the basin map; 0 makes none."""
     across: str = "z1"
-    """What varies to the right in the basin map."""
+    """Coordinate that varies to the right in the basin map."""
     across_span: float = 0.6
-    """How far, either way; in metres, radians and seconds."""
+    """Range of that coordinate to either side, in metres, radians and seconds."""
     up: str = "speed"
-    """What varies upwards."""
+    """Coordinate that varies upwards in the basin map."""
     up_span: float = 2.5
-    """How far, either way; in metres, radians and seconds."""
+    """Range of that coordinate to either side, in metres, radians and seconds."""
     large: bool = False
-    """Map a basin of more than 250 000 cells all the same."""
+    """Whether to map a basin of more than 250 000 cells all the same."""
     workers: int = 2
-    """Processes for the basin map."""
+    """Number of processes that compute the basin map."""
     out: Path | None = None
     """Folder for hop.json, pictures and the basin's rows; a map begun there is continued."""
     json: bool = False
-    """One JSON object instead of tables."""
+    """Whether to print one JSON object instead of tables."""
 
 
 def main(arguments: list[str]) -> int:
-    """Run the command."""
+    """Run `legbench hop`."""
     flags = parse(HopArguments, "hop", arguments)
     _check(flags)
     design = load_design(flags.design)

@@ -11,6 +11,7 @@ from legbench.cli.hop_tables import point_content, point_lines
 from legbench.cli.output import note
 from legbench.design import LegDesign
 from legbench.design.statics import Support
+from legbench.kinematics import half_angle
 from legbench.modes.drive import Passive
 from legbench.modes.passive import FreeHop, depths, free_hop
 from legbench.modes.scene import Holding, make_scene
@@ -25,7 +26,7 @@ DROPS = (0.02, 0.05, 0.1)
 def answer(design: LegDesign, rest: float) -> tuple[dict[str, Any], list[str]]:
     """Hops without impact of a leg that stands at z2 = `rest` [rad], as JSON and as lines."""
     scene = make_scene(design, Holding.JUMP, rest)
-    half = 0.5 * (scene.motor[1] - scene.motor[0])
+    half = float(half_angle(np.array(scene.motor)))
     leg = TaylorLeg(LegModel.of(design, undamped=True), probe=Passive.probe)
     hops = []
     for depth in depths(leg, half, np.linspace(scene.rest[1], 0.5 * design.limits.knee[1], 150)):

@@ -37,7 +37,7 @@ class ModesArguments:
     design: Annotated[Path, tyro.conf.Positional]
     """Design file."""
     setup: Holding = Holding.FFS
-    """How the leg is held; `jump` means its stance."""
+    """Setup in which the leg is held; `jump` means its stance."""
     z2: float = 0.9
     """Set point at which the link rests, orthonormal [rad]."""
     energy: float = 0.2
@@ -61,13 +61,13 @@ class ModesArguments:
     """Range of z2 either way over which strictness is checked, within the joint limits [rad]."""
     out: Path | None = None
     """Folder for modes.json, pictures, and the orbits as trajectories (orbits.json and
-    orbits.parquet); none: nothing is written."""
+    orbits.parquet); without it nothing is written."""
     json: bool = False
-    """One JSON object instead of tables."""
+    """Whether to print one JSON object instead of tables."""
 
 
 def main(arguments: list[str]) -> int:
-    """Run the command."""
+    """Run `legbench modes`."""
     flags = parse(ModesArguments, "modes", arguments)
     _check(flags)
     scene = make_scene(load_design(flags.design), flags.setup, flags.z2)

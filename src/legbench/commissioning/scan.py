@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from legbench.drives.errors import DriveError, NoAnswerError
+from legbench.drives.master.doubles import count_answers
 from legbench.drives.master.first_contact import first_contact
 from legbench.drives.master.sdo_port import SdoPort
 from legbench.drives.master.session import Session
@@ -26,6 +27,8 @@ class Found:
     product: int
     revision: int
     serial: int
+    answers: int
+    """Number of drives that answer under this node id; each has to have one of its own."""
     verdict: str
     """How it compares with the bus file."""
 
@@ -50,6 +53,7 @@ def scan(session: Session, last: int = LAST_NODE) -> Iterator[Found]:
             vendor, product, revision, serial = (
                 sdo.get_int(0x1018, sub, DataType.UNSIGNED32) for sub in range(1, 5)
             )
+            answers = count_answers(port, node_id, 0x1018, 4)
             yield Found(
                 node_id=node_id,
                 device_type=device,
@@ -57,7 +61,10 @@ def scan(session: Session, last: int = LAST_NODE) -> Iterator[Found]:
                 product=product,
                 revision=revision,
                 serial=serial,
-                verdict=_verdict(config, node_id, (vendor, product, serial)),
+                answers=answers,
+                verdict=_verdict(config, node_id, (vendor, product, serial))
+                if answers < 2
+                else f"{answers} drives answer with this node id",
             )
         if not found and port.error_frames:
             raise NoAnswerError(f"no node up to {last} answers")

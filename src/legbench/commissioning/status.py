@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from legbench.drives.master.preparation import is_homed
 from legbench.drives.master.sdo_port import SdoPort
 from legbench.drives.master.session import Session
 from legbench.drives.protocol.cia402 import Mode, describe_statusword
@@ -30,6 +31,8 @@ class NodeStatus:
     link_counts: int
     temperature: float | None
     """[deg C]"""
+    homed: bool | None
+    """Whether the drive says that it is homed; none if it need not be."""
 
 
 def read_counts(session: Session, node: NodeConfig) -> tuple[int, int]:
@@ -52,10 +55,11 @@ def status(session: Session) -> list[NodeStatus]:
     """
     up = session.bring_up()
     with up.contact():
-        return [_status(up.sdo(node), node) for node in session.config.nodes]
+        nodes = session.config.nodes
+        return [_status(up.sdo(node), node, is_homed(up, node)) for node in nodes]
 
 
-def _status(sdo: SdoPort, node: NodeConfig) -> NodeStatus:
+def _status(sdo: SdoPort, node: NodeConfig, homed: bool | None) -> NodeStatus:
     motor, link = _counts(sdo, node)
     mode = sdo.get_int(0x6061, 0, DataType.INTEGER8)
     code = sdo.get_int(0x603F, 0, DataType.UNSIGNED16)
@@ -76,4 +80,5 @@ def _status(sdo: SdoPort, node: NodeConfig) -> NodeStatus:
         motor_counts=motor,
         link_counts=link,
         temperature=celsius,
+        homed=homed,
     )

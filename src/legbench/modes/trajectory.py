@@ -13,8 +13,8 @@ from legbench.modes.branches import Branch
 from legbench.modes.carry import Carrier
 from legbench.modes.damped import DampedFamily
 from legbench.modes.family import Family
-from legbench.recording.files import write_whole
 from legbench.signals import Floats
+from legbench.writing import reason, write_whole
 
 ROWS = 101
 """Instants of a period, both ends included [-]."""
@@ -112,7 +112,9 @@ def write_paths(paths: list[OrbitPath], path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, sink.getvalue().to_pybytes())
     except OSError as error:
-        raise ConfigError(f"{path.parent} cannot be written: {error}") from error
+        raise ConfigError(
+            f"cannot write {path}: {reason(error)}; name a folder that you can write"
+        ) from error
 
 
 def paths_to_json(paths: list[OrbitPath]) -> list[dict[str, object]]:

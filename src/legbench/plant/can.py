@@ -17,7 +17,7 @@ from legbench.signals import Command, Floats, Observation
 VELOCITY_BANDWIDTH = 200.0
 """Corner frequency of the velocity estimate [Hz]."""
 STILL_SPEED = 0.05
-"""A leg at rest moves slower than this [rad/s]."""
+"""Speed below which a leg counts as at rest [rad/s]."""
 STILL_CYCLES = 100
 """Number of cycles for which the leg must rest before a run begins."""
 STILL_PATIENCE = 5000
@@ -142,7 +142,7 @@ class CanPlant(AbstractPlant):
 
     @property
     def session(self) -> Session:
-        """The bus, closed with the plant."""
+        """Session of the bus, which is closed with the plant."""
         return self._session
 
     def _exchange(self, motor_pos: Floats) -> Sample:

@@ -5,7 +5,7 @@ from typing import Any, final
 
 from legbench.clock import AbstractClock
 from legbench.drives.emulated.behaviour import Behaviour
-from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.build import emulate, on_bench
 from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.emulated.network import Network
 from legbench.drives.master.session import Session
@@ -37,13 +37,13 @@ IDLE_POS = (-0.3, 0.3)
 
 @final
 class CanClock(AbstractClock):
-    """Never waits, because the link does; tells how late its last SYNC was."""
+    """Clock of a run on drives: the link waits, this shows how late its last SYNC was."""
 
     def __init__(self, plant: CanPlant) -> None:
         self._plant = plant
 
     def start(self) -> None:
-        """The link's grid is laid already."""
+        """Do nothing: the link has laid its grid already."""
 
     def wait(self, cycle: int) -> float:
         """Lateness of the cycle that has been seen [s]."""
@@ -103,7 +103,7 @@ def open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
 def _facts(
     choice: CanChoice, config: BusConfig, limits: SafetyLimits, granted: Granted | None
 ) -> dict[str, Any]:
-    """What a run has to say of the bus."""
+    """Entries of a run's manifest about the bus."""
     return {
         "bus": {
             "file": str(choice.bus),
@@ -162,9 +162,9 @@ def _emulated(config: BusConfig, choice: CanChoice, leg: Leg | None) -> Network:
     For those who only look its drives have kept their configuration: nobody may write it.
     """
     if leg is None:
-        idle = [Behaviour(start_pos=start) for start in IDLE_POS]
-        fits = len(config.nodes) == len(idle)
-        return emulate(config, idle if fits else None, configured=choice.read_only)
+        starts = IDLE_POS if len(config.nodes) == len(IDLE_POS) else (0.0,) * len(config.nodes)
+        idle = [on_bench(node, start) for node, start in zip(config.nodes, starts, strict=True)]
+        return emulate(config, idle, configured=choice.read_only)
     motors = [float(value) for value in leg.start.motor_pos]
     return emulate(
         config,

@@ -1,4 +1,4 @@
-"""How much of the radial mode many legs keep: each is released from a deflected posture.
+"""Rating of many legs that are released from a deflected posture.
 
 All of them move at once, by the equations of motion, with the motor positions that were computed
 for the design: nobody knows a leg's errors.
@@ -21,12 +21,12 @@ from legbench.metrics import Reference, alignment
 from legbench.signals import Bools, Floats
 
 KEPT = 0.95
-"""P^r that a leg has to keep [-]."""
+"""Rating P^r that a leg has to keep [-]."""
 STEP = 0.002
 """Step of the integration [s]: P^r is then good to 2e-7 with the foot pinned, and to 5e-6 with the
 trunk fixed, where the leg swings faster."""
 TOGETHER = 400
-"""Legs that are integrated in step: so many fit into a processor's cache, and memory stays flat."""
+"""Number of legs that are integrated in step: so many fit into a processor's cache [-]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,9 +43,9 @@ class Release:
     dz2: float = 0.3
     """Deflection before it [rad]."""
     duration: float = 1.0
-    """How long the motion is rated [s]."""
+    """Duration over which the motion is rated [s]."""
     reference: Reference = Reference.EQUILIBRIUM
-    """What eq. (14) measures deflection from: gravity's sag, which flatters, is left out."""
+    """Reference of the deflection in eq. (14), without gravity's sag, which would flatter."""
 
     def __post_init__(self) -> None:
         if self.setup is SetupKind.JUMP:
@@ -55,26 +55,26 @@ class Release:
 
     @property
     def support(self) -> Support:
-        """What carries the legs."""
+        """Support that carries the legs."""
         return Setup(kind=self.setup).support
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ratings:
-    """P^r of many legs."""
+    """Ratings P^r of many legs."""
 
     values: Floats
-    """(n,) [-]; zero for a leg that left its branch."""
+    """Rating P^r of each leg (n,) [-]; zero for a leg that left its branch."""
     faulted: Bools
 
     @property
     def kept(self) -> int:
-        """How many legs keep P^r above `KEPT`."""
+        """Number of legs that keep P^r above `KEPT`."""
         return int((self.values > KEPT).sum())
 
     @property
     def share(self) -> float:
-        """The yield [-]."""
+        """Yield: share of the legs that keep P^r above `KEPT` [-]."""
         return self.kept / len(self.values)
 
 
@@ -87,6 +87,8 @@ class Released:
 
     start: Floats
     """Postures in which they rest before (n, 2) [rad]."""
+    held: Floats
+    """Motor positions before the jump (n, 2) [rad]."""
     rest: Floats
     """Postures in which they rest afterwards (n, 2) [rad]."""
     motor: Floats
@@ -99,7 +101,7 @@ def rate_legs(
     release: Release,
     progress: Advance | None = None,
 ) -> Ratings:
-    """P^r of `legs`, each commanded as its `nominal` design asks for.
+    """Rate `legs` by P^r, each commanded as its `nominal` design asks for.
 
     Raises:
         ConfigError: a design that cannot be released there.
@@ -157,7 +159,7 @@ def released(nominal: Sequence[LegDesign], legs: Sequence[LegDesign], release: R
         _resting(legs, at, modal_to_joint(np.array([0.0, z2])), release.support)
         for at, z2 in ((begin, release.z2 + release.dz2), (motor, release.z2))
     )
-    return Released(start=start, rest=rest, motor=motor)
+    return Released(start=start, held=begin, rest=rest, motor=motor)
 
 
 def _motors(nominal: Sequence[LegDesign], z2: float, name: str, support: Support) -> Floats:

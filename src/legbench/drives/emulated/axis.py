@@ -5,10 +5,12 @@ from typing import final
 
 from legbench.drives.emulated.alarms import Alarms
 from legbench.drives.emulated.behaviour import Behaviour
-from legbench.drives.emulated.homing import Homing, HomingState
+from legbench.drives.emulated.homing import Homing
+from legbench.drives.emulated.homing_methods import METHODS
 from legbench.drives.emulated.motion import Motion
-from legbench.drives.emulated.power import HALT, PowerStage
+from legbench.drives.emulated.power import HALT, POWERED, PowerStage
 from legbench.drives.emulated.sensors import Sensors
+from legbench.drives.emulated.switches import Switches
 from legbench.drives.protocol.cia402 import DriveState, Mode, StatusBit
 from legbench.drives.protocol.frame import Frame
 from legbench.drives.protocol.objects import LINK_SHORT, Key
@@ -17,7 +19,10 @@ from legbench.drives.setup.config import NodeConfig
 from legbench.drives.setup.units import wrap
 
 MODES = (Mode.NONE, Mode.HOMING, Mode.CYCLIC_SYNCHRONOUS_POSITION)
+POLARITY = (0x607E, 0)
 FOLLOWING_ERROR, SETPOINTS_MISSING, SYNC_MISSING = 0x8611, 0xFF10, 0xFF11
+HOMED = 1 << 15
+"""Bit 15 of the statusword, the maker's own: the position refers to a home since power-on."""
 _ENABLED = DriveState.OPERATION_ENABLED
 _STATUS = int(StatusBit.REMOTE)
 
@@ -27,6 +32,7 @@ class Axis:
     """Emulated motor with its two encoders, as the object dictionary shows them.
 
     Attributes:
+        node_id: node id under which it reports its errors.
         power: power state machine.
         motion: motion of the motor.
         alarms: errors of the drive.
@@ -36,12 +42,14 @@ class Axis:
 
     def __init__(self, node: NodeConfig, behaviour: Behaviour, values: dict[Key, int]) -> None:
         self._node, self._behaviour, self._values = node, behaviour, values
+        self.node_id = node.node_id
         self.power = PowerStage(values)
         self.motion = Motion(node.motor, behaviour, values)
-        self.alarms = Alarms(node.node_id, values)
+        self.alarms = Alarms(self.node_id, values)
         self.sensors = Sensors(node)
         self.warning = False
-        self._homing = Homing(values, node.motor.counts_per_rev)
+        self._switches = Switches(node.motor, behaviour)
+        self._homing = Homing(values, self._switches)
         self._link_counts = node.link.to_counts(behaviour.start_pos)
         self._torque = 0
         self._mode_due_ns: int | None = None
@@ -51,11 +59,22 @@ class Axis:
         self._out: list[Frame] = []
         self.publish()
 
+    def address(self, node_id: int) -> None:
+        """Report under another node id from now on."""
+        self.node_id = self.alarms.node_id = node_id
+
+    def boot(self, now_ns: int) -> None:
+        """Leave the self-test; a mode of operation that was stored is entered (6060h)."""
+        self.power.boot()
+        if self._values[0x6060, 0]:
+            self.written((0x6060, 0), now_ns)
+
     def restart(self) -> None:
         """Reset the electronics to their power-on state; the motor stays where it is."""
         self.power.state = DriveState.NOT_READY_TO_SWITCH_ON
         self.power.stopping = None
-        self.alarms = Alarms(self._node.node_id, self._values)
+        self.alarms = Alarms(self.node_id, self._values)
+        self._homing = Homing(self._values, self._switches)
         self._waiting_word = self._mode_due_ns = None
         self._late_words.clear()
         self.motion.hold(0)
@@ -74,6 +93,11 @@ class Axis:
             changes = value != self._values[0x6060, 0]
             if halted and changes and self._behaviour.halt_blocks_mode:
                 return Abort.DEVICE_STATE
+        if key == (0x6098, 0) and value not in METHODS:
+            return Abort.INVALID_VALUE
+        if key == POLARITY and value != self._values[key] and self.power.state in POWERED:
+            # The target would be another one, all at once.
+            return Abort.DEVICE_STATE
         return None
 
     def written(self, key: Key, now_ns: int) -> None:
@@ -113,7 +137,7 @@ class Axis:
         if target is not None:
             # The object wraps; the motor takes the short way round.
             near = round(self.motion.demand)
-            target = near + wrap(target - near)
+            target = near + wrap(self.motion.sign * target - near)
         self.motion.latch(target, now_ns)
         if self.motion.missing > self._behaviour.missing_limit:
             self.fault(SETPOINTS_MISSING)
@@ -130,7 +154,8 @@ class Axis:
         self.sensors.tick(step_ns)
         before = self.motion.actual
         self._move(now_ns, step_ns)
-        self._values[0x606C, 0] = round((self.motion.actual - before) * 1e9 / step_ns)
+        turned = -1 if self._values[POLARITY] & 0x40 else 1
+        self._values[0x606C, 0] = turned * round((self.motion.actual - before) * 1e9 / step_ns)
         return self.motion.angle
 
     def _move(self, now_ns: int, step_ns: int) -> None:
@@ -170,11 +195,14 @@ class Axis:
         values, motion = self._values, self.motion
         actual = self.sensors.motor.show(round(motion.actual))
         link = self.sensors.link.show(self._link_counts)
-        values[0x6064, 0] = wrap(actual)
-        values[0x6062, 0] = wrap(round(motion.demand))
-        values[0x60F4, 0] = wrap(round(motion.demand) - actual)
+        sign = motion.sign
+        values[0x6064, 0] = wrap(sign * actual)
+        values[0x6062, 0] = wrap(sign * round(motion.demand))
+        values[0x60F4, 0] = wrap(sign * (round(motion.demand) - actual))
         values[0x60E4, 1] = wrap(link)
         values[LINK_SHORT, 0] = wrap(link, 16)
+        if self._switches.present:
+            values[0x60FD, 0] = self._switches.inputs(motion.travel, sign)
         values[0x6077, 0] = min(max(self._torque, -32768), 32767)
         self._status()
 
@@ -182,6 +210,8 @@ class Axis:
         word = self.power.low_byte | _STATUS
         if self.warning:
             word |= StatusBit.WARNING
+        if self._homing.done:
+            word |= HOMED
         mode = self._values[0x6061, 0]
         if mode == Mode.CYCLIC_SYNCHRONOUS_POSITION:
             if self.power.state is _ENABLED and self.power.stopping is None:
@@ -192,11 +222,8 @@ class Axis:
             if self._values[0x603F, 0] == FOLLOWING_ERROR:
                 word |= StatusBit.FOLLOWING_ERROR
         elif mode == Mode.HOMING:
-            word |= {
-                HomingState.ATTAINED: StatusBit.TARGET_REACHED | StatusBit.FOLLOWS_COMMAND,
-                HomingState.FAILED: StatusBit.TARGET_REACHED | StatusBit.FOLLOWING_ERROR,
-                HomingState.IDLE: StatusBit.TARGET_REACHED,
-            }.get(self._homing.state, 0)
+            halted = bool(self._values[0x6040, 0] & HALT)
+            word |= self._homing.status(halted=halted, standing=self.motion.speed == 0.0)
         self._show(int(word))
 
     def _show(self, word: int) -> None:

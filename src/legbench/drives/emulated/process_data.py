@@ -2,6 +2,7 @@
 
 from typing import final
 
+from legbench.drives.emulated.rules import usable
 from legbench.drives.emulated.store import ObjectStore
 from legbench.drives.errors import CodecError, SdoAbortError
 from legbench.drives.protocol.frame import COB_INVALID, COB_MASK, Frame
@@ -10,7 +11,8 @@ from legbench.drives.protocol.pdo import Mapped, PdoMap, split_word
 from legbench.drives.protocol.sdo import Abort
 
 RPDO, TPDO = 0x1400, 0x1800
-LAST_SYNCHRONOUS = 240
+ACYCLIC, LAST_SYNCHRONOUS = 0, 240
+"""Transmission types: at SYNC if it has changed, and the last of those at every nth SYNC."""
 _EVENT_TYPES = (254, 255)
 
 
@@ -18,9 +20,11 @@ _EVENT_TYPES = (254, 255)
 class Pdo:
     """Process data object (PDO) as its communication and mapping objects describe it."""
 
-    def __init__(self, cob_id: int, kind: int, timer_ms: int, layout: PdoMap) -> None:
+    def __init__(
+        self, cob_id: int, kind: int, *, inhibit: int, timer_ms: int, layout: PdoMap
+    ) -> None:
         self.cob_id, self.kind, self.layout = cob_id, kind, layout
-        self.timer_ns = 1_000_000 * timer_ms
+        self.inhibit_ns, self.timer_ns = 100_000 * inhibit, 1_000_000 * timer_ms
         self.keys = tuple(entry.key for entry in layout.entries)
         self.waiting: tuple[int, ...] | None = None
         """Values of an RPDO that are received and not yet latched."""
@@ -69,13 +73,10 @@ class ProcessData:
 
     def _check_comm(self, comm: int, sub: int, value: int, exists: bool) -> Abort | None:
         if sub == 1:
-            if (
-                exists
-                and not value & COB_INVALID
-                and (value ^ self._store.values[comm, 1]) & COB_MASK
-            ):
-                return Abort.INVALID_VALUE
-            return None
+            if value & COB_INVALID:
+                return None
+            moved = bool((value ^ self._store.values[comm, 1]) & COB_MASK)
+            return Abort.INVALID_VALUE if (exists and moved) or not usable(value) else None
         if sub == 2 and LAST_SYNCHRONOUS < value < _EVENT_TYPES[0]:
             return Abort.INVALID_VALUE
         return Abort.DEVICE_STATE if sub == 3 and exists else None
@@ -122,7 +123,13 @@ class ProcessData:
             layout = PdoMap([entry for entry in entries if entry is not None])
         except CodecError:
             return None
-        pdo = Pdo(cob & COB_MASK, values[comm, 2], values[comm, 5], layout)
+        pdo = Pdo(
+            cob & COB_MASK,
+            values[comm, 2],
+            inhibit=values[comm, 3],
+            timer_ms=values[comm, 5],
+            layout=layout,
+        )
         known = old.get(pdo.cob_id)
         if known is not None and known.keys == pdo.keys:
             pdo.seen_ns = known.seen_ns
@@ -140,7 +147,11 @@ class ProcessData:
         """Sample the TPDOs that a SYNC makes due."""
         frames: list[Frame] = []
         for pdo in self.tpdos:
-            if pdo.kind <= LAST_SYNCHRONOUS:
+            if pdo.kind == ACYCLIC:
+                before, data = pdo.last, self.sample(pdo)
+                if data != before:
+                    frames.append(Frame(pdo.cob_id, data))
+            elif pdo.kind <= LAST_SYNCHRONOUS:
                 pdo.syncs += 1
                 if pdo.syncs >= pdo.kind:
                     pdo.syncs = 0
@@ -173,7 +184,10 @@ class ProcessData:
             before, data = pdo.last, self.sample(pdo)
             since_ns = None if pdo.seen_ns is None else now_ns - pdo.seen_ns
             late = bool(pdo.timer_ns) and (since_ns is None or since_ns >= pdo.timer_ns)
-            if data != before or late:
+            if since_ns is not None and since_ns < pdo.inhibit_ns:
+                # What has changed meanwhile is sent when the time is over.
+                pdo.last = before
+            elif data != before or late:
                 pdo.seen_ns = now_ns
                 frames.append(Frame(pdo.cob_id, data))
         return frames

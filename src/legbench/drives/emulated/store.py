@@ -1,6 +1,6 @@
 """The object dictionary inside a drive: values, and access to them by SDO."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Container, Iterable
 from typing import final
 
 from legbench.drives.errors import CodecError
@@ -29,9 +29,11 @@ class ObjectStore:
         self._texts: dict[Key, Value] = {}
         self.load_defaults()
 
-    def load_defaults(self) -> None:
-        """Set every object to its power-on default."""
+    def load_defaults(self, indices: Container[int] = range(0x10000)) -> None:
+        """Set every object among some indices, by default all, to its power-on default."""
         for key, entry in self._entries.items():
+            if entry.index not in indices:
+                continue
             if isinstance(entry.default, int):
                 self.values[key] = entry.default
             else:

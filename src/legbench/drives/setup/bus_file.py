@@ -1,8 +1,9 @@
 """Bus and limit files: TOML to dataclasses, every key checked."""
 
 import re
-from collections.abc import Callable, Mapping
-from dataclasses import fields
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -19,6 +20,8 @@ from legbench.drives.setup.config import (
     Parameter,
     PdoConfig,
 )
+from legbench.drives.setup.configuration import interpolation_time
+from legbench.drives.setup.homed import HomedCondition
 from legbench.drives.setup.units import AxisUnits
 from legbench.errors import ConfigError
 from legbench.limits.safety import SafetyLimits
@@ -89,9 +92,22 @@ def bus_from_mapping(content: Mapping[str, Any]) -> BusConfig:
     """A bus from the tables of a file; raises ConfigError."""
     given = dict(content)
     tables = _list("node", given.pop("node", []))
-    given["nodes"] = tuple(_node(table) for table in tables)
+    given["nodes"] = tuple(_node(table, place) for place, table in enumerate(tables, start=1))
     _waive(given)
-    return _build(BusConfig, "bus", given, converted=("nodes", "waive"))
+    bus = _build(BusConfig, "bus", given, converted=("nodes", "waive"))
+    interpolation_time(bus.period_us)
+    return bus
+
+
+@contextmanager
+def _at(where: str) -> Iterator[None]:
+    """Put a place of the file in front of an error that does not begin with it yet."""
+    try:
+        yield
+    except ConfigError as error:
+        if str(error).startswith(where):
+            raise
+        raise ConfigError(f"{where}: {error}") from None
 
 
 def _waive(given: dict[str, Any]) -> None:
@@ -103,23 +119,34 @@ def _waive(given: dict[str, Any]) -> None:
         given["waive"] = tuple(names)
 
 
-def _node(table: object) -> NodeConfig:
+def _node(table: object, place: int) -> NodeConfig:
     given = _table("node", table)
-    name = str(given.get("name", "?"))
-    where = f"node '{name}'"
+    where = f"node '{given['name']}'" if "name" in given else f"node {place} of the file"
+    with _at(where):
+        return _node_of(given, where)
+
+
+def _node_of(given: dict[str, Any], where: str) -> NodeConfig:
     identity = {key: given.pop(key) for key in _IDENTITY if key in given}
     given["identity"] = _build(Identity, where, identity)
     for axis in ("motor", "link"):
-        given[axis] = _build(AxisUnits, f"{where} {axis}", _table(axis, given.get(axis, {})))
+        with _at(f"{where} {axis}"):
+            given[axis] = _build(AxisUnits, f"{where} {axis}", _table(axis, given.get(axis, {})))
     if "id" in given:
         given["node_id"] = given.pop("id")
     for key in ("link_object", "temperature_object"):
         if key in given:
-            given[key] = parse_object(given[key])
+            with _at(f"{where}: {key}"):
+                given[key] = parse_object(given[key])
     for key, plural in (("rpdo", "rpdos"), ("tpdo", "tpdos")):
         if key in given:
             usual = {"deadline_ms": RPDO.deadline_ms} if key == "rpdo" else {}
-            given[plural] = tuple(_pdo(where, entry, usual) for entry in _list(key, given.pop(key)))
+            pdos = _list(key, given.pop(key))
+            with _at(f"{where}: {key}"):
+                given[plural] = tuple(_pdo(where, entry, usual) for entry in pdos)
+    if "homed" in given:
+        with _at(f"{where} homed"):
+            given["homed"] = _homed(f"{where} homed", given["homed"])
     if "soft_limits" in given:
         given["soft_limits"] = _range("soft_limits", given["soft_limits"])
     parameters = _table("parameters", given.get("parameters", {}))
@@ -129,7 +156,14 @@ def _node(table: object) -> NodeConfig:
         if keys.count(key) > 1:
             raise ConfigError(f"{where} gives parameter {name_of(*key)} twice")
     done = ("identity", "motor", "link", "link_object", "temperature_object", "rpdos", "tpdos")
-    return _build(NodeConfig, where, given, converted=(*done, "parameters", "soft_limits"))
+    return _build(NodeConfig, where, given, converted=(*done, "parameters", "soft_limits", "homed"))
+
+
+def _homed(where: str, table: object) -> HomedCondition:
+    given = _table("homed", table)
+    if "object" in given:
+        given["object"] = parse_object(given["object"])
+    return _build(HomedCondition, where, given, converted=("object",))
 
 
 def _pdo(where: str, table: object, usual: Mapping[str, int]) -> PdoConfig:
@@ -196,10 +230,14 @@ def _build(
         for name, value in given.items()
         if name not in converted and isinstance(value, int | float)
     }
-    try:
-        return kind(**(dict(given) | plain))
-    except TypeError as error:
-        raise ConfigError(f"{where}: {str(error).partition(') ')[2] or error}") from None
+    lacking = [
+        "id" if name == "node_id" else name
+        for name, field in known.items()
+        if name not in given and field.default is MISSING
+    ]
+    if lacking:
+        raise ConfigError(f"{where}: {', '.join(lacking)} must be given")
+    return kind(**(dict(given) | plain))
 
 
 def _finite(where: str, name: str, value: float) -> float:

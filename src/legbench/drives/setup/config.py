@@ -10,6 +10,7 @@ from legbench.drives.protocol.objects import LINK_SHORT, PDO_COUNT
 from legbench.drives.protocol.pdo import Mapped, PdoMap
 from legbench.drives.setup.bus_numbers import BUS_NUMBERS, LONG, WORD, check_bus_numbers
 from legbench.drives.setup.cob_ids import check_cob_id, check_distinct
+from legbench.drives.setup.homed import HomedCondition
 from legbench.drives.setup.parameters import Parameter, check_parameter
 from legbench.drives.setup.units import AxisUnits
 from legbench.errors import ConfigError
@@ -106,6 +107,9 @@ class NodeConfig:
     heartbeat_consumer: bool = True
     """Whether the drive has 1016h, and so stops when its master's heartbeat is missing; some have
     not, and must be given a `deadline_ms` of their commands instead."""
+    homed: HomedCondition | None = None
+    """How the drive shows that it is homed, without which nothing moves; none needs no homing, as
+    with an absolute encoder."""
     soft_limits: Range | None = None
     """Motor range to which the drive itself clamps targets (607Dh) [rad]; none sets no range."""
 
