@@ -28,9 +28,9 @@ class ManyLegs:
 
     terms: PairTerms
     stiffness: Pair
-    """[N m/rad]"""
+    """Stiffness of the springs on q1 and q2 [N m/rad]."""
     damping: Pair
-    """[N m s/rad]"""
+    """Damping of q1 and q2 [N m s/rad]."""
     stops: tuple[Stop, ...]
 
     @classmethod

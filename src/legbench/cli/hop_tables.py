@@ -1,4 +1,4 @@
-"""What `legbench hop` has found, as lines of text and as JSON."""
+"""Results of `legbench hop` as lines of text and as JSON."""
 
 from dataclasses import asdict
 from typing import Any
@@ -76,7 +76,7 @@ def cycle_lines(cycle: Cycle) -> list[str]:
 
 
 def _growth(cycle: Cycle) -> str:
-    """What the largest multiplier does to the motion, and along what."""
+    """Words for the growth by the largest multiplier, and for its direction."""
     value, direction = cycle.multipliers[0], cycle.directions[:, 0] * UNITS
     largest = int(np.argmax(np.abs(cycle.directions[:, 0])))
     scaled = np.abs(direction / direction[largest])

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class Followed(StrEnum):
-    """Which modes are followed."""
+    """Choice of the modes that are followed."""
 
     RADIAL = "radial"
     POLAR = "polar"
@@ -45,7 +45,7 @@ class ModesArguments:
     at: float | None = None
     """Show the orbits of just this energy instead of the last ones [J]."""
     family: Followed = Followed.BOTH
-    """Which of the two modes is followed."""
+    """Mode that is followed, or both."""
     branches: bool = False
     """Follow the families that branch off where stability changes, too."""
     damped: bool = False

@@ -1,4 +1,4 @@
-"""What `legbench modes` has found, as JSON."""
+"""Results of `legbench modes` as JSON."""
 
 from dataclasses import asdict
 from typing import Any

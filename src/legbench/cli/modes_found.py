@@ -1,4 +1,4 @@
-"""What `legbench modes` has found: the families and curves that were asked for."""
+"""Results of `legbench modes`: the families and curves that were asked for."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

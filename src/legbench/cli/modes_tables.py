@@ -1,4 +1,4 @@
-"""What `legbench modes` has found, as lines of text."""
+"""Results of `legbench modes` as lines of text."""
 
 from collections.abc import Sequence
 from typing import TypeVar

@@ -33,11 +33,11 @@ class Reach:
     segment: str
     """`thigh`, `shank` or `foot`."""
     inertia: float
-    """What the design asks for, about the centre of mass [kg m^2]."""
+    """Inertia that the design asks for, about the centre of mass [kg m^2]."""
     most: float
-    """`m c (l - c)`, the most that mass between the joints can have [kg m^2]."""
+    """Largest inertia of mass between the joints, `m c (l - c)` [kg m^2]."""
     overhang: float
-    """How far beyond both joints mass has to reach at least [m]; zero if it need not."""
+    """Least reach of mass beyond both joints [m]; zero if none is needed."""
 
     @property
     def realisable(self) -> bool:

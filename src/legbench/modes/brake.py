@@ -31,21 +31,21 @@ SAMPLES = 65
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BrakeOrbit:
-    """One oscillation of a mode."""
+    """One oscillation of a mode, which stops at both ends."""
 
     start: Floats
     """Posture at one end (2,) [rad]."""
     end: Floats
     """Posture at the other end (2,) [rad]."""
     period: float
-    """[s]"""
+    """Duration until the leg is back at its start [s]."""
     energy: float
     """Energy above rest [J]."""
     bend: float
     """Largest |z1| on the way for the radial mode, of z2's excursion from rest for the polar
     one [rad]: distance from the straight line that the mode would be."""
     monodromy: Monodromy
-    """How neighbours move relative to it in one period."""
+    """Motion of its neighbours in one period, to first order."""
     outside: str
     """Joint that is beyond its limit somewhere on the way, and where; empty if none is."""
 

@@ -31,9 +31,9 @@ class Branch:
     side: int
     """1 or -1: which way along the eigenvector."""
     orbits: tuple[PeriodicOrbit, ...]
-    """Its orbits, by growing distance from the mode."""
+    """Orbits of the branch, by growing distance from the mode."""
     ended: str
-    """Why there are no more."""
+    """Reason why there are no more, in words."""
 
 
 def branches(family: Family, *, most: int = MOST) -> tuple[Branch, ...]:

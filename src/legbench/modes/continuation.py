@@ -16,7 +16,7 @@ Equations = Callable[[Floats], tuple[Floats, Floats]]
 """Residual (n,) of unknowns (n + 1,), and its derivative (n, n + 1); a residual that is not finite
 where there is nothing to solve."""
 NEWTON = 12
-"""Iterations after which a step is given up and halved."""
+"""Number of iterations after which a step is given up and halved."""
 FARTHEST = 0.5
 """Largest change of an unknown in one iteration; beyond it Newton's method is lost."""
 

@@ -15,7 +15,7 @@ from legbench.signals import Floats
 CLOSED = 1e-9
 """Distance between the two ends of a cycle that is solved, in `UNITS` [-]."""
 NEWTON = 25
-"""Iterations after which a cycle is given up."""
+"""Number of iterations after which a cycle is given up."""
 SHORTER = 0.5
 """Largest change of an iteration, in `UNITS` [-]."""
 LONGEST = 8
@@ -37,7 +37,7 @@ class Cycle:
     directions: Floats
     """Eigenvectors, one a column, complex, in `UNITS` at the first apex (6, 6)."""
     residual: float
-    """What is left of each `map(apex) - next apex`, in `UNITS` [-]."""
+    """Largest remainder of `map(apex) - next apex`, in `UNITS` [-]."""
 
     @property
     def period(self) -> int:
@@ -58,7 +58,7 @@ class Cycle:
 def stacked(
     leg: TaylorLeg, drive: AbstractDrive, apexes: Floats
 ) -> tuple[Floats, Floats, list[Floats]]:
-    """How far each hop misses the next apex, the derivative of that, and those of the hops.
+    """Distances by which hops miss the next apex, with their derivative and those of the hops.
 
     Args:
         leg: the compiled leg.

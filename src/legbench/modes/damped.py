@@ -28,7 +28,7 @@ class DampedFamily:
     """Dampers of both joints [N m s/rad]."""
     orbits: tuple[PeriodicOrbit, ...]
     ended: str
-    """Why there are no more."""
+    """Reason why there are no more, in words."""
 
 
 def follow_damped(

@@ -30,7 +30,7 @@ DETERMINANT = 1e-8
 RATIOS = ((2, 1), (3, 1), (3, 2), (1, 2), (1, 3), (2, 3))
 """Ratios of linear frequencies, radial to polar, that are told as internal resonances."""
 NEAR = 0.02
-"""How near to such a ratio, relative to it [-]."""
+"""Relative distance from such a ratio within which it is told [-]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,9 +61,9 @@ class Family:
     passings: tuple[Passing, ...]
     """Orbits at which the trace passes a level, by growing amplitude."""
     ended: str
-    """Why there are no more."""
+    """Reason why there are no more, in words."""
     warnings: tuple[str, ...]
-    """What keeps the family from being taken at its word: resonances, errors of its multipliers."""
+    """Reasons not to take the family at its word: resonances, errors of its multipliers."""
 
     @property
     def largest(self) -> float:

@@ -37,11 +37,11 @@ STEP = 0.1
 MOST = 120
 """Largest number of hops of a family [-]."""
 MARGINAL = 1e-4
-"""How near to 1 the largest multiplier comes where a change of stability is solved for [-]."""
+"""Distance from 1 of the largest multiplier at a change of stability that is solved for [-]."""
 LOOKS = 12
 """Largest number of hops that are solved for at a change of stability [-]."""
 AGAIN_NEAR, AGAIN_AFTER = 0.03, 5
-"""How near a family comes to one of its hops, and how many hops later, when it has closed [-]."""
+"""Distance within which a family has come back to one of its hops, and how many hops later [-]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,7 +68,7 @@ class Change:
 
     @property
     def kind(self) -> str:
-        """What happens there, in words."""
+        """Words for what happens there."""
         multiplier = self.member.cycle.multipliers[0]
         if abs(multiplier.imag) > 1e-3:
             return "a pair of multipliers, to hops that wander around it"
@@ -85,7 +85,7 @@ class HopFamily:
     members: tuple[Member, ...]
     changes: tuple[Change, ...]
     ended: str
-    """Why there are no more."""
+    """Reason why there are no more, in words."""
 
 
 @final

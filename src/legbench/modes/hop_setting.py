@@ -12,7 +12,7 @@ from legbench.modes.drive import JumpLaw
 
 
 class Setting(StrEnum):
-    """What is varied."""
+    """Setting over which a hop is followed."""
 
     Z2 = "z2"
     """Middle of the set points [rad]."""

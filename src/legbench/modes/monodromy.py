@@ -1,4 +1,4 @@
-"""What one period does to the neighbours of a periodic orbit.
+"""Motion of the neighbours of a periodic orbit over one period.
 
 In a conservative leg two of the four Floquet multipliers are one: along the orbit, and towards
 orbits of another energy. As a double eigenvalue they are known to half of the digits only. They

@@ -35,7 +35,7 @@ class PeriodicOrbit:
     start: Floats
     """q1, q2, v1, v2 at one instant (4,) [rad, rad/s]."""
     period: float
-    """[s]"""
+    """Duration until the leg is back in its state [s]."""
     energy: float
     """Largest energy above rest on the way [J]."""
     lost: float

@@ -33,11 +33,11 @@ class Response:
     start: Floats
     """State when the motors go to z2 + dz2 (4,) [rad, rad/s]."""
     folded: float
-    """How long they stay there [s]."""
+    """Duration of the motors' stay at z2 + dz2 [s]."""
     stretched: float
-    """How long they then stay at z2 - dz2 [s]."""
+    """Duration of the motors' stay at z2 - dz2 afterwards [s]."""
     dz2: float
-    """[rad]"""
+    """Amplitude of the motors [rad]."""
     radial: float
     """Half of the range of z2 [rad]."""
     polar: float
@@ -65,7 +65,7 @@ class ResponseCurve:
     dz2: float
     responses: tuple[Response, ...]
     ended: str
-    """Why there are no more."""
+    """Reason why there are no more, in words."""
 
 
 @final

@@ -40,10 +40,10 @@ class RiddenCurve:
     """Limit cycles of bang-bang by growing dz2."""
 
     threshold: float
-    """[N m]"""
+    """Modal spring torque that switches [N m]."""
     cycles: tuple[Response, ...]
     ended: str
-    """Why there are none with larger dz2."""
+    """Reason why there are none with larger dz2, in words."""
 
 
 class _Law:

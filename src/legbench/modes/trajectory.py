@@ -27,13 +27,13 @@ class OrbitPath:
     """One orbit, sampled over its period."""
 
     family: str
-    """Which family it belongs to."""
+    """Name of the family to which the orbit belongs."""
     index: int
-    """Its place in the family, from 0 [-]."""
+    """Place of the orbit in the family, from 0 [-]."""
     energy: float
     """Energy above rest [J]."""
     period: float
-    """[s]"""
+    """Duration of one oscillation [s]."""
     stable: bool | None
     """Whether neighbours of the same energy stay near; None of a damped mode."""
     rows: Floats

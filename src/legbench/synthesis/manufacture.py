@@ -31,7 +31,7 @@ class Row:
     shown: str
     """Value in workshop units, as text."""
     note: str = ""
-    """What a workshop has to mind; empty if nothing."""
+    """Remark for the workshop; empty if there is nothing to mind."""
 
 
 def manufacture_table(design: LegDesign) -> tuple[Row, ...]:
@@ -92,7 +92,7 @@ def _row(part: str, quantity: str, symbol: str, value: float, unit: str, note: s
 
 
 def beyond(reach: Reach) -> str:
-    """What an inertia asks for that mass between the joints cannot have; empty if it can."""
+    """Words for an inertia that mass between the joints cannot have; empty if it can."""
     if reach.realisable:
         return ""
     return (
@@ -106,7 +106,7 @@ class Lump:
     """One piece of a weight, small against the segment."""
 
     mass: float
-    """[kg]"""
+    """Mass of the piece [kg]."""
     position: float
     """Distance from the proximal joint towards the distal one [m]."""
 
