@@ -264,3 +264,28 @@ def test_a_response_that_meets_a_stop_ends_there_by_name() -> None:
     curve = respond(make_scene(weak, Holding.FFS, 1.0), weak.damping, 0.05)
     assert curve.ended.startswith("the knee reaches its limit of 0.3 rad at ")
     assert curve.responses[-1].radial > 0.7
+
+
+def test_a_multiplier_of_minus_one_leads_to_orbits_of_twice_the_period() -> None:
+    scene = make_scene(OPTIMAL, Holding.FFS, 1.3)
+    family = follow(scene, "radial", 0.35)
+    doubled = [one for one in family.passings if one.periods == 2]
+    assert [one.stable_after for one in doubled] == [False, True]
+    found = branches(family, most=5)
+    assert [branch.passing.periods for branch in found] == [2, 2, 2, 2]
+    for branch in found:
+        last, once = branch.orbits[-1], branch.passing.orbit.period
+        assert last.period == pytest.approx(2.0 * once, rel=0.1)
+        whole = moved(scene, last.start, last.period)
+        assert np.max(np.abs(whole - last.start)) < 1e-7
+        half = moved(scene, last.start, 0.5 * last.period)
+        assert np.max(np.abs(half - last.start)) > 0.1
+    # Each leaves the mode with the stability that the mode has not got there.
+    assert [branch.orbits[0].monodromy.stable for branch in found] == [True, True, False, False]
+
+
+def test_an_internal_resonance_is_told_where_the_pair_turns_by_a_third() -> None:
+    family = follow(make_scene(OPTIMAL, Holding.FFS, 1.3), "radial", 0.06)
+    (passing,) = family.passings
+    assert (passing.turns, passing.periods, passing.changes) == (1, 3, False)
+    assert passing.orbit.monodromy.pair[0] ** 3 == pytest.approx(1.0, abs=1e-6)

@@ -113,7 +113,7 @@ def _periodic(orbit: PeriodicOrbit) -> dict[str, Any]:
         "start": orbit.start.tolist(),
         "radial": orbit.radial,
         "polar": orbit.polar,
-        "area": orbit.area,
+        "slowest": orbit.slowest,
         "brakes": orbit.brakes,
     }
 

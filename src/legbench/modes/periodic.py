@@ -24,8 +24,8 @@ CLOSED = 1e-9
 """Largest distance between the two ends of a closed orbit, scaled [-]."""
 SAMPLES = 129
 """States of an orbit at which its shape and the joint limits are looked at [-]."""
-LINE = 1e-6
-"""Area in joint space below which an orbit goes back the way it came [rad^2]."""
+BRAKES = 1e-3
+"""Smallest speed over the largest below which an orbit stops and goes back the way it came [-]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,8 +47,8 @@ class PeriodicOrbit:
     """Half of the range of z2 [rad]."""
     polar: float
     """Half of the range of z1 [rad]."""
-    area: float
-    """Area that it encloses in joint space [rad^2]; zero of an orbit that stops at both ends."""
+    slowest: float
+    """Smallest speed on the way over the largest, by kinetic energy [-]."""
     monodromy: Monodromy
     """Pair and trace mean what they say for an undamped leg only."""
     outside: str
@@ -56,8 +56,8 @@ class PeriodicOrbit:
 
     @property
     def brakes(self) -> bool:
-        """Whether it goes back the way it came."""
-        return self.area < LINE
+        """Whether it stops somewhere, from where it goes back the way it came."""
+        return self.slowest < BRAKES
 
     @property
     def damping_ratio(self) -> float:
@@ -120,7 +120,7 @@ class Shooting:
         path = self.carrier.path(start, np.linspace(0.0, period, SAMPLES), extra=extra)
         q, v = path[:, :2], path[:, 2:]
         scene = self.carrier.scene
-        kinetic = 0.5 * np.einsum("ni,nij,nj->n", v, scene.mass(q), v)
+        kinetic = self._kinetic(path)
         z1, z2 = (q[:, 1] + q[:, 0]) / np.sqrt(2.0), (q[:, 1] - q[:, 0]) / np.sqrt(2.0)
         taken = (self.carrier.damping * v**2).sum(axis=-1)
         return PeriodicOrbit(
@@ -132,14 +132,38 @@ class Shooting:
             extra=extra,
             radial=float(np.ptp(z2) / 2.0),
             polar=float(np.ptp(z1) / 2.0),
-            area=_area(q),
+            slowest=self._slowest(start, period, extra, kinetic),
             monodromy=monodromy(self.carrier, start, period),
             outside=beyond_limits(scene, q),
         )
 
+    def _kinetic(self, path: Floats) -> Floats:
+        """Kinetic energy (n,) of states (n, 4) [J]."""
+        q, v = path[:, :2], path[:, 2:]
+        return 0.5 * np.einsum("ni,nij,nj->n", v, self.carrier.scene.mass(q), v)
 
-def _area(path: Floats) -> float:
-    """Area that a closed curve (n, 2) encloses, by the shoelace formula."""
-    x, y = path[:-1].T
-    along_x, along_y = path[1:].T
-    return float(0.5 * abs(np.sum(x * along_y - y * along_x)))
+    def _slowest(self, start: Floats, period: float, extra: float, kinetic: Floats) -> float:
+        """Smallest speed over the largest, searched by parabolas through the kinetic energy."""
+        largest, least = float(np.max(kinetic)), float(np.min(kinetic))
+        step = period / (SAMPLES - 1)
+        at = step * float(np.argmin(kinetic[:-1]))
+        state = self.carrier.path(start, np.array([0.0, at or period]), extra=extra)[-1]
+        for _ in range(3):
+            # Around the slowest instant, a step back: the flow goes either way.
+            ways = [
+                self.carrier.path(state, np.array([0.0, sign * step]), extra=extra)
+                for sign in (-1.0, 1.0)
+            ]
+            before, here, after = self._kinetic(np.stack([ways[0][1], state, ways[1][1]]))
+            bend = before - 2.0 * here + after
+            least = min(least, float(here))
+            if not bend > 0.0:
+                break
+            move = 0.5 * step * float(before - after) / float(bend)
+            move = float(np.clip(move, -step, step))
+            if move == 0.0:
+                break
+            state = self.carrier.path(state, np.array([0.0, move]), extra=extra)[-1]
+            least = min(least, float(self._kinetic(state[np.newaxis])[0]))
+            step *= 0.2
+        return float(np.sqrt(max(least, 0.0) / largest))
