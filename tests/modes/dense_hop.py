@@ -1,9 +1,9 @@
 """Hops by an independent path: DOP853 on the interpreted equations, events on dense output.
 
-Nothing is shared with the compiled leg but the design and the settings. Steps end where a stop
-begins or ends to push; the controller is its rules, not levels of a probe; every condition is
-looked at on the interpolant of each step, and where two looks may hide a double crossing, its
-largest value is searched between them.
+Shared with the compiled leg are the equations, typed once, and the settings; integrator, events,
+stops and the controller's rules are this one's own. Steps end where a stop begins or ends to push;
+every condition is looked at on the interpolant of each step, and where two looks may hide a double
+crossing, its largest value is searched between them.
 """
 
 import math

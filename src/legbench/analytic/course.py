@@ -78,6 +78,7 @@ class Course:
         watch: the compiled regime.
         bumpers: the joint stops.
         lookout: what is watched.
+        told: the state that was last told of, while the leg is still there.
     """
 
     def __init__(
@@ -98,6 +99,7 @@ class Course:
         self._variation = Variation(tolerance) if model.ops is DUAL else None
         self.lookout = Lookout(self, self.plain, min_phase)
         self.motor: Pair = (0.0, 0.0)
+        self.told: LegState | None = None
 
     def start(self, state: LegState) -> None:
         """Put the leg somewhere."""
@@ -124,7 +126,7 @@ class Course:
         ops, along = self.model.ops, steady_point(self.model, self.regime)
         (x, z), (dx, dz) = self.centre() if self.watch.flies else (self.point, self.drift)
         inner, inner_vel = sweep(ops, self.q, along), sweep_rate(ops, self.q, self.v, along)
-        return LegState(
+        self.told = LegState(
             time=self.time,
             regime=self.regime,
             q=self.q,
@@ -133,6 +135,7 @@ class Course:
             trunk_vel=(dx - inner_vel[0], dz - inner_vel[1]),
             since=self.since,
         )
+        return self.told
 
     def centre(self) -> tuple[Pair, Pair]:
         """Place [m] and velocity [m/s] of the centre of mass in flight."""
@@ -183,6 +186,7 @@ class Course:
         Raises:
             PlantFault: the integration failed.
         """
+        self.told = None
         if levels is not self.lookout.levels:
             self.lookout.lay(levels)
         for _ in range(MAX_EVENTS):
@@ -197,9 +201,8 @@ class Course:
                     return seen
             elif self.time >= until:
                 return None
-        raise PlantFault(
-            "integration failed", f"integration failed at t = {self.time:.6f} s: the leg chatters"
-        )
+        why = f"integration failed at t = {self.time:.6f} s: the leg chatters"
+        raise PlantFault("integration failed", why)
 
     def watches(self) -> list[Watch]:
         """Compiled regimes that the leg has been in so far."""
@@ -268,7 +271,7 @@ class Course:
 
     def _enter(self, regime: Regime) -> None:
         """Begin a regime here and now."""
-        self.regime = regime
+        self.regime, self.told = regime, None
         self.terms = terms_of(self.plain, regime)
         self.lookout.enter(regime, self.since)
         self._load(held=False)
@@ -276,11 +279,8 @@ class Course:
     def _load(self, *, held: bool) -> None:
         """Put where the leg is into the integrator of its regime."""
         watch = self.watch = self._watch_of(held=held)
-        self.plain_q, self.plain_v, self.plain_motor = (
-            floats(self.q),
-            floats(self.v),
-            floats(self.motor),
-        )
+        self.plain_q, self.plain_v = floats(self.q), floats(self.v)
+        self.plain_motor = floats(self.motor)
         self.began = self.time
         watch.integrator.time = 0.0
         watch.integrator.reset_cooldowns()

@@ -34,8 +34,8 @@ vanishes together with the force [-]."""
 RISE, FALL, FELL, FELL_BACK, TURN, CONTACT = map(
     int, (Event.RISE, Event.FALL, Event.FELL, Event.FELL_BACK, Event.TURN, Event.CONTACT)
 )
-LIMITS = tuple(range(Event.KNEE_LOW, Event.HIP_HIGH + 1))
-"""Events of the joints' limits."""
+ANGLES = (RISE, FALL, FELL, FELL_BACK, *range(Event.KNEE_LOW, Event.HIP_HIGH + 1))
+"""Events that look at angles: two at the probe, two at q1 + q2, two at the knee, two at q1."""
 SEEN = {
     RISE: Watched.RISE,
     FALL: Watched.FALL,
@@ -74,7 +74,7 @@ class Lookout:
         self._arm = floats(foot_from_centre(model))
         self._weight = model.floating.mass * GRAVITY
         self.levels, self.lean, self.blind = SILENT, NEVER, 0.0
-        self._turn, self._fresh, self._jumped, self._free = 0.0, False, False, False
+        self._turn, self._free = 0.0, False
 
     def enter(self, regime: Regime, since: float) -> None:
         """Begin a regime: the ground is not looked at for the shortest phase, turns start anew."""
@@ -83,7 +83,7 @@ class Lookout:
 
     def move_to(self, watch: Watch) -> None:
         """Lay all levels in another integrator."""
-        course, self._watch, self._jumped = self._course, watch, True
+        course, self._watch = self._course, watch
         watch.restore()
         watch.lay_bounds(FELL, FELL_BACK, -self.lean, self.lean, NEVER)
         course.bumpers.lay(watch)
@@ -92,7 +92,6 @@ class Lookout:
     def lay(self, levels: Levels) -> None:
         """Watch other levels."""
         self.levels, watch = levels, self._watch
-        self._fresh = True
         watch.lay_bounds(FALL, RISE, levels.lower, levels.upper, NEVER)
         if not levels.turns:
             self._turn = 0.0
@@ -109,8 +108,9 @@ class Lookout:
         course, watch = self._course, self._watch
         if watch.moved:
             watch.restore()
-            self._fresh = self._jumped = True
-        due = self._near() if self._fresh else None
+        due = self._near()
+        if self.levels.turns:
+            self._guard_turn()
         if course.bumpers.touched:
             course.bumpers.guard(
                 watch, course.terms, course.plain_motor, course.plain_q, course.plain_v
@@ -121,24 +121,18 @@ class Lookout:
         return due
 
     def _near(self) -> int | None:
-        """Guard what has been laid anew or jumped; one whose condition holds already."""
-        course = self._course
-        guard, (q1, q2), due = self._watch.guard, course.plain_q, None
-        reading = course.probe[0] * q1 + course.probe[1] * q2
-        if guard(RISE, reading):
-            due = RISE
-        elif guard(FALL, reading):
-            due = FALL
-        if self.levels.turns:
-            self._guard_turn()
-        if self._jumped:
-            lean, knee = q1 + q2, q2 - q1
-            if guard(FELL, lean) or guard(FELL_BACK, lean):
-                due = FELL
-            for event, angle in zip(LIMITS, (knee, knee, q1, q1), strict=True):
-                guard(event, angle)
-        if due is None:
-            self._fresh = self._jumped = False
+        """Guard the events of angles; one whose condition holds already."""
+        course, watch = self._course, self._watch
+        (p1, p2), (q1, q2), gain, level = course.probe, course.plain_q, watch.gain, watch.level
+        reading, lean, knee = p1 * q1 + p2 * q2, q1 + q2, q2 - q1
+        due = None
+        for event, value in zip(
+            ANGLES, (reading, reading, lean, lean, knee, knee, q1, q1), strict=True
+        ):
+            if gain[event] * value - level[event] > -NUDGE:
+                beyond = watch.guard(event, value)
+                if beyond and due is None and event in SEEN:
+                    due = event
         return due
 
     def _contact(self) -> int | None:

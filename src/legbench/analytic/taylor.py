@@ -52,7 +52,6 @@ class TaylorLeg:
         self.model = model
         self._probe, self._min_phase, self._tolerance = probe, min_phase, tolerance
         self.course = Course(model, probe=probe, tolerance=tolerance, min_phase=min_phase)
-        self._last: LegState | None = None
         self._varied: TaylorLeg | None = None
 
     @property
@@ -83,9 +82,9 @@ class TaylorLeg:
             state, what = self.watch(state, until, motor, SILENT)
             if what is Watched.CONTACT:
                 self.course.switch()
-                self._last = self.course.state()
-                happened.append(Transition(time=state.time, before=state, after=self._last))
-                state = self._last
+                after = self.course.state()
+                happened.append(Transition(time=state.time, before=state, after=after))
+                state = after
         return state, happened
 
     def watch(
@@ -97,12 +96,11 @@ class TaylorLeg:
             PlantFault: the integration failed.
         """
         course = self.course
-        if state is not self._last:
+        if state is not course.told:
             course.start(state)
         course.hold(motor)
         what = course.go(until, levels)
-        self._last = course.state()
-        return self._last, what
+        return course.state(), what
 
     def order(self, regime: Regime) -> int:
         """Order of the Taylor series that the tolerance asks for."""
