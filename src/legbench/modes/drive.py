@@ -86,13 +86,14 @@ class JumpLaw(AbstractDrive):
     threshold of the controller is a level of y, and every extreme one of its turns.
 
     Raises:
-        ConfigError: a set point that the leg cannot reach.
+        ConfigError: settings that the controller itself refuses for this leg.
     """
 
     def __init__(self, config: JumpConfig, design: LegDesign) -> None:
         targets = LegTargets(
             designs=design, support=Support.FOOT, convention=ModalConvention.ORTHONORMAL
         )
+        config.build(targets)
         self._exits, self._turn = phase_exits(config), config.apex_turn
         k1, k2 = design.stiffness
         self._k = min(k1, k2)

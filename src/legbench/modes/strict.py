@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from legbench.analytic.matrices import pair_coriolis
-from legbench.modes.flow import orbit
+from legbench.modes.carry import Carrier
 from legbench.modes.linear import RADIAL
 from legbench.modes.scene import Scene
 from legbench.signals import Floats
@@ -80,7 +80,8 @@ def check(scene: Scene, curve: Curve, seconds: float) -> Strictness:
 
 
 def _strays(scene: Scene, curve: Curve, seconds: float) -> float:
-    path = orbit(scene, curve.points[-1], seconds, 400)
+    start = np.concatenate([curve.points[-1], [0.0, 0.0]])
+    path = Carrier(scene).path(start, np.linspace(0.0, seconds, 400))[:, :2]
     first, last = curve.points[:-1], curve.points[1:]
     way = last - first
     share = np.einsum("nki,ki->nk", path[:, np.newaxis] - first, way) / np.sum(way**2, axis=-1)
