@@ -29,7 +29,8 @@ from legbench.drives.master.session import Session
 from legbench.drives.protocol.frame import Frame
 from legbench.drives.setup.bus_file import load_bus, load_limits
 from legbench.drives.setup.config import BusConfig
-from legbench.drives.transport.unix_bus import PACKET, UnixBus, pack_frame, unpack_frame
+from legbench.drives.transport.unix_bus import UnixBus
+from legbench.drives.transport.unix_packet import PACKET, pack_frame, unpack_frame
 from legbench.experiment import Experiment, make_controller, start_of, targets_of
 from legbench.plant.can import CanPlant
 from legbench.plant.emulated_leg import EmulatedLeg

@@ -19,8 +19,9 @@ from pathlib import Path
 from legbench.drives.setup.bus_file import bus_from_mapping
 from legbench.drives.setup.eds import eds_text
 from legbench.drives.sheet.assess import assess
+from legbench.drives.sheet.bus_text import bus_text
 from legbench.drives.sheet.load import sheet_of
-from legbench.drives.sheet.propose import bus_text, propose
+from legbench.drives.sheet.propose import propose
 from legbench.errors import ConfigError, LegbenchError
 from legbench.reading import UnreadableError, parse_toml
 
@@ -107,7 +108,7 @@ def learned(text: bytes) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Mutate and count; 1 if something else than a refusal was raised."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--mutations", type=int, default=2000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("sheets", type=Path, nargs="*", help="other data sheets to begin with")

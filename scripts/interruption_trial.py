@@ -24,9 +24,10 @@ from legbench.cli.drives_moving import Configure, Home, Jog, Zero
 from legbench.cli.drives_reading import Bench
 from legbench.cli.drives_timing import Jitter
 from legbench.drives.emulated.behaviour import Behaviour
+from legbench.drives.emulated.body import stiff_body
 from legbench.drives.emulated.build import emulate
 from legbench.drives.emulated.bus import LockstepBus
-from legbench.drives.emulated.network import Network, stiff_body
+from legbench.drives.emulated.network import Network
 from legbench.drives.emulated.network_time import NetworkTime
 from legbench.drives.master.session import Session
 from legbench.drives.setup.bus_file import load_bus, load_limits

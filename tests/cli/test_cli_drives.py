@@ -103,6 +103,68 @@ def test_home_calls_the_present_position_zero(drives: Drives) -> None:
     assert (told["after_counts"], told["granted"]) == (0, None)
 
 
+@pytest.mark.parametrize("method", ["-1", "-4", "1", "17", "23", "34"])
+def test_every_kind_of_homing_can_be_tried(method: str, drives: Drives) -> None:
+    done = drives("home", "--node", "motor1", "--method", method, "--json")
+    assert done.status == 0, done.err
+    told = json.loads(done.out)
+    assert (told["method"], told["after_counts"]) == (int(method), 0)
+
+
+def test_reset_tells_every_drive_and_what_it_was(drives: Drives) -> None:
+    done = drives("reset")
+    assert done.status == 0, done.err
+    line = "was in no fault; now 0240h: switch on disabled, remote"
+    assert done.out == f"motor1 {line}\nmotor2 {line}\n"
+    nodes = json.loads(drives("reset", "--node", "motor2", "--json").out)["nodes"]
+    assert [(node["node"], node["error"], node["in_fault"]) for node in nodes] == [
+        ("motor2", "", False)
+    ]
+
+
+def test_reset_fails_while_the_cause_is_there(
+    drives: Drives, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = can_open.emulate
+
+    def tripped(*arguments: Any, **named: Any) -> Network:
+        network = real(*arguments, **named)
+        network.advance(20_000_000)
+        network.drives[1].trip(0x3220, network.now_ns)
+        return network
+
+    monkeypatch.setattr(can_open, "emulate", tripped)
+    done = drives("reset")
+    assert done.status == 1
+    assert "motor2 was in fault: 3220h under-voltage; now 0208h: fault, remote" in done.out
+    assert "motor2 is still in fault" in done.err
+    jogged = drives("jog", "--node", "motor1")
+    assert jogged.status == 1
+    assert "run `legbench drives reset --node motor2`" in jogged.err
+
+
+def test_store_names_the_drives_that_have_stored(drives: Drives) -> None:
+    done = drives("store", "--node", "motor2")
+    assert done.status == 0, done.err
+    assert done.out == "motor2 has stored its parameters (1010h:01)\n"
+    stored = json.loads(drives("store", "--part", "2", "--json").out)["stored"]
+    assert [(one["node"], one["part"]) for one in stored] == [("motor1", 2), ("motor2", 2)]
+
+
+def test_node_id_works_with_one_drive_on_the_bus(
+    capfd: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    text = BUS.read_text(encoding="utf-8")
+    path = tmp_path / "leg.toml"
+    path.write_text(text[: text.rindex("[[node]]")], encoding="utf-8")
+    where = ("--interface", "legbench", "--bus", path)
+    done = called(capfd, "drives", "node-id", "--to", "9", *where)
+    assert done.status == 0, done.err
+    assert "serial 1001  revision 0  was node 1, is node 9" in done.out
+    told = json.loads(called(capfd, "drives", "node-id", "--to", "9", "--json", *where).out)
+    assert (told["before"], told["after"], told["stored"]) == (1, 9, True)
+
+
 def test_jog_moves_one_motor_and_comes_back(drives: Drives) -> None:
     done = drives("jog", "--node", "motor1", "--by", "0.05", "--json")
     assert done.status == 0, done.err
@@ -139,7 +201,16 @@ def _ends(jogged: dict[str, list[float]]) -> tuple[list[float], list[float]]:
         (("jog", "--node", "motor1", "--by", "0.5"), ("0.5 rad", "up to 0.3 rad")),
         (("jog", "--node", "motor1", "--speed", "3"), ("3 rad/s", "up to 1 rad/s")),
         (("home", "--node", "knee"), ("no node 'knee'",)),
-        (("home", "--node", "motor1", "--method", "99"), ("homing", "failed")),
+        (("home", "--node", "motor1", "--method", "99"), ("method is 99", "1 to 37", "-128")),
+        (("home", "--node", "motor1", "--method", "36"), ("homing method 36", "06090030h")),
+        (("reset", "--node", "knee"), ("no node 'knee'", "motor1, motor2")),
+        (("store", "--node", "knee"), ("no node 'knee'",)),
+        (("store", "--part", "0"), ("part is 0", "1 to 127")),
+        (("store", "--timeout", "nan"), ("timeout is nan s", "60 s at most")),
+        (("node-id", "--to", "0"), ("node id is 0", "1 to 127")),
+        (("node-id", "--to", "126"), ("node id is 126", "master's")),
+        (("node-id", "--to", "5"), ("nodes 1, 2 answer", "disconnect")),
+        (("emulate", "--channel", "x", "--only", "hip"), ("no node 'hip'", "motor1, motor2")),
         (("home", "--node", "motor1", "--timeout", "-1"), ("timeout is -1 s", "positive")),
         (("zero", "--posture", "0", "nan"), ("posture is nan rad", "-pi to pi rad")),
         (("scan", "--last", "0"), ("last is 0", "1 to 127")),

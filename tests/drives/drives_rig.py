@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from legbench.drives.emulated.behaviour import Behaviour
+from legbench.drives.emulated.body import Body, stiff_body
 from legbench.drives.emulated.build import emulate
 from legbench.drives.emulated.bus import LockstepBus
-from legbench.drives.emulated.network import Body, Network, stiff_body
+from legbench.drives.emulated.network import Network
 from legbench.drives.master.link import Link
 from legbench.drives.protocol.cia402 import DriveState, decode_state
 from legbench.drives.setup.config import BusConfig, Identity, NodeConfig

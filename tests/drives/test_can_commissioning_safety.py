@@ -1,5 +1,6 @@
 """Small motions end at rest, whatever ends them: silence, errors, signals; virtual time."""
 
+import re
 import shutil
 import signal
 from collections.abc import Callable
@@ -246,6 +247,32 @@ def test_a_search_that_is_too_fast_is_refused() -> None:
     assert words(network, 1) == []
 
 
+@pytest.mark.parametrize(("sub", "what"), [(1, "a switch or stop"), (2, "zero")])
+def test_a_search_without_a_speed_is_refused_as_it_would_never_end(sub: int, what: str) -> None:
+    full = searching_bus()
+    none = Parameter(index=0x6099, sub=sub, kind=DataType.UNSIGNED32, value=0)
+    nodes = tuple(replace(node, parameters=(*node.parameters, none)) for node in full.nodes)
+    session, network = opened(replace(full, nodes=nodes))
+    with session, pytest.raises(ConfigError, match=f"has no speed to search {what} .*6099:0{sub}"):
+        homed(session, method=17)
+    assert words(network, 1) == []
+
+
+@pytest.mark.parametrize("method", [0, 38, 99, -129])
+def test_a_method_that_no_drive_has_is_refused_before_anything_is_sent(method: int) -> None:
+    session, network = opened()
+    with session, pytest.raises(ConfigError, match=f"method is {method}; .* 1 to 37, .* -128 to"):
+        homed(session, method=method)
+    assert not [frame for _, frame in network.log or [] if frame.cob_id > 0x600]
+
+
+def test_a_method_that_this_drive_lacks_is_told_without_power() -> None:
+    session, network = opened()
+    with session, pytest.raises(DriveError, match=r"does not take homing method 36.*06090030h"):
+        homed(session, method=36)
+    assert words(network, 1) == []
+
+
 def test_a_leg_can_be_jogged_after_homing() -> None:
     session, network = opened(starts=(0.0, 0.4))
     with session:
@@ -305,8 +332,10 @@ def test_a_signal_stops_all_drives_before_the_command_ends(
 def bench(folder: Path) -> tuple[str, ...]:
     """Flags of an emulated leg whose bus file has a speed for searches."""
     text = BUS.read_text(encoding="utf-8")
-    speeds = f'[node.parameters]\n"6099:01 u32" = {SPEED_COUNTS}\n'
-    (folder / "leg.toml").write_text(text.replace("[node.parameters]\n", speeds), encoding="utf-8")
+    speed = f'"6099:01 u32" = {SPEED_COUNTS}\n'
+    changed = re.sub(r'"6099:01 u32" = .*\n', speed, text)
+    assert changed.count(speed) == 2
+    (folder / "leg.toml").write_text(changed, encoding="utf-8")
     shutil.copy(LIMITS, folder / "limits.toml")
     design = str(ROOT / "models" / "optimal.toml")
     bus = str(folder / "leg.toml")

@@ -150,10 +150,10 @@ def test_a_leg_that_is_held_ends_in_its_rest_posture(
         assert it.plant.landing is not None
         angles = [drive.axis.motion.angle for drive in it.network.drives]
         np.testing.assert_allclose(angles, it.start.motor_pos, atol=1e-4)
-        # The paper's leg swings for long where its foot is pinned: 0.3 rad need 18 s.
+        # The paper's leg swings for long where its foot is pinned: 11 to 20 s.
         assert it.plant.landing.rested
         assert it.plant.landing.swing <= STILL_RANGE
-        assert it.plant.landing.duration < 0.7 * PATIENCE
+        assert it.plant.landing.duration < 0.75 * PATIENCE
         assert np.max(np.abs(it.body._plant.data.qvel)) < SLOW
         assert outcome.message is None
 

@@ -32,6 +32,16 @@ from legbench.recording.repair import recover
 
 PATIENCE = 30.0
 """Longest that anything may take on a busy machine [s]."""
+LOOSE = {
+    "lost_frames": 5000,
+    "overrun_cycles": 5000,
+    "following_cycles": 5000,
+    "joint_speed": 1000.0,
+    "standing": 6.0,
+    "sway": 6.0,
+}
+"""Limits that act while a machine is busy. Drives that were kept waiting make up for it by 3 ms at
+once: between two SYNCs their leg then moves three times as fast as it is."""
 CALL = "import sys\nfrom legbench.cli import main\nsys.exit(main(sys.argv[1:]))"
 
 
@@ -68,11 +78,11 @@ def calm(folder: Path, deadline_ms: int = 4000) -> Path:
     (folder / "leg.toml").write_text(text, encoding="utf-8")
     shutil.copy(LIMITS, folder / "limits.toml")
     loose = (folder / "limits.toml").read_text(encoding="utf-8")
-    for name in ("lost_frames", "overrun_cycles", "following_cycles"):
+    for name, value in LOOSE.items():
         loose = "\n".join(
-            f"{name} = 5000" if line.startswith(name) else line for line in loose.splitlines()
+            f"{name} = {value:g}" if line.startswith(name) else line for line in loose.splitlines()
         )
-    waive = 'waive = ["lost_frames", "overrun_cycles", "following_cycles"]\n'
+    waive = f"waive = {json.dumps(list(LOOSE))}\n"
     (folder / "limits.toml").write_text(loose + "\n" + waive, encoding="utf-8")
     return folder / "leg.toml"
 
@@ -264,10 +274,6 @@ def test_nobody_acts_beside_a_master_of_another_computer(tmp_path: Path) -> None
     # What the files waive is said before the run, in its manifest and in its events.
     assert "the bus file waives the master watch: drives may go on for 4001 ms" in trouble
     assert manifest["plant"]["bus"]["waived"] == ["master watch", "drive heartbeat"]
-    assert manifest["plant"]["limits"]["waive"] == [
-        "lost_frames",
-        "overrun_cycles",
-        "following_cycles",
-    ]
+    assert manifest["plant"]["limits"]["waive"] == list(LOOSE)
     (told,) = [event for event in read_events(run_folder(tmp_path))[0] if event["name"] == "waived"]
-    assert len(told["protections"]) == 5
+    assert len(told["protections"]) == 2 + len(LOOSE)

@@ -19,7 +19,8 @@ from legbench.drives.master.session import Session
 from legbench.drives.protocol.frame import Frame
 from legbench.drives.setup.bus_file import load_bus
 from legbench.drives.setup.stopping import check_stopping
-from legbench.drives.transport.unix_bus import UnixBus, pack_frame, unpack_frame
+from legbench.drives.transport.unix_bus import UnixBus
+from legbench.drives.transport.unix_packet import pack_frame, unpack_frame
 from legbench.errors import ConfigError
 from legbench.limits.safety import SafetyLimits
 
@@ -58,6 +59,8 @@ def answered(server: UnixServer, bus: can.BusABC, cob_id: int) -> can.Message:
         Frame(0x7FF, bytes(range(8))),
         Frame(0x1FFFFFFF, b"\x01", extended=True),
         Frame(0x123, remote=True),
+        Frame(0x123, remote=True, dlc=8),
+        Frame(1 << 20, remote=True, extended=True, dlc=1),
         Frame(0x40, bytes(8), error=True),
     ],
 )
@@ -65,7 +68,16 @@ def test_a_frame_survives_its_packet(frame: Frame) -> None:
     assert unpack_frame(pack_frame(frame)) == frame
 
 
-@pytest.mark.parametrize("packet", [b"", bytes(12), bytes(14), b"\0\0\0\0\xff" + bytes(8)])
+@pytest.mark.parametrize(
+    "packet",
+    [
+        b"",
+        bytes(13),
+        bytes(15),
+        b"\0\0\0\0\xff" + bytes(9),
+        b"\0\x08\0\0\0" + bytes(9),
+    ],
+)
 def test_other_packets_are_no_frames(packet: bytes) -> None:
     assert unpack_frame(packet) is None
 

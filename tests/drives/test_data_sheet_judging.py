@@ -30,12 +30,12 @@ from legbench.drives.setup.config import (
 )
 from legbench.drives.setup.outcome import Outcome
 from legbench.drives.setup.taken import check_taken
+from legbench.drives.sheet.bus_text import marked_lines
 from legbench.drives.sheet.candidates import link_candidates, temperature_candidates
 from legbench.drives.sheet.data_sheet import DataSheet
 from legbench.drives.sheet.load import sheet_of
 from legbench.drives.sheet.mapping import choose
 from legbench.drives.sheet.predict import predict
-from legbench.drives.sheet.propose import marked_lines
 from legbench.errors import ConfigError
 
 U8, U32, I32 = DataType.UNSIGNED8, DataType.UNSIGNED32, DataType.INTEGER32
@@ -55,6 +55,7 @@ def bus_of(eds: Path) -> BusConfig:
 
 
 def _on(one: NodeConfig, eds: Path) -> NodeConfig:
+    assert one.link is not None
     link = replace(one.link, bits=32)
     return replace(one, eds=eds, link=link, link_object=LINK_POSITION, tpdos=TPDOS)
 
@@ -251,6 +252,27 @@ def test_a_drive_with_one_encoder_leads_a_leg_by_its_torque_or_tells_none(tmp_pa
     assert learned_by(tmp_path, stranger()).period_us == 2000
 
 
+def test_the_period_is_one_that_the_drive_takes(tmp_path: Path) -> None:
+    for exponent, value, period_us in ((-3, 4, 4000), (-4, 20, 2000), (-3, 1, 1000)):
+        sheet = (
+            stranger().without(0x60E4).fixed({(0x60C2, 1): str(value), (0x60C2, 2): str(exponent)})
+        )
+        assert learned_by(tmp_path, sheet).period_us == period_us
+        (tmp_path / "leg.toml").unlink()
+
+
+def test_a_ramp_in_a_unit_of_the_makers_own_is_no_ramp(tmp_path: Path) -> None:
+    sheet = stranger()
+    sheet.entries[0x6085, 0].limits = ("0", "60000")
+    bus = learned_by(tmp_path, sheet)
+    given = {entry.index for entry in bus.nodes[0].parameters}
+    assert 0x6084 in given
+    assert 0x6085 not in given
+    sheet.entries[0x6084, 0].limits = ("0", "60000")
+    (tmp_path / "leg.toml").unlink()
+    assert learned_by(tmp_path, sheet).waive == ("quick-stop ramp",)
+
+
 def test_what_nothing_replaces_is_waived_by_name_and_said(tmp_path: Path) -> None:
     bus = learned_by(tmp_path, stranger().without(0x6007, 0x6084, 0x6085))
     assert bus.waive == ("master watch", "quick-stop ramp")
@@ -270,6 +292,7 @@ def test_a_file_that_is_there_is_left_as_it_is(tmp_path: Path) -> None:
     ("change", "words"),
     [
         (lambda it: it.fixed({(0x6502, 0): "0x41"}, "ro"), "6502h:00 is 0x41: .*no cyclic synch"),
+        (lambda it: it.fixed({(0x1000, 0): "0x00020191"}), "1000h:00 is 00020191h: it is no CiA"),
         (lambda it: it.without(0x6041), "6041h:00 Statusword is missing"),
         (
             lambda it: it.without(0x1801, 0x1802, 0x1803, 0x1A01, 0x1A02, 0x1A03),

@@ -159,6 +159,11 @@ def test_an_object_without_a_default_has_that_of_the_profile() -> None:
     assert found.objects[0x1000, 0].default == 0x00020192
     assert found.default((0x1000, 0), 1) is None
     assert found.objects[0x6502, 0].default == 0xA0
+    # No drive has these numbers: a maker's tool has written 0 for nothing.
+    sheet.entries[0x1000, 0].default = sheet.entries[0x6502, 0].default = "0"
+    found = sheet_of(sheet.text().encode(), "it.eds")
+    assert found.default((0x6502, 0), 1) is None
+    assert found.objects[0x1000, 0].default == 0x00020192
 
 
 @pytest.mark.parametrize(

@@ -33,7 +33,7 @@ def test_a_frame_at_another_bitrate_is_destroyed_until_its_sender_is_off_the_bus
     master = network.attach(bitrate=750_000)
     network.send(master, nmt_frame(NmtCommand.START))
     network.advance(50 * MS)
-    heard = [frame for _, frame in master.received]
+    heard = [frame for _, frame, _ in master.received]
     assert heard == [ERROR_FRAME] * (BUS_OFF // 8) + [BUS_OFF_FRAME]
     with pytest.raises(BusError, match="the controller is bus-off"):
         network.send(master, Frame(0x080))
@@ -54,10 +54,10 @@ def test_a_listener_at_another_bitrate_destroys_frames_until_it_is_error_passive
     stranger = network.attach(bitrate=500_000, listen_only=listen_only)
     network.advance(500 * MS)
     assert stranger.received
-    assert {frame for _, frame in stranger.received} == {ERROR_FRAME}
-    broken = [frame for _, frame in master.received if frame.error]
+    assert {frame for _, frame, _ in stranger.received} == {ERROR_FRAME}
+    broken = [frame for _, frame, _ in master.received if frame.error]
     assert len(broken) == (0 if listen_only else PASSIVE // 8 - 1)
-    whole = [frame.cob_id for _, frame in master.received if not frame.error]
+    whole = [frame.cob_id for _, frame, _ in master.received if not frame.error]
     assert whole.count(0x701) == whole.count(0x702) >= 24
 
 

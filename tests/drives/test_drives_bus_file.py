@@ -90,7 +90,7 @@ def test_a_bus_file_becomes_a_bus(tmp_path: Path) -> None:
         ("bitrate = 1_000_000", "bitrate = '1M'", "bus: bitrate is '1M'; it must be of type int"),
         ("id = 1", "id = 200", "node 'hip' has id 200; it must be 1 to 127"),
         ("id = 1", "id = 2", "node ids 2, 2 and master 126 must differ"),
-        ("id = 1\n", "", "node 'hip': .*missing.*'node_id'"),
+        ("id = 1\n", "", "node 'hip': id must be given"),
         ("sign = -1", "sign = 0", "sign is 0; it must be 1 or -1"),
         ("gear = 50.0", "gear = -50.0", "gear is -50; it must be positive"),
         ('"6065:00 u32"', '"6065 u32"', "'6065 u32' is no object; write index"),

@@ -27,6 +27,7 @@ def test_boot_up_comes_first_and_only_once() -> None:
 
 def test_every_object_can_be_read_and_its_access_is_kept() -> None:
     bench = Bench(configured=False)
+    bench.drive.trip(OVER_TEMPERATURE, bench.now_ns)
     for (index, sub), entry in OBJECTS.items():
         bench.read(index, sub)
         if entry.access.value in ("ro", "const"):
@@ -217,7 +218,8 @@ def test_losing_the_master_acts_as_6007_says(option: int, final: int) -> None:
     assert bench.drive.state is NmtState.OPERATIONAL
     bench.beat = True
     bench.cycle(2)
-    assert bench.emergencies() == [0x8130, 0x0000]
+    # A fault keeps its reason until it is reset.
+    assert bench.emergencies() == [0x8130] + [0x0000] * (wanted is not DriveState.FAULT)
 
 
 @pytest.mark.parametrize(
@@ -309,11 +311,11 @@ def test_mode_display_lags_and_halt_blocks_the_mode() -> None:
         bench.put(0x6060, 0, 5)
 
 
-def home(bench: Bench, method: int) -> None:
+def home(bench: Bench, method: int, speed: float = 1.0) -> None:
     bench.put(0x6098, 0, method)
     bench.put(0x607C, 0, 5000)
-    bench.put(0x6099, 1, round(1.0 * PER_RAD))
-    bench.put(0x6099, 2, round(0.5 * PER_RAD))
+    bench.put(0x6099, 1, round(speed * PER_RAD))
+    bench.put(0x6099, 2, round(0.5 * speed * PER_RAD))
     bench.enable()
     bench.put(0x6060, 0, 6)
     bench.cycle(5)
@@ -338,10 +340,27 @@ def test_homing_finds_its_place(method: int, where: float) -> None:
     assert bench.angle == pytest.approx(true, abs=1e-3)
 
 
-def test_an_unknown_homing_method_fails() -> None:
+@pytest.mark.parametrize("method", [15, 16, 31, 32, 36, 38, -5, -128])
+def test_a_homing_method_that_it_lacks_is_refused(method: int) -> None:
     bench = Bench(hard_stop=(-0.5, 0.7))
-    home(bench, 17)
+    with pytest.raises(SdoAbortError, match="06090030h"):
+        bench.put(0x6098, 0, method)
+
+
+def test_a_search_for_a_switch_that_is_not_there_fails() -> None:
+    bench = Bench(hard_stop=(-0.5, 0.7))
+    home(bench, 23)
     assert bench.status & StatusBit.FOLLOWING_ERROR
+    assert bench.status & StatusBit.TARGET_REACHED
+    assert not bench.status & StatusBit.FOLLOWS_COMMAND
+
+
+def test_a_search_without_a_speed_fails_instead_of_lasting_for_ever() -> None:
+    for method in (-3, 17, 33):
+        bench = Bench(start_pos=0.3, hard_stop=(-0.5, 0.7))
+        home(bench, method, speed=0)
+        assert bench.status & StatusBit.FOLLOWING_ERROR
+        assert bench.angle == pytest.approx(0.3, abs=1e-5)
 
 
 def test_event_driven_pdos_are_sent_on_change_and_by_their_timer() -> None:

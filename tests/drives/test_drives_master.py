@@ -136,6 +136,9 @@ def test_a_bus_log_is_read_by_others(tmp_path: Path) -> None:
             can.Message(
                 timestamp=2, arbitration_id=0x701, is_extended_id=False, is_remote_frame=True
             ),
+            can.Message(
+                timestamp=2, arbitration_id=0x181, is_extended_id=False, is_remote_frame=True, dlc=8
+            ),
         ]
         for message in sent:
             log(message)
@@ -143,6 +146,17 @@ def test_a_bus_log_is_read_by_others(tmp_path: Path) -> None:
     found = list(can.CanutilsLogReader(path))
     for message, back in zip(sent, found, strict=True):
         assert message.equals(back, timestamp_delta=1e-6, check_channel=False)
+
+
+@pytest.mark.parametrize("cob_id", [0x88, 0x40, 0x04])
+def test_an_error_frame_in_a_bus_log_is_read_back_as_one(tmp_path: Path, cob_id: int) -> None:
+    path = tmp_path / "bus.log"
+    with BusLog(FileLog(path), "can0") as log:
+        # SocketCAN's reports of a bus error, of bus-off and of an overflow.
+        log(can.Message(timestamp=1, arbitration_id=cob_id, data=bytes(8), is_error_frame=True))
+    (found,) = can.CanutilsLogReader(path)
+    assert found.is_error_frame
+    assert f"{0x20000080 | cob_id:08X}#0000000000000000" in path.read_text()
 
 
 def test_interfaces_that_are_not_there_are_named() -> None:

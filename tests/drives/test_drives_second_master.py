@@ -169,8 +169,7 @@ def spoken(
     drives = emulate(bus_config(), how).drives
     if changed is not None:
         for drive in drives:
-            drive._kept = (changed,)
-            drive._recall()
+            drive._values[changed.key] = changed.value
     return speaker, Network(drives, others=[speaker], keep_log=True)
 
 

@@ -78,6 +78,7 @@ def answered(server: SlcanServer, bus: can.BusABC, cob_id: int) -> can.Message |
         (Frame(0x181, bytes(range(8))), b"t18180001020304050607\r"),
         (Frame(0x1ABCDEF0, b"\xff", extended=True), b"T1ABCDEF01FF\r"),
         (Frame(0x123, remote=True), b"r1230\r"),
+        (Frame(0x123, remote=True, dlc=8), b"r1238\r"),
         (Frame(0x1, remote=True, extended=True), b"R000000010\r"),
     ],
 )
@@ -269,3 +270,30 @@ def test_a_line_that_was_cut_is_ended_before_the_next_one(
     assert first is not None
     assert second is not None
     bus.shutdown()
+
+
+def test_what_is_no_classic_frame_is_not_sent_and_a_closed_bus_does_nothing(
+    server: SlcanServer,
+) -> None:
+    bus = opened(server)
+    for changes in ({"is_error_frame": True}, {"is_fd": True}, {"arbitration_id": 1 << 29}):
+        with pytest.raises(can.CanOperationError, match=r"not sent|29 bits"):
+            bus.send(can.Message(**{"arbitration_id": 0, "data": b"\1\1", **changes}))
+    bus.shutdown()
+    for call in (lambda: bus.send(ASK), lambda: bus.recv(0.0)):
+        with pytest.raises(can.CanOperationError, match="shut down"):
+            call()
+
+
+def test_frames_are_stamped_when_their_bytes_are_read(
+    server: SlcanServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with opened(server) as bus:
+        for _ in range(3):
+            bus.send(ASK)
+        for _ in range(50):
+            server.poll()
+        seconds = itertools.count(100)
+        monkeypatch.setattr("legbench.drives.transport.slcan_bus.time.time", lambda: next(seconds))
+        answers = [bus.recv(0.0) for _ in range(3)]
+        assert [answer.timestamp for answer in answers if answer is not None] == [100, 100, 100]

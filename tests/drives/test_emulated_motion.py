@@ -9,6 +9,7 @@ from legbench.drives.emulated.alarms import Alarms
 from legbench.drives.emulated.behaviour import Behaviour, MissingSetpoint
 from legbench.drives.emulated.homing import Homing, HomingState
 from legbench.drives.emulated.motion import Motion
+from legbench.drives.emulated.switches import Switches
 from legbench.drives.protocol.objects import Key
 from legbench.drives.setup.units import AxisUnits
 
@@ -25,6 +26,7 @@ def motor(
     values = {
         (0x60C2, 1): 1,
         (0x60C2, 2): -3,
+        (0x607E, 0): 0,
         (0x607D, 1): 0,
         (0x607D, 2): 0,
         (0x6080, 0): 0,
@@ -237,7 +239,7 @@ def homing(made: Motion, method: int, **changes: int) -> tuple[Homing, Callable[
     values = made._values
     values |= {(0x6098, 0): method, (0x607C, 0): HOME, (0x6099, 1): SEARCH, (0x6099, 2): LEAVE}
     values |= {(0x6099, 2): changes.get("leave", LEAVE)}
-    run = Homing(values, UNITS.counts_per_rev)
+    run = Homing(values, Switches(UNITS, made._behaviour))
 
     def cycles(word: int, count: int) -> None:
         for _ in range(count):
@@ -279,7 +281,7 @@ def test_homing_seeks_a_stop_at_its_speed_and_leaves_it_for_the_index(
         assert made.actual == HOME
         assert made.angle == pytest.approx((stop - 300) / PER_RAD)
         return
-    assert run.state is HomingState.LEAVING
+    assert run.state is HomingState.SEARCHING
     back = made.actual
     cycles(0x0F | START, 1)
     assert made.actual - back == pytest.approx(-direction * LEAVE * 1e-3)
@@ -294,14 +296,14 @@ def test_homing_without_a_speed_away_from_the_stop_fails_there() -> None:
     for method, leave, state in (
         (-1, 0, HomingState.FAILED),
         (-3, 0, HomingState.ATTAINED),
-        (-1, LEAVE, HomingState.LEAVING),
+        (-1, LEAVE, HomingState.SEARCHING),
     ):
         run, cycles = homing(motor(hard_stop=(0.0, 0.1)), method, leave=leave)
         cycles(START, 3)
         assert run.state is state
 
 
-@pytest.mark.parametrize("method", [0, 1, 17, 33, 34, 36, -5])
+@pytest.mark.parametrize("method", [0, 15, 16, 31, 32, 36, 38, -5])
 def test_an_unknown_method_fails_and_moves_nothing(method: int) -> None:
     made = motor(start_pos=0.2)
     run, cycles = homing(made, method)
@@ -316,7 +318,7 @@ def test_the_end_of_bit_4_interrupts_homing_and_its_edge_begins_anew() -> None:
         made = motor(start_pos=0.05 if method == -1 else 0.6, hard_stop=(0.0, 3.0))
         run, cycles = homing(made, method, leave=leave)
         cycles(START, 40)
-        assert run.state in (HomingState.SEARCHING, HomingState.LEAVING)
+        assert run.state is HomingState.SEARCHING
         cycles(0x00, 1)
         assert run.state is HomingState.IDLE
         before = made.actual

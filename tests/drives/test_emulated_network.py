@@ -41,7 +41,7 @@ def wire(*faults: Fault, stuffing: Stuffing = Stuffing.NONE, **changes: object) 
 
 def heard(station: Station) -> list[tuple[int, int]]:
     """Time [us] and identifier of what was received."""
-    return [(at_ns // US, frame.cob_id) for at_ns, frame in station.received]
+    return [(at_ns // US, frame.cob_id) for at_ns, frame, _ in station.received]
 
 
 # --- order and times -------------------------------------------------------------------------
@@ -66,7 +66,7 @@ def test_frames_of_one_identifier_keep_their_order() -> None:
     for byte in range(20):
         network.send(here, Frame(0x181, bytes((byte,))))
     network.advance(10 * MS)
-    assert [frame.data[0] for _, frame in there.received] == list(range(20))
+    assert [frame.data[0] for _, frame, _ in there.received] == list(range(20))
 
 
 @pytest.mark.parametrize("bitrate", [125_000, 500_000, 1_000_000])
@@ -84,7 +84,7 @@ def test_a_frame_takes_its_bits(bitrate: int, stuffing: Stuffing) -> None:
             Stuffing.EXACT: exact_bits(frame),
         }[stuffing]
         end_ns = 3 * MS + bits * 1_000_000_000 // bitrate
-        assert list(there.received) == [(end_ns, frame)]
+        assert list(there.received) == [(end_ns, frame, False)]
         assert network.log == [(end_ns, frame)]
 
 
@@ -115,10 +115,11 @@ def test_a_full_queue_and_a_station_off_the_bus_take_nothing() -> None:
     network.send(here, Frame(0x100))
     network.advance(2 * MS)
     assert len(there.received) == 3
+    # What it has handed over is still sent when it has gone.
     network.send(here, Frame(0x100))
     network.detach(here)
     network.advance(3 * MS)
-    assert len(there.received) == 3
+    assert len(there.received) == 4
 
 
 # --- the body and the drives -----------------------------------------------------------------
@@ -180,9 +181,9 @@ def test_a_broken_frame_costs_eight_and_is_sent_until_its_node_is_off_the_bus() 
     assert counts == {8 * count for count in range(33)}
     network.advance(200 * MS)
     assert len(there.received) == 32
-    assert all(frame == Frame(0x88, bytes(8), error=True) for _, frame in there.received)
+    assert all(frame == Frame(0x88, bytes(8), error=True) for _, frame, _ in there.received)
     # A try is the frame's head, as long as one of no data at worst, and the error's 23 bits.
-    assert [at_ns for at_ns, _ in there.received] == [78 * US * count for count in range(1, 33)]
+    assert [at_ns for at_ns, _, _ in there.received] == [78 * US * count for count in range(1, 33)]
     assert here.received[-1][1] == Frame(0x40, bytes(8), error=True)
     assert here.waiting == 0
     with pytest.raises(BusError, match="the controller is bus-off"):
@@ -222,7 +223,7 @@ def test_a_station_at_another_bitrate_breaks_frames_until_it_is_passive() -> Non
     # 15 times it is still error active (below 128); what follows goes through.
     assert other.unread == 128
     assert network.errors[here] == 8 * 15 - 1
-    assert all(frame.error for _, frame in other.received)
+    assert all(frame.error for _, frame, _ in other.received)
     network.send(other, Frame(0x200))
     network.advance(200 * MS)
     assert network.off_bus(other)
@@ -241,7 +242,7 @@ def test_who_only_listens_breaks_nothing() -> None:
     network.send(here, Frame(0x100))
     network.advance(MS)
     assert heard(there) == [(47, 0x100)]
-    assert [frame.error for _, frame in other.received] == [True]
+    assert [frame.error for _, frame, _ in other.received] == [True]
     assert network.errors[here] == 0
     for _ in range(40):
         network.send(here, Frame(0x100))
@@ -292,7 +293,7 @@ def test_what_arrives_of_a_frame(
     if fault["kind"] is KIND.DELAY:
         # It was on the wire once, arrives nowhere, and comes again after the delay.
         arrivals = [(63 + 300 + 63, b"\1\2")]
-    assert [(at_ns // US, frame.data) for at_ns, frame in there.received] == arrivals
+    assert [(at_ns // US, frame.data) for at_ns, frame, _ in there.received] == arrivals
     # A copy is none of its sender's, and the sender does not hear it.
     assert list(here.received) == []
     assert here.waiting == 0
@@ -325,7 +326,7 @@ def test_a_babbling_node_speaks_at_its_pace_in_its_window() -> None:
     assert times[1][0] == 3000 + 111
     assert times[1][4] == 4000 + 111
     assert len(times[2]) == 1
-    assert {frame.data for _, frame in station.received} == {bytes(8), b"\7"}
+    assert {frame.data for _, frame, _ in station.received} == {bytes(8), b"\7"}
 
 
 def drives_after(fault: NodeFault, until_ms: int) -> tuple[Network, Station]:
@@ -341,7 +342,7 @@ def drives_after(fault: NodeFault, until_ms: int) -> tuple[Network, Station]:
 
 def beats(station: Station, node_id: int) -> list[int]:
     """When a node was heard [ms]."""
-    return [at_ns // MS for at_ns, frame in station.received if frame.cob_id == 0x700 + node_id]
+    return [at_ns // MS for at_ns, frame, _ in station.received if frame.cob_id == 0x700 + node_id]
 
 
 @pytest.mark.parametrize("node_id", [1, 2])
@@ -383,7 +384,7 @@ def test_a_tripped_drive_is_in_fault_and_its_cause_stands_to_the_end(
         "switch on disabled",
         "fault",
     )
-    told = [frame.data[:2] for _, frame in station.received if frame.cob_id == 0x082]
+    told = [frame.data[:2] for _, frame, _ in station.received if frame.cob_id == 0x082]
     assert told == [code.to_bytes(2, "little")]
     assert knee.axis.alarms.standing
     network.advance(29 * MS + 1)
@@ -395,7 +396,7 @@ def test_a_tripped_drive_is_in_fault_and_its_cause_stands_to_the_end(
 def test_a_reset_drive_boots_again_once() -> None:
     fault = NodeFault(kind=NodeFaultKind.RESET, node_id=1, start_ns=20 * MS, end_ns=22 * MS)
     network, station = drives_after(fault, 60)
-    boots = [at_ns // MS for at_ns, frame in station.received if frame == Frame(0x701, b"\0")]
+    boots = [at_ns // MS for at_ns, frame, _ in station.received if frame == Frame(0x701, b"\0")]
     assert boots == [5, 25]
     assert network.drives[0]._values[0x1017, 0] == 0
     assert network.drives[1]._values[0x1017, 0] == 2
@@ -424,4 +425,4 @@ def test_a_drive_whose_frames_break_leaves_the_bus_and_stops() -> None:
     network.advance(30 * MS)
     assert network.off_bus(drive)
     assert drive.axis.power.state.value == "fault"
-    assert sum(frame.error for _, frame in station.received) == 32
+    assert sum(frame.error for _, frame, _ in station.received) == 32

@@ -8,7 +8,7 @@ import itertools
 
 import pytest
 
-from legbench.drives.emulated import axis, drive
+from legbench.drives.emulated import axis, connection, drive, reception
 from legbench.drives.emulated.alarms import register_of
 from legbench.drives.emulated.power import POWERED as POWERED_INSIDE
 from legbench.drives.emulated.power import PowerStage
@@ -376,8 +376,10 @@ ABORTS = {
     0x06090031: "too high",
     0x06090032: "too low",
     0x08000000: "general error",
+    0x08000020: "transferred or stored",
     0x08000021: "local control",
     0x08000022: "device state",
+    0x08000024: "no data",
 }
 
 
@@ -407,6 +409,7 @@ EMERGENCIES = {
     0x5441: "safe torque off",
     0x6320: "parameter error",
     0x7305: "encoder",
+    0x8100: "connection ended",
     0x8110: "CAN overrun",
     0x8120: "CAN error passive",
     0x8130: "heartbeat lost",
@@ -434,10 +437,12 @@ def test_error_codes_say_what_the_standard_says_they_mean() -> None:
         drive.UNDER_VOLTAGE: (0x3220, "under-voltage"),
         drive.OVER_TEMPERATURE: (0x4310, "drive over-temperature"),
         drive.HEARTBEAT_LOST: (0x8130, "heartbeat lost"),
-        drive.PDO_SHORT: (0x8210, "PDO too short"),
-        drive.PDO_LONG: (0x8220, "PDO too long"),
-        drive.SYNC_LENGTH: (0x8240, "SYNC of unexpected length"),
-        drive.RPDO_LATE: (0x8250, "RPDO timeout"),
+        connection.CONNECTION_ENDED: (0x8100, "connection ended"),
+        connection.WAS_OFF_BUS: (0x8140, "recovered from bus-off"),
+        reception.PDO_SHORT: (0x8210, "PDO too short"),
+        reception.PDO_LONG: (0x8220, "PDO too long"),
+        reception.SYNC_LENGTH: (0x8240, "SYNC of unexpected length"),
+        reception.RPDO_LATE: (0x8250, "RPDO timeout"),
         axis.FOLLOWING_ERROR: (0x8611, "following error"),
         axis.SETPOINTS_MISSING: (0xFF10, "set points missing"),
         axis.SYNC_MISSING: (0xFF11, "SYNC missing"),

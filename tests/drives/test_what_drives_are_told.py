@@ -258,7 +258,7 @@ def test_a_data_sheet_describes_objects_as_the_standard_spells_them() -> None:
     # Arrays are of one type, records are not (CiA 301, 7.4.3).
     kinds = {
         name: (found[name]["ObjectType"], found[name]["SubNumber"])
-        for name in ("1003", "1016", "1018", "1400", "1600", "607D", "60C2")
+        for name in ("1003", "1010", "1011", "1016", "1018", "1400", "1600", "607D", "60C2")
     }
     assert kinds == {
         "1003": ("0x8", "2"),
@@ -266,6 +266,8 @@ def test_a_data_sheet_describes_objects_as_the_standard_spells_them() -> None:
         "1018": ("0x9", "5"),
         "1400": ("0x9", "5"),
         "1600": ("0x9", "9"),
+        "1010": ("0x8", "4"),
+        "1011": ("0x8", "4"),
         "607D": ("0x8", "3"),
         "60C2": ("0x9", "3"),
     }
@@ -293,8 +295,15 @@ def test_a_configured_sheet_holds_the_node_and_what_it_is_told() -> None:
     commissioning = found["DeviceComissioning"]
     assert (commissioning["NodeID"], commissioning["NodeName"]) == ("2", "knee")
     assert (commissioning["Baudrate"], commissioning["LSS_SerialNumber"]) == ("500", "101")
-    identity = [found[f"1018sub{sub}"]["ParameterValue"] for sub in (1, 2, 3, 4)]
+    identity = [found[f"1018sub{sub}"]["DefaultValue"] for sub in (1, 2, 3, 4)]
     assert identity == ["0x1234", "0x7", "0x9", "0x65"]
+    device = found["DeviceInfo"]
+    numbers = [device[f"{what}Number"] for what in ("Vendor", "Product", "Revision")]
+    assert numbers == ["0x1234", "0x7", "0x9"]
+    # What cannot be written is no parameter.
+    const = [name for name, entry in found.items() if entry.get("AccessType") == "const"]
+    assert len(const) > 10
+    assert not any("ParameterValue" in found[name] for name in const)
     last = {key: (kind, value) for key, kind, value in told(bus, chosen)}
     for key, (kind, value) in last.items():
         index, sub = key.split(":")
@@ -305,4 +314,4 @@ def test_a_configured_sheet_holds_the_node_and_what_it_is_told() -> None:
     bare = replace(chosen, identity=replace(chosen.identity, serial=None, revision=None))
     found = sheet(dcf_text(bus_of(bare), bare))
     assert found["DeviceComissioning"]["LSS_SerialNumber"] == "0"
-    assert [found[f"1018sub{sub}"]["ParameterValue"] for sub in (3, 4)] == ["0x0", "0x0"]
+    assert [found[f"1018sub{sub}"]["DefaultValue"] for sub in (3, 4)] == ["0x0", "0x0"]

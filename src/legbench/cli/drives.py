@@ -8,6 +8,7 @@ from tyro.conf import subcommand
 from legbench.cli import (
     drives_moving,
     drives_reading,
+    drives_service,
     drives_serving,
     drives_sheets,
     drives_timing,
@@ -44,6 +45,18 @@ class DrivesArguments:
         | Annotated[
             drives_moving.Jog,
             subcommand("jog", description="move one motor a little, under all limits; IT MOVES"),
+        ]
+        | Annotated[
+            drives_service.Reset,
+            subcommand("reset", description="leave faults whose cause is gone; enables nothing"),
+        ]
+        | Annotated[
+            drives_service.Store,
+            subcommand("store", description="make the drives store what they hold (1010h)"),
+        ]
+        | Annotated[
+            drives_service.NodeId,
+            subcommand("node-id", description="give the only drive on the bus another node id"),
         ]
         | Annotated[
             drives_timing.Jitter,

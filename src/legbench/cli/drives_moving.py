@@ -96,9 +96,10 @@ class Home:
     node: str
     """Name in the bus file."""
     method: int = 37
-    """6098h: 37 calls the present position zero; -1 to -4 search a hard stop."""
+    """Homing method (6098h): 35 and 37 call the present position zero, all others search and MOVE:
+    1 to 34 limit switch, home switch or index pulse (CiA 402), -1 to -128 are the maker's own."""
     timeout: float = 20.0
-    """[s]"""
+    """Longest time that the search may take [s]."""
 
     def run(self, bench: Bench) -> int:
         """Home and print the counts before and after."""
@@ -164,6 +165,11 @@ class Jog:
                 f"spring {torque:+.4f} N m"
             )
         return 0
+
+
+def nodes_named(session: Session, name: str | None) -> tuple[NodeConfig, ...]:
+    """The node of a name, or all of the bus file without one; raises ConfigError."""
+    return session.config.nodes if name is None else (_node(session, name),)
 
 
 def _node(session: Session, name: str) -> NodeConfig:

@@ -70,7 +70,7 @@ class Scan:
     """Highest node id to ask."""
 
     def run(self, bench: Bench) -> int:
-        """Print every node; 1 if a node of the bus file is not there."""
+        """Print every node; 1 if a node of the bus file is not there, or two drives share an id."""
         from legbench.commissioning.scan import scan
         from legbench.drives.protocol.frame import LAST_NODE
 
@@ -89,13 +89,19 @@ class Scan:
                     f"{_told(node.revision)}  "
                     f"{node.verdict}"
                 )
+        double = [node for node in found if node.answers > 1]
+        for node in double:
+            note(
+                f"{node.answers} drives answer as node {node.node_id}: disconnect all but one, "
+                "give it another node id with `legbench drives node-id`, then connect the next"
+            )
         missing = sorted(names - {node.verdict for node in found})
         for verdict in missing:
             note(
                 f"not there: {verdict}; look at its power, its wiring and the bitrate, "
                 f"{session.config.bitrate_text}"
             )
-        return 1 if missing else 0
+        return 1 if missing or double else 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -114,7 +120,8 @@ class Status:
         for node in nodes:
             heat = "" if node.temperature is None else f", {node.temperature:.1f} deg C"
             print(f"{node.name} (node {node.node_id}): {node.statusword}")
-            print(f"  mode {node.mode}, error {node.error}{heat}")
+            homed = {None: "", True: ", homed", False: ", NOT HOMED"}[node.homed]
+            print(f"  mode {node.mode}, error {node.error}{heat}{homed}")
             second = ", no second encoder"
             if node.link_pos is not None:
                 second = f", link {node.link_pos:+.4f} rad ({node.link_counts} counts)"
@@ -132,17 +139,15 @@ class Budget:
 
     def run(self, bench: Bench) -> int:
         """Print every frame; raises ConfigError where a channel or the files do not fit."""
+        from legbench.commissioning.learn import known_means
         from legbench.drives.setup.checks import check_together
         from legbench.drives.setup.exchange import check_budget, exchanges
-        from legbench.drives.setup.master_watch import means_of
         from legbench.drives.setup.wire import MAX_LOAD, bus_load, schedule
         from legbench.plants import LIMITS_NAME, joint_ranges, limits_for
 
         config = bench.config().at(bench.bitrate)
         limits = limits_for(bench.limits or bench.bus.parent / LIMITS_NAME, bench.leg())
-        means = {
-            node.name: means_of(config, node, speed=limits.command_speed) for node in config.nodes
-        }
+        means = known_means(config, speed=limits.command_speed)
         entries = [entry for one in config.channels for entry in schedule(config, one)]
         load = max(bus_load(config, one) for one in config.channels)
         if bench.json:

@@ -13,6 +13,7 @@ from legbench.cli.output import note, print_json, report_error
 from legbench.errors import ConfigError
 
 if TYPE_CHECKING:
+    from legbench.drives.emulated.body import Body
     from legbench.drives.setup.config import BusConfig
 
 UNIX, SLCAN = "legbench_unix", "slcan"
@@ -26,6 +27,15 @@ def _check_time(name: str, value: float) -> None:
 
 def _at_bitrate(config: "BusConfig", bitrate: int | None) -> "BusConfig":
     return config if bitrate is None else replace(config, bitrate=bitrate)
+
+
+def only(config: "BusConfig", name: str) -> "BusConfig":
+    """Return a bus with one of its drives alone; raises ConfigError for another name."""
+    nodes = tuple(node for node in config.nodes if node.name == name)
+    if not nodes:
+        names = ", ".join(node.name for node in config.nodes)
+        raise ConfigError(f"no node '{name}' in the bus file; there are {names}")
+    return replace(config, nodes=nodes)
 
 
 def _wearing(config: "BusConfig", eds: Path | None) -> "BusConfig":
@@ -65,6 +75,8 @@ class Emulate:
     """How other processes reach it: a socket file, or python-can's slcan on a terminal."""
     bare: bool = False
     """Nothing on the shafts: no MuJoCo."""
+    only: str | None = None
+    """Name of the only drive of the bus file on this bus, bare, such as for `drives node-id`."""
     eds: Path | None = None
     """Data sheet (EDS) whose dictionary all drives wear; else those that the bus file names."""
     patience: int = 5
@@ -75,22 +87,19 @@ class Emulate:
     def run(self, bench: Bench) -> int:
         """Serve until ^C or SIGTERM, printing every change of a drive's state."""
         from legbench.commissioning.emulate import Server, serve
-        from legbench.control import JumpConfig
         from legbench.drives.emulated.bus_server import BusServer
-        from legbench.drives.emulated.network import Network, stiff_body
+        from legbench.drives.emulated.network import Network
         from legbench.drives.emulated.slcan_server import SlcanServer
         from legbench.drives.emulated.unix_server import UnixServer
-        from legbench.experiment import Experiment, start_of
         from legbench.interrupts import stop_on_interrupt
         from legbench.plant.can_open import open_session
-        from legbench.plant.emulated_leg import EmulatedLeg
 
         _check_time("seconds", self.seconds)
         self._check_way(bench)
-        chosen = Experiment(design=bench.leg(), controller=JumpConfig())
-        start = start_of(chosen)
-        body = stiff_body if self.bare else EmulatedLeg(chosen.design, chosen.options, start)
         config = _wearing(_at_bitrate(bench.config(), bench.bitrate), self.eds)
+        start_pos, body = self._leg(bench)
+        if self.only is not None:
+            config, start_pos = only(config, self.only), (0.0,)
         end = time.monotonic() + self.seconds
         where = None if bench.channel is None else Path(bench.channel)
 
@@ -114,7 +123,7 @@ class Emulate:
             serve(
                 config,
                 serve_at,
-                start_pos=tuple(start.motor_pos.tolist()),
+                start_pos=start_pos,
                 body=body,
                 patience=self.patience,
                 report=partial(_print_state, bench.json),
@@ -122,6 +131,19 @@ class Emulate:
                 stop=lambda: stop.is_set or time.monotonic() > end,
             )
         return 0
+
+    def _leg(self, bench: Bench) -> "tuple[tuple[float, ...], Body]":
+        """Motor positions at power-on [rad], and what hangs on the shafts."""
+        from legbench.control import JumpConfig
+        from legbench.drives.emulated.body import stiff_body
+        from legbench.experiment import Experiment, start_of
+        from legbench.plant.emulated_leg import EmulatedLeg
+
+        chosen = Experiment(design=bench.leg(), controller=JumpConfig())
+        start = start_of(chosen)
+        bare = self.bare or self.only is not None
+        body = stiff_body if bare else EmulatedLeg(chosen.design, chosen.options, start)
+        return tuple(start.motor_pos.tolist()), body
 
     def _check_way(self, bench: Bench) -> None:
         if self.serve == SLCAN and bench.interface is not None:

@@ -9,6 +9,7 @@ from tyro.conf import Positional, UseAppendAction
 
 from legbench.cli.drives_reading import Bench
 from legbench.cli.output import note, print_json, report_error
+from legbench.plant.can_choice import LIMITS_NAME
 
 if TYPE_CHECKING:
     from legbench.commissioning.learn import Learned
@@ -96,6 +97,10 @@ def _print(learned: "Learned", *, as_json: bool, out: Path | None) -> None:
         print(f"  without master it reacts after {' or '.join(times) or 'no time that is known'}")
     if out is not None and not learned.problems:
         print(f"wrote {out}")
+        if not (out.parent / LIMITS_NAME).exists():
+            note(
+                f"a run also needs limits: copy hardware/{LIMITS_NAME} beside it, or give --limits"
+            )
     if learned.to_measure:
         note(
             f"{len(learned.to_measure)} lines of the bus file are still to be measured; each says "

@@ -4,9 +4,10 @@ import time
 from collections.abc import Callable
 
 from legbench.drives.emulated.behaviour import Behaviour
-from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.body import Body, stiff_body
+from legbench.drives.emulated.build import emulate, on_bench
 from legbench.drives.emulated.bus_server import BusServer
-from legbench.drives.emulated.network import Body, Network, stiff_body
+from legbench.drives.emulated.network import Network
 from legbench.drives.emulated.slcan_server import SlcanServer
 from legbench.drives.emulated.unix_server import UnixServer
 from legbench.drives.protocol.cia402 import DriveState
@@ -51,7 +52,7 @@ def serve(
         BusError: the bus cannot be opened, or has failed.
         PlantFault: the leg has come apart.
     """
-    behaviours = [_behaviour(pos, patience) for pos in start_pos]
+    behaviours = _behaviours(config, start_pos, patience)
     # A master on the same processor goes first, as it would on one of its own.
     ask(priority=PRIORITY - 1)
     network = emulate(config, behaviours, body=body, body_period_ns=BODY_PERIOD_NS)
@@ -70,11 +71,15 @@ def serve(
                     reporting(time.monotonic() - began, node.name, state.value)
 
 
-def _behaviour(start_pos: float, patience: int) -> Behaviour:
-    """Behaviour of a drive that replies at once and starts at a motor position [rad]."""
-    return Behaviour(
-        reply_delay_us=(0, 0),
-        start_pos=start_pos,
-        missing_limit=patience,
-        sync_loss_periods=patience,
-    )
+def _behaviours(config: BusConfig, start_pos: tuple[float, ...], patience: int) -> list[Behaviour]:
+    """Behaviours of drives that reply at once and start at some motor positions [rad]."""
+    return [
+        on_bench(
+            node,
+            pos,
+            reply_delay_us=(0, 0),
+            missing_limit=patience,
+            sync_loss_periods=patience,
+        )
+        for node, pos in zip(config.nodes, start_pos, strict=True)
+    ]

@@ -7,8 +7,9 @@ when this master falls silent; it is always led out by quick stop.
 from dataclasses import dataclass
 from typing import final
 
-from legbench.drives.errors import DriveError
+from legbench.drives.errors import DriveError, SdoAbortError
 from legbench.drives.master.bring_up import BringUp
+from legbench.drives.master.preparation import is_homed
 from legbench.drives.master.sdo_port import SdoPort
 from legbench.drives.master.sdo_stop import SdoStop, leave_operational
 from legbench.drives.master.session import Session
@@ -36,6 +37,10 @@ START_HOMING = 0x1F
 """Enable operation with bit 4."""
 IN_PLACE = (35, 37)
 """Methods that do not move."""
+INDEX_ONLY = (33, 34)
+"""Methods that search the index pulse alone, at the slower speed."""
+STANDARD, MAKERS = range(1, 38), range(-128, 0)
+"""Homing methods of CiA 402-2, and of the makers of drives."""
 NEEDED = ((0x6065, 0), (0x6072, 0), (0x6085, 0))
 """Window, torque and ramp that a search is not made without, in the bus file."""
 FASTEST = 1.0
@@ -70,7 +75,7 @@ def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20
     Args:
         session: the channel is taken.
         node: of the bus file.
-        method: 6098h; 37 calls the present position zero, -1 to -4 drive against a hard stop.
+        method: 6098h; 37 calls the present position zero, all others but 35 search.
         timeout: [s]
 
     Raises:
@@ -79,13 +84,10 @@ def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20
         BusError: the channel has a master.
         PlantFault: somebody else leads these drives; before the homing has begun, nothing has been
             sent since it was heard.
-        DriveError: another drive, a refused step, or homing failed.
+        DriveError: another drive, a refused step, homing failed, or is not shown afterwards.
         StopError: the drive keeps its power, or does not answer.
     """
-    if not 0.0 < timeout <= LONGEST:
-        raise ConfigError(f"timeout is {timeout:g} s; it must be positive, {LONGEST:g} s at most")
-    if method not in IN_PLACE:
-        _check_bounded(node)
+    _check_asked(node, method, timeout)
     # Led by SDO a drive gets no RPDO, whose deadline therefore never begins.
     check_master_watch(session.config, speed=FASTEST, commands=False)
     session.hold()
@@ -98,7 +100,7 @@ def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20
     check_taken(session.config, {node.name: up.configure(node)}, speed=FASTEST, commands=False)
     sdo = up.sdo(node)
     if method not in IN_PLACE:
-        _check_speed(sdo, node)
+        _check_speed(sdo, node, method)
     before = up.preload(node)
     _choose(sdo, node, method)
     master = _Master(session, up, node)
@@ -113,7 +115,30 @@ def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20
     up.lookout.rest()
     sdo.put(0x6060, 0, I8, Mode.CYCLIC_SYNCHRONOUS_POSITION)
     after = up.position(node)
+    _check_shown(up, node)
     return Homed(node=node.name, method=method, before_counts=before, after_counts=after)
+
+
+def _check_shown(up: BringUp, node: NodeConfig) -> None:
+    """Check that a drive shows its homing as the bus file says; raises DriveError."""
+    if is_homed(up, node) is False:
+        raise DriveError(
+            f"drive '{node.name}' has homed, and does not show it ({node.homed}): correct its "
+            "'homed' in the bus file, by which nothing begins otherwise"
+        )
+
+
+def _check_asked(node: NodeConfig, method: int, timeout: float) -> None:
+    """Refuse what no drive has or no search should be made with; raises ConfigError."""
+    if not 0.0 < timeout <= LONGEST:
+        raise ConfigError(f"timeout is {timeout:g} s; it must be positive, {LONGEST:g} s at most")
+    if method not in STANDARD and method not in MAKERS:
+        raise ConfigError(
+            f"homing method is {method}; the standard has 1 to {STANDARD[-1]}, makers of drives "
+            f"{MAKERS[0]} to -1"
+        )
+    if method not in IN_PLACE:
+        _check_bounded(node)
 
 
 def _check_bounded(node: NodeConfig) -> None:
@@ -126,17 +151,31 @@ def _check_bounded(node: NodeConfig) -> None:
         )
 
 
-def _check_speed(sdo: SdoPort, node: NodeConfig) -> None:
-    speed = sdo.get_int(0x6099, 1, U32) / abs(node.motor.counts_per_rad)
-    if speed > FASTEST:
-        raise ConfigError(
-            f"'{node.name}' would search its stop at {speed:.3g} rad/s, the limit is {FASTEST:g} "
-            'rad/s; give "6099:01 u32" [counts/s] in its parameters'
-        )
+def _check_speed(sdo: SdoPort, node: NodeConfig, method: int) -> None:
+    """Refuse a search that is too fast, or that would never come anywhere (6099h)."""
+    subs = {1: "a switch or stop", 2: "zero"}
+    for sub, what in subs.items():
+        speed = sdo.get_int(0x6099, sub, U32) / abs(node.motor.counts_per_rad)
+        # The maker's own methods need not use the second speed, an index pulse not the first.
+        needed = sub == 1 if method in MAKERS else sub == 2 or method not in INDEX_ONLY
+        way = f'give "6099:{sub:02X} u32" [counts/s] in its parameters'
+        if speed > FASTEST:
+            raise ConfigError(
+                f"'{node.name}' would search {what} at {speed:.3g} rad/s, the limit is "
+                f"{FASTEST:g} rad/s; {way}"
+            )
+        if needed and not speed:
+            raise ConfigError(f"'{node.name}' has no speed to search {what} with; {way}")
 
 
 def _choose(sdo: SdoPort, node: NodeConfig, method: int) -> None:
-    sdo.put(0x6098, 0, I8, method)
+    try:
+        sdo.put(0x6098, 0, I8, method)
+    except SdoAbortError as error:
+        raise DriveError(
+            f"drive '{node.name}' does not take homing method {method}: {error}; its manual lists "
+            "those that it has"
+        ) from error
     there = sdo.get_int(0x6098, 0, I8)
     if there != method:
         raise DriveError(f"drive '{node.name}' does not take homing method {method}: {there}")
@@ -189,8 +228,10 @@ class _Master(Lead):
             if way is Way.REFUSED:
                 break
             self.command(controlword)
+        way = f"; remove the cause, then run `legbench drives reset --node {self._node.name}`"
         raise DriveError(
             f"drive '{self._node.name}' does not become enabled: {describe_statusword(word)}"
+            f"{way if decode_state(word) is DriveState.FAULT else ''}"
         )
 
     def await_end(self, timeout: float) -> None:

@@ -12,11 +12,15 @@ from legbench.drives.setup.bus_numbers import RUN_PERIODS_US
 from legbench.drives.setup.config import BusConfig
 from legbench.drives.setup.configuration import quick_stop_ramp
 from legbench.drives.setup.exchange import check_budget
+from legbench.drives.setup.master_watch import Means, means_of
+from legbench.drives.setup.outcome import held_by
 from legbench.drives.setup.taken import check_taken
 from legbench.drives.sheet.assess import Assessment, assess
+from legbench.drives.sheet.bus_text import bus_text, marked_lines, waivers_for
 from legbench.drives.sheet.data_sheet import DataSheet
 from legbench.drives.sheet.load import load_sheet
-from legbench.drives.sheet.propose import Proposal, bus_text, marked_lines, propose, waivers_for
+from legbench.drives.sheet.predict import predict
+from legbench.drives.sheet.propose import Proposal, propose
 from legbench.errors import ConfigError
 from legbench.reading import LARGEST_TOML, UnreadableError, parse_toml, read_file
 from legbench.recording.files import write_whole
@@ -81,18 +85,26 @@ def learn(
 
 
 def _period_us(proposal: Proposal, ids: Sequence[int], folder: Path) -> int:
-    """Return the shortest period in which all frames are exchanged; raises ConfigError for none."""
+    """Return the shortest period in which all frames are exchanged and that the drives take.
+
+    Raises:
+        ConfigError: no period is long enough for all frames.
+    """
     everything = waivers_for(proposal, watched=False, braked=False)
+    carried: list[int] = []
     for period_us in RUN_PERIODS_US:
         text = bus_text(proposal, ids, everything, period_us=period_us)
+        config = _parsed(text, folder)
         try:
-            check_budget(_parsed(text, folder))
+            check_budget(config)
         except ConfigError:
-            if period_us == RUN_PERIODS_US[-1]:
+            if period_us == RUN_PERIODS_US[-1] and not carried:
                 raise
-        else:
+            continue
+        carried.append(period_us)
+        if not any(assess(proposal.sheet, config, node).problems for node in config.nodes):
             return period_us
-    return RUN_PERIODS_US[-1]
+    return carried[0]
 
 
 def write_bus(learned: Learned, out: Path) -> None:
@@ -127,6 +139,31 @@ def check(bus: Path, eds: Path | None = None) -> Learned:
     known = {path: load_sheet(path) for path in set(paths.values()) if path is not None}
     sheets = {name: known[path] for name, path in paths.items() if path is not None}
     return _judged(config, sheets, read_file(bus, LARGEST_TOML).decode("utf-8"))
+
+
+def known_means(config: BusConfig, *, speed: float) -> dict[str, tuple[Means, ...]]:
+    """Return how every drive notices that its master is gone, by the name of its node.
+
+    A drive whose node names a data sheet has the means that the data sheet leaves it.
+
+    Args:
+        config: the bus.
+        speed: highest speed of the motors [rad/s].
+
+    Raises:
+        ConfigError: a data sheet is missing or is none.
+        MissingExtraError: canopen is not installed.
+    """
+    known = {path: load_sheet(path) for path in {node.eds for node in config.nodes} if path}
+    return {
+        node.name: means_of(
+            config,
+            node,
+            speed=speed,
+            held=None if node.eds is None else held_by(predict(known[node.eds], config, node)),
+        )
+        for node in config.nodes
+    }
 
 
 def problems_of(config: BusConfig) -> tuple[str, ...]:

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from legbench.drives.errors import DriveError, NoAnswerError
+from legbench.drives.master.doubles import count_answers
 from legbench.drives.master.first_contact import first_contact
 from legbench.drives.master.identification import read_identity
 from legbench.drives.master.sdo_port import SdoPort
@@ -28,6 +29,8 @@ class Found:
     revision: int | None
     serial: int | None
     """None where the drive tells none."""
+    answers: int
+    """Number of drives that answer under this node id; each has to have one of its own."""
     verdict: str
     """How it compares with the bus file."""
 
@@ -50,6 +53,7 @@ def scan(session: Session, last: int = LAST_NODE) -> Iterator[Found]:
             found += 1
             sdo = SdoPort(port, node_id, timeout_ms=config.sdo_timeout_ms)
             there = read_identity(sdo)
+            answers = count_answers(port, node_id, 0x1018, 4)
             yield Found(
                 node_id=node_id,
                 device_type=device,
@@ -57,7 +61,10 @@ def scan(session: Session, last: int = LAST_NODE) -> Iterator[Found]:
                 product=there.product,
                 revision=there.revision,
                 serial=there.serial,
-                verdict=_verdict(config, node_id, there),
+                answers=answers,
+                verdict=_verdict(config, node_id, there)
+                if answers < 2
+                else f"{answers} drives answer with this node id",
             )
         if not found and port.error_frames:
             raise NoAnswerError(f"no node up to {last} answers")

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from legbench.drives.master.preparation import is_homed
 from legbench.drives.master.sdo_port import SdoPort
 from legbench.drives.master.session import Session
 from legbench.drives.protocol.cia402 import Mode, describe_statusword
@@ -31,6 +32,8 @@ class NodeStatus:
     link_counts: int | None
     temperature: float | None
     """[deg C]"""
+    homed: bool | None
+    """Whether the drive says that it is homed; none if it need not be."""
 
 
 def read_counts(session: Session, node: NodeConfig) -> tuple[int, int | None]:
@@ -59,10 +62,11 @@ def status(session: Session) -> list[NodeStatus]:
     """
     up = session.bring_up()
     with up.contact():
-        return [_status(up.sdo(node), node) for node in session.config.nodes]
+        nodes = session.config.nodes
+        return [_status(up.sdo(node), node, is_homed(up, node)) for node in nodes]
 
 
-def _status(sdo: SdoPort, node: NodeConfig) -> NodeStatus:
+def _status(sdo: SdoPort, node: NodeConfig, homed: bool | None) -> NodeStatus:
     motor, link = _counts(sdo, node)
     mode = sdo.get_int(0x6061, 0, DataType.INTEGER8)
     code = sdo.find_int(0x603F, 0, DataType.UNSIGNED16)
@@ -78,7 +82,7 @@ def _status(sdo: SdoPort, node: NodeConfig) -> NodeStatus:
         name=node.name,
         node_id=node.node_id,
         statusword=describe_statusword(sdo.get_int(0x6041, 0, DataType.UNSIGNED16)),
-        mode=MODES.get(mode, f"mode {mode}"),
+        mode=MODES.get(mode, str(mode)),
         error=_error(code),
         side=node.side.value,
         motor_pos=motor_pos,
@@ -86,6 +90,7 @@ def _status(sdo: SdoPort, node: NodeConfig) -> NodeStatus:
         motor_counts=motor,
         link_counts=link,
         temperature=celsius,
+        homed=homed,
     )
 
 

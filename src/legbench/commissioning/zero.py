@@ -1,25 +1,24 @@
 """Encoder offsets from a leg that stands in a known posture."""
 
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from legbench.commissioning.status import read_counts
 from legbench.drives.errors import DriveError
+from legbench.drives.master.preparation import check_homed
 from legbench.drives.master.session import Session
 from legbench.drives.setup.config import NodeConfig
+from legbench.drives.setup.encoders import Side
+from legbench.drives.setup.file_edit import Place, edit_file
 from legbench.drives.setup.units import AxisUnits
 from legbench.errors import ConfigError, RecordingError
-from legbench.recording.files import write_whole
 
 READS = 5
 """Number of reads of every encoder, which have to agree."""
 STILL_COUNTS = 40
 """Largest spread of these reads."""
-_SECTION = re.compile(r"^\s*\[+\s*([\w.]+)\s*\]+")
-_OFFSET = re.compile(r"^(\s*offset_counts\s*=\s*)-?[\d_]+", re.MULTILINE)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,6 +26,8 @@ class Zero:
     """Offsets of one node."""
 
     node: str
+    side: Side
+    """Side of the encoder of the position loop, whose table in the bus file has its name."""
     motor_offset: int
     """Offset of the encoder of the position loop [counts]."""
     link_offset: int | None
@@ -39,7 +40,7 @@ def measure(session: Session, posture: Sequence[float]) -> list[Zero]:
     Raises:
         ConfigError: an angle that no leg stands at.
         PlantFault: somebody else leads these drives.
-        DriveError: a drive does not answer, is another one, or its encoders move.
+        DriveError: a drive does not answer, is another one, is not homed, or its encoders move.
     """
     for angle in posture:
         if not abs(angle) <= math.pi:
@@ -47,6 +48,7 @@ def measure(session: Session, posture: Sequence[float]) -> list[Zero]:
     up = session.bring_up()
     up.listen()
     up.identify()
+    check_homed(up, session.config.nodes)
     return [
         _node(session, node, angle)
         for node, angle in zip(session.config.nodes, posture, strict=True)
@@ -67,7 +69,10 @@ def _node(session: Session, node: NodeConfig, angle: float) -> Zero:
             )
         offsets.append(_offset(units, shown[READS // 2], angle))
     return Zero(
-        node=node.name, motor_offset=offsets[0], link_offset=offsets[1] if offsets[1:] else None
+        node=node.name,
+        side=node.side,
+        motor_offset=offsets[0],
+        link_offset=offsets[1] if offsets[1:] else None,
     )
 
 
@@ -76,36 +81,26 @@ def _offset(units: AxisUnits, shown: int, angle: float) -> int:
 
 
 def write(path: Path, zeros: Sequence[Zero], out: Path | None = None) -> Path:
-    """Put offsets into a bus file, comments kept; whole or not at all.
+    """Put the offsets into the bus file that was measured with; whole or not at all.
+
+    Everything else in the file is kept, see `file_edit.edit_file`.
+
+    Args:
+        path: bus file.
+        zeros: offsets of its nodes, in their order.
+        out: file to write; by default the bus file itself.
 
     Raises:
-        ConfigError: it has not one `offset_counts` for every encoder.
-        RecordingError: it cannot be read or written.
+        ConfigError: the file is no TOML any more, or has other nodes.
+        RecordingError: it cannot be written.
     """
-    out = out or path
-    wanted = [
-        value
-        for zero in zeros
-        for value in (zero.motor_offset, zero.link_offset)
-        if value is not None
-    ]
+    changes: dict[Place, int] = {}
+    for number, zero in enumerate(zeros):
+        # A drive with one encoder has the table of its side alone.
+        changes["node", number, zero.side.value, "offset_counts"] = zero.motor_offset
+        if zero.link_offset is not None:
+            changes["node", number, "link", "offset_counts"] = zero.link_offset
     try:
-        lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
-        section, place = "", 0
-        for number, line in enumerate(lines):
-            found = _SECTION.match(line)
-            if found is not None:
-                section = found[1]
-            if section in ("node.motor", "node.link") and _OFFSET.match(line):
-                if place < len(wanted):
-                    lines[number] = _OFFSET.sub(rf"\g<1>{wanted[place]}", line)
-                place += 1
-        if place != len(wanted):
-            raise ConfigError(
-                f"{path} has {place} lines 'offset_counts', {len(wanted)} encoders need one each; "
-                "add them to [node.motor] and [node.link], motor first"
-            )
-        write_whole(out, "".join(lines).encode())
+        return edit_file(path, changes, out)
     except OSError as error:
-        raise RecordingError(f"cannot write offsets to {out}: {error.strerror}") from None
-    return out
+        raise RecordingError(f"cannot write offsets to {out or path}: {error.strerror}") from None

@@ -82,4 +82,4 @@ def check_number(name: str, value: float, low: float, high: float, unit: str) ->
     """
     if not low <= value <= high:
         what = f" {unit}" if unit else ""
-        raise ConfigError(f"{name} is {value}{what}; it must be {low:g} to {high:g}{what}")
+        raise ConfigError(f"{name} is {value}{what}; it must be {low:.10g} to {high:.10g}{what}")

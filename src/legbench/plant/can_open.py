@@ -6,7 +6,7 @@ from typing import Any, final
 
 from legbench.clock import AbstractClock
 from legbench.drives.emulated.behaviour import Behaviour
-from legbench.drives.emulated.build import emulate, emulate_channels
+from legbench.drives.emulated.build import emulate, emulate_channels, on_bench
 from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.emulated.channels_bus import ChannelsBus
 from legbench.drives.emulated.network import Network
@@ -177,11 +177,11 @@ def _emulated(config: BusConfig, choice: CanChoice, leg: Leg | None) -> Sequence
     """
     several = len(config.channels) > 1
     if leg is None:
-        idle = [Behaviour(start_pos=start) for start in IDLE_POS]
-        found = idle if len(config.nodes) == len(idle) else None
+        starts = IDLE_POS if len(config.nodes) == len(IDLE_POS) else (0.0,) * len(config.nodes)
+        idle = [on_bench(node, start) for node, start in zip(config.nodes, starts, strict=True)]
         if several:
-            return emulate_channels(config, found, configured=choice.read_only)
-        return [emulate(config, found, configured=choice.read_only)]
+            return emulate_channels(config, idle, configured=choice.read_only)
+        return [emulate(config, idle, configured=choice.read_only)]
     drives = [Behaviour(start_pos=float(value)) for value in leg.start.motor_pos]
     body = EmulatedLeg(leg.design, leg.options, leg.start)
     faults, configured = choice.faults, choice.read_only

@@ -13,9 +13,8 @@ STILL_TIME = 0.5
 """Time for which it must [s]; a leg that flies may be as quiet, but falls 0.3 m within it."""
 PATIENCE = 30.0
 """Time at the posture after which power goes anyway [s]. A jump of the paper's leg dies out in 4 to
-7 s. Pinned by its foot it loses a factor e in 3.6 to 5.4 s: 0.3 rad, more than its largest stroke,
-are 0.01 rad after 18 s. Motors that hold cost nothing meanwhile; a leg that swings for longer is no
-fault."""
+7 s. Pinned by its foot it loses a factor e in 3.6 to 5.4 s and rests after 11 to 20 s. Motors that
+hold cost nothing meanwhile; a leg that swings for longer is no fault."""
 
 
 class End(StrEnum):

@@ -20,8 +20,8 @@ first failure, whether the file has been closed. Each has one writer."""
 class Ring:
     """Shared memory of one log; whole lines go in, and come out in their order.
 
-    Put and taken only grow, and every number is eight bytes that are stored at once. A processor
-    may show a new number before the bytes it counts, so the taker takes what it has seen counted
+    Put and taken only grow, and every number is eight bytes that a 64-bit processor stores at once.
+    It may show a new number before the bytes it counts, so the taker takes what it has seen counted
     one look earlier, or all once a packet or the other's end says that it is there.
 
     Attributes:

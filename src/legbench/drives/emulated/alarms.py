@@ -25,18 +25,22 @@ def register_of(code: int) -> int:
 
 @final
 class Alarms:
-    """Errors of one node; they cannot be reset while the cause of one is present."""
+    """Errors of one node; they cannot be reset while the cause of one is present.
+
+    Attributes:
+        node_id: node id under which they are reported.
+    """
 
     def __init__(self, node_id: int, values: dict[Key, int]) -> None:
-        self._node_id, self._values = node_id, values
+        self.node_id, self._values = node_id, values
         self._standing: set[int] = set()
-        self._shown: set[int] = set()
+        self._shown: list[int] = []
 
     def raise_(self, code: int) -> Frame | None:
         """Record a new error; returns its emergency message, none if it has been sent."""
         if code in self._shown:
             return None
-        self._shown.add(code)
+        self._shown.append(code)
         values = self._values
         values[0x603F, 0] = code
         values[0x1003, 0], values[0x1003, 1] = 1, code
@@ -64,18 +68,20 @@ class Alarms:
         return self._message(0)
 
     def clear(self, code: int) -> Frame | None:
-        """Clear a communication error, which ends by itself; returns the all-clear, if due."""
+        """Clear a communication error, which ends by itself; returns the all-clear, if due.
+
+        603Fh then shows the latest of the errors that are left.
+        """
         if code not in self._shown:
             return None
-        self._shown.discard(code)
-        if self._shown:
-            return None
-        self._values[0x603F, 0] = 0
-        return self._message(0)
+        self._shown.remove(code)
+        all_clear = self._message(0)
+        self._values[0x603F, 0] = self._shown[-1] if self._shown else 0
+        return None if self._shown else all_clear
 
     def _message(self, code: int) -> Frame:
         register = 0
         for shown in self._shown:
             register |= register_of(shown)
         self._values[0x1001, 0] = register
-        return emcy_frame(Emergency(node_id=self._node_id, code=code, register=register))
+        return emcy_frame(Emergency(node_id=self.node_id, code=code, register=register))

@@ -7,10 +7,12 @@ from typing import final
 from legbench.drives.emulated.alarms import Alarms
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.dictionary import USUAL_LINKS
-from legbench.drives.emulated.homing import Homing, HomingState
+from legbench.drives.emulated.homing import Homing
+from legbench.drives.emulated.homing_methods import METHODS
 from legbench.drives.emulated.motion import Motion
-from legbench.drives.emulated.power import HALT, PowerStage
+from legbench.drives.emulated.power import HALT, POWERED, PowerStage
 from legbench.drives.emulated.sensors import Sensors
+from legbench.drives.emulated.switches import Switches
 from legbench.drives.protocol.cia402 import DriveState, Mode, StatusBit
 from legbench.drives.protocol.datatypes import DataType, range_of
 from legbench.drives.protocol.emcy import Emergency, emcy_frame
@@ -22,7 +24,10 @@ from legbench.drives.setup.encoders import Side
 from legbench.drives.setup.units import wrap
 
 MODES = (Mode.NONE, Mode.HOMING, Mode.CYCLIC_SYNCHRONOUS_POSITION)
+POLARITY = (0x607E, 0)
 FOLLOWING_ERROR, SETPOINTS_MISSING, SYNC_MISSING = 0x8611, 0xFF10, 0xFF11
+HOMED = 1 << 15
+"""Bit 15 of the statusword, the maker's own: the position refers to a home since power-on."""
 SHORT = (LINK_SHORT, 0)
 _ENABLED = DriveState.OPERATION_ENABLED
 _STATUS = int(StatusBit.REMOTE)
@@ -33,6 +38,7 @@ class Axis:
     """Emulated motor with its two encoders, as the object dictionary shows them.
 
     Attributes:
+        node_id: node id under which it reports its errors.
         power: power state machine.
         motion: motion of the motor.
         alarms: errors of the drive.
@@ -50,12 +56,14 @@ class Axis:
         """Turn the numbers of an object dictionary; `links` show the position of the link."""
         self._links = tuple(links)
         self._node, self._behaviour, self._values = node, behaviour, values
+        self.node_id = node.node_id
         self.power = PowerStage(values)
         self.motion = Motion(node.motor, behaviour, values)
-        self.alarms = Alarms(node.node_id, values)
+        self.alarms = Alarms(self.node_id, values)
         self.sensors = Sensors(node)
         self.warning = False
-        self._homing = Homing(values, node.motor.counts_per_rev)
+        self._switches = Switches(node.motor, behaviour)
+        self._homing = Homing(values, self._switches)
         self._link_counts = 0 if node.link is None else node.link.to_counts(behaviour.start_pos)
         self._torque = 0.0
         self._target, self._shown = node.target_object.key, node.motor_object.key
@@ -66,11 +74,22 @@ class Axis:
         self._out: list[Frame] = []
         self.publish()
 
+    def address(self, node_id: int) -> None:
+        """Report under another node id from now on."""
+        self.node_id = self.alarms.node_id = node_id
+
+    def boot(self, now_ns: int) -> None:
+        """Leave the self-test; a mode of operation that was stored is entered (6060h)."""
+        self.power.boot()
+        if self._values[0x6060, 0]:
+            self.written((0x6060, 0), now_ns)
+
     def restart(self) -> None:
         """Reset the electronics to their power-on state; the motor stays where it is."""
         self.power.state = DriveState.NOT_READY_TO_SWITCH_ON
         self.power.stopping = None
-        self.alarms = Alarms(self._node.node_id, self._values)
+        self.alarms = Alarms(self.node_id, self._values)
+        self._homing = Homing(self._values, self._switches)
         self._waiting_word = self._mode_due_ns = None
         self._late_words.clear()
         self.motion.hold(0)
@@ -89,6 +108,11 @@ class Axis:
             changes = value != self._values[0x6060, 0]
             if halted and changes and self._behaviour.halt_blocks_mode:
                 return Abort.DEVICE_STATE
+        if key == (0x6098, 0) and value not in METHODS:
+            return Abort.INVALID_VALUE
+        if key == POLARITY and value != self._values[key] and self.power.state in POWERED:
+            # The target would be another one, all at once.
+            return Abort.DEVICE_STATE
         return None
 
     def written(self, key: Key, now_ns: int) -> None:
@@ -135,7 +159,7 @@ class Axis:
         target = asked + values[0x60B0, 0] if fresh and units.show(asked) == asked else None
         if target is not None:
             # The object wraps; the motor takes the short way round.
-            target = units.nearest(target, round(self.motion.demand))
+            target = units.nearest(self.motion.sign * target, round(self.motion.demand))
         self.motion.latch(target, now_ns)
         if self.motion.missing > self._behaviour.missing_limit:
             self.fault(SETPOINTS_MISSING)
@@ -150,7 +174,8 @@ class Axis:
         self.sensors.tick(step_ns)
         before = self.motion.actual
         self._move(now_ns, step_ns)
-        self._values[0x606C, 0] = round((self.motion.actual - before) * 1e9 / step_ns)
+        turned = -1 if self._values[POLARITY] & 0x40 else 1
+        self._values[0x606C, 0] = turned * round((self.motion.actual - before) * 1e9 / step_ns)
         return self.motion.angle
 
     def _show_mode(self, now_ns: int) -> None:
@@ -202,17 +227,19 @@ class Axis:
     def publish(self) -> None:
         """Update the actual values in the object dictionary."""
         values, motion = self._values, self.motion
-        node = self._node
+        node, sign = self._node, motion.sign
         actual = self.sensors.motor.show(round(motion.actual + motion.beside))
-        values[self._shown] = node.motor.show(actual)
-        values[0x6062, 0] = wrap(round(motion.demand))
-        values[0x60F4, 0] = wrap(round(motion.demand) - actual)
+        values[self._shown] = node.motor.show(sign * actual)
+        values[0x6062, 0] = wrap(sign * round(motion.demand))
+        values[0x60F4, 0] = wrap(sign * (round(motion.demand) - actual))
         if node.link is not None:
             link = self.sensors.link.show(self._link_counts)
             for key in self._links:
                 own = key == node.link_object.key
                 short = 16 if key == SHORT else 32
                 values[key] = node.link.show(link) if own else wrap(link, short)
+        if self._switches.present:
+            values[0x60FD, 0] = self._switches.inputs(motion.travel, sign)
         rated = self._behaviour.rated_torque
         values[0x6077, 0] = _saturated(1000.0 * self._torque / rated, DataType.INTEGER16)
         if node.torque_object is not None:
@@ -224,6 +251,8 @@ class Axis:
         word = self.power.low_byte | _STATUS
         if self.warning:
             word |= StatusBit.WARNING
+        if self._homing.done:
+            word |= HOMED
         mode = self._values[0x6061, 0]
         if mode == Mode.CYCLIC_SYNCHRONOUS_POSITION:
             if self.power.state is _ENABLED and self.power.stopping is None:
@@ -235,11 +264,8 @@ class Axis:
             if self._values[0x603F, 0] == FOLLOWING_ERROR:
                 word |= StatusBit.FOLLOWING_ERROR
         elif mode == Mode.HOMING:
-            word |= {
-                HomingState.ATTAINED: StatusBit.TARGET_REACHED | StatusBit.FOLLOWS_COMMAND,
-                HomingState.FAILED: StatusBit.TARGET_REACHED | StatusBit.FOLLOWING_ERROR,
-                HomingState.IDLE: StatusBit.TARGET_REACHED,
-            }.get(self._homing.state, 0)
+            halted = bool(self._values[0x6040, 0] & HALT)
+            word |= self._homing.status(halted=halted, standing=self.motion.speed == 0.0)
         self._show(int(word))
 
     def _show(self, word: int) -> None:

@@ -64,6 +64,8 @@ class Behaviour:
     """Delay of the boot-up message after a reset [us]."""
     hard_stop: tuple[float, float] | None = None
     """Mechanical range of the motor [rad]."""
+    home_switch: tuple[float, float] | None = None
+    """Range of the motor in which its home switch is active [rad]; none stands for no switch."""
     start_pos: float = 0.0
     """Motor position at power-on [rad]."""
     rated_torque: float = 10.0

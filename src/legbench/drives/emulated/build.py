@@ -1,19 +1,42 @@
 """An emulated bus from a bus configuration."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 from legbench.drives.emulated.behaviour import Behaviour
+from legbench.drives.emulated.body import Body, stiff_body
 from legbench.drives.emulated.dictionary import Dictionary, dictionary_of
 from legbench.drives.emulated.drive import EmulatedDrive
 from legbench.drives.emulated.faults import Fault
-from legbench.drives.emulated.network import Body, Network, stiff_body
+from legbench.drives.emulated.network import Network
 from legbench.drives.emulated.shared_body import SharedBody
 from legbench.drives.emulated.stuffing import Stuffing
-from legbench.drives.setup.config import BusConfig
+from legbench.drives.setup.config import BusConfig, NodeConfig
 from legbench.drives.setup.configuration import configuration
 from legbench.drives.sheet.load import load_sheet
 from legbench.errors import ConfigError
+
+STOP_BEHIND = 0.1
+"""Distance of the mechanical stops behind the soft limits of a motor [rad]."""
+FREE_RANGE = math.pi
+"""Distance of the mechanical stops from zero where a bus file gives no soft limits [rad]."""
+HOME_SWITCH = (-0.05, 0.05)
+"""Range of a motor in which its home switch is active [rad]."""
+
+
+def on_bench(node: NodeConfig, start_pos: float, **changes: Any) -> Behaviour:
+    """Behaviour of a drive as it hangs on a bench: with mechanical stops and switches to home by.
+
+    Args:
+        node: the drive, whose soft limits lie within its stops.
+        start_pos: motor position at power-on [rad].
+        changes: other fields of `Behaviour`.
+    """
+    low, high = node.soft_limits or (STOP_BEHIND - FREE_RANGE, FREE_RANGE - STOP_BEHIND)
+    stops = (min(low - STOP_BEHIND, start_pos), max(high + STOP_BEHIND, start_pos))
+    return Behaviour(start_pos=start_pos, hard_stop=stops, home_switch=HOME_SWITCH, **changes)
 
 
 def emulate(

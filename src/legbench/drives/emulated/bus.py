@@ -1,10 +1,12 @@
 """The emulated bus as a python-can interface: `can.Bus(interface="legbench", channel=FILE)`.
 
 Lock-step and threadless: time is virtual and passes only while somebody waits, in `recv` or in
-`NetworkTime.wait_until`. The same calls give the same frames, time stamps included.
+`NetworkTime.wait_until`. The same calls give the same frames, time stamps included. Programs that
+receive in a thread, such as python-can's `Notifier`, may do so; their order is then up to threads.
 """
 
 import math
+import time
 from pathlib import Path
 from typing import final
 
@@ -14,15 +16,20 @@ from can.typechecking import CanFilters
 from legbench.drives.emulated.build import emulate
 from legbench.drives.emulated.network import PASSIVE, Network
 from legbench.drives.emulated.network_time import NetworkTime
-from legbench.drives.emulated.station import Station
+from legbench.drives.emulated.station import Heard, Station
 from legbench.drives.errors import BusError
 from legbench.drives.protocol.frame import Frame
 from legbench.drives.setup.bus_file import load_bus
+from legbench.drives.transport.messages import frame_of, message_of, refuse_fd
 from legbench.drives.transport.virtual_bus import VirtualBus
 from legbench.errors import ConfigError
 
 IDLE_NS = 1_000_000_000
-"""Longest wait of `recv` without a time-out, as nothing else can happen in lock-step [ns]."""
+"""Time that passes at once while `recv` waits without a time-out [ns]."""
+YIELD_S = 1e-3
+"""Pause of such a wait, in which another thread may send [s]."""
+LOOK_NS = 50_000
+"""Time after which a sender who waits for room looks again: the shortest frame at 1 Mbit/s [ns]."""
 
 
 @final
@@ -42,15 +49,27 @@ class LockstepBus(VirtualBus):
         network: Network | None = None,
         tx_queue: int = 64,
         bitrate: int | None = None,
-        **_others: object,
+        receive_own_messages: bool = False,
+        fd: bool = False,
+        single_handle: bool = False,
     ) -> None:
-        """Plug into a network, or build one with stiff links from the bus file `channel`.
+        """Plug into a network, or build one with stiff links from a bus file.
 
-        The bitrate [bit/s] is that of the wire by default; at another one no frame passes.
+        Args:
+            channel: the bus file.
+            can_filters: frames to receive; by default all.
+            network: the network, instead of one of its own.
+            tx_queue: number of frames that the controller takes before they are on the wire.
+            bitrate: bitrate of this controller; by default that of the wire [bit/s]. At another
+                one no frame passes.
+            receive_own_messages: receive the frames that are sent here, when they were on the wire.
+            fd: flexible data rate, which these buses do not have.
+            single_handle: without effect; python-can's programs give it to every interface.
 
         Raises:
-            can.CanInitializationError: the bus file makes no sense.
+            can.CanInitializationError: the bus file makes no sense, or `fd` is set.
         """
+        refuse_fd(fd)
         if network is None:
             try:
                 network = emulate(load_bus(Path(channel)))
@@ -58,7 +77,8 @@ class LockstepBus(VirtualBus):
                 raise can.CanInitializationError(str(error)) from error
         self.network = network
         self.timebase = NetworkTime(network)
-        self._station = network.attach(tx_queue, bitrate)
+        self._station = network.attach(tx_queue, bitrate, echo=receive_own_messages)
+        self._open = True
         self.channel_info = f"emulated bus {channel}"
         self.channel = channel
         super().__init__(channel=channel, can_filters=can_filters)
@@ -76,55 +96,74 @@ class LockstepBus(VirtualBus):
     @property
     def state(self) -> can.BusState:
         """State of the controller by its error counters; setting `ACTIVE` restarts it."""
-        errors = max(self.network.errors[self._station], self._station.unread)
         if self.network.off_bus(self._station):
             return can.BusState.ERROR
-        return can.BusState.PASSIVE if errors >= PASSIVE else can.BusState.ACTIVE
+        passive = self.network.level(self._station) >= PASSIVE
+        return can.BusState.PASSIVE if passive else can.BusState.ACTIVE
 
     @state.setter
     def state(self, new_state: can.BusState) -> None:
-        if new_state is can.BusState.ACTIVE:
-            self.network.recover(self._station)
+        if new_state is not can.BusState.ACTIVE:
+            raise NotImplementedError(f"{new_state.name} cannot be set, only ACTIVE")
+        self.network.recover(self._station)
+
+    def _check_open(self) -> None:
+        if not self._open:
+            raise can.CanOperationError(f"{self.channel_info} is shut down")
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
-        """Hand a frame to the controller; takes no time.
+        """Hand a frame to the controller; lets time pass only to wait for room, up to `timeout`.
 
         Raises:
-            can.CanOperationError: bus-off, or the queue is full.
+            can.CanOperationError: bus-off, the queue is full, or this is no frame of classic CAN.
         """
-        frame = Frame(msg.arbitration_id, bytes(msg.data), msg.is_remote_frame, msg.is_extended_id)
-        try:
-            self.network.send(self._station, frame)
-        except BusError as error:
-            raise can.CanOperationError(str(error)) from error
+        self._check_open()
+        frame = frame_of(msg)
+        with self.network.lock:
+            if timeout and not self.network.takes(self._station):
+                self._wait_for_room(math.ceil(1e9 * timeout))
+            try:
+                self.network.send(self._station, frame)
+            except BusError as error:
+                raise can.CanOperationError(str(error)) from error
+
+    def _wait_for_room(self, span_ns: int) -> None:
+        network, until_ns = self.network, self.network.now_ns + span_ns
+        while not network.takes(self._station) and network.now_ns < until_ns:
+            network.advance(min(until_ns, network.now_ns + LOOK_NS))
 
     def recv(self, timeout: float | None = None) -> can.Message | None:
-        """The next frame that passes the filters; lets time pass until it comes."""
-        span_ns = IDLE_NS if timeout is None else math.ceil(1e9 * max(0.0, timeout))
-        until_ns = self.network.now_ns + span_ns
+        """The next frame that passes the filters; lets time pass until it comes.
+
+        Raises:
+            can.CanOperationError: the bus is shut down.
+        """
+        if timeout is not None:
+            return self._recv_within(math.ceil(1e9 * max(0.0, timeout)))
+        while (message := self._recv_within(IDLE_NS)) is None:
+            time.sleep(YIELD_S)
+        return message
+
+    def _recv_within(self, span_ns: int) -> can.Message | None:
+        self._check_open()
+        with self.network.lock:
+            return self._next_message(self.network.now_ns + span_ns)
+
+    def _next_message(self, until_ns: int) -> can.Message | None:
         received = self._station.received
         while True:
             if not received:
                 self.network.advance(until_ns, self._station)
             if not received:
                 return None
-            at_ns, frame = received.popleft()
-            message = can.Message(
-                timestamp=1e-9 * at_ns,
-                arbitration_id=frame.cob_id,
-                is_extended_id=frame.extended,
-                is_remote_frame=frame.remote,
-                is_error_frame=frame.error,
-                dlc=len(frame.data),
-                data=frame.data,
-                channel=self.channel,
-            )
+            at_ns, frame, own = received.popleft()
+            message = message_of(frame, 1e-9 * at_ns, self.channel, own=own)
             if self._filters is None or self._matches_filters(message):
                 return message
 
     def inject(self, frame: Frame) -> None:
         """Put a frame into the receive queue that was never on the wire, for tests."""
-        self._station.received.append((self.network.now_ns, frame))
+        self._station.received.append(Heard(self.network.now_ns, frame))
 
     @property
     def pending(self) -> int:
@@ -132,7 +171,9 @@ class LockstepBus(VirtualBus):
         return len(self._station.received)
 
     def shutdown(self) -> None:
-        """Detach from the network."""
-        if not self._is_shutdown:
-            self.network.detach(self._station)
+        """End what is sent periodically and detach from the network."""
         super().shutdown()
+        if self._open:
+            self._open = False
+            with self.network.lock:
+                self.network.detach(self._station)

@@ -12,7 +12,7 @@ from legbench.closing import Closing
 from legbench.drives.emulated.network import Network
 from legbench.drives.emulated.pacer import Pacer
 from legbench.drives.errors import BusError
-from legbench.drives.protocol.frame import Frame
+from legbench.drives.transport.messages import frame_of, message_of
 
 
 @final
@@ -54,34 +54,18 @@ class BusServer(Closing):
             return None
 
     def _take(self, message: can.Message) -> None:
-        if message.is_error_frame:
-            return
-        frame = Frame(
-            message.arbitration_id,
-            bytes(message.data),
-            message.is_remote_frame,
-            message.is_extended_id,
-        )
-        try:
-            self.network.send(self._station, frame)
-        except BusError:
-            # A full queue or bus-off loses the frame, as on a real bus.
-            return
+        # A full queue or bus-off loses the frame, as on a real bus; other frames than those of
+        # classic CAN do not reach classic drives.
+        with suppress(BusError, can.CanOperationError):
+            self.network.send(self._station, frame_of(message))
 
     def _give(self) -> None:
         while self._station.received:
-            _, frame = self._station.received.popleft()
+            at_ns, frame, _ = self._station.received.popleft()
             if not frame.error:
                 # A full queue or an unplugged cable loses the frame, as on a real bus.
                 with suppress(can.CanOperationError):
-                    self._bus.send(
-                        can.Message(
-                            arbitration_id=frame.cob_id,
-                            data=frame.data,
-                            is_extended_id=frame.extended,
-                            is_remote_frame=frame.remote,
-                        )
-                    )
+                    self._bus.send(message_of(frame, 1e-9 * at_ns, ""))
 
     def close(self) -> None:
         """Close the bus; may be called twice."""

@@ -36,6 +36,8 @@ class Dictionary:
     """Objects that show the position of the link."""
     temperature: Key | None = (TEMPERATURE, 0)
     """Object that shows the temperature of the power stage, if any does."""
+    relative: frozenset[Key] = frozenset()
+    """Objects whose value at power-on moves with the node id."""
 
     def refusal(self, key: Key, value: int) -> Abort | None:
         """Abort code of a value beyond the limits of its object; none if it lies within."""
@@ -56,7 +58,9 @@ def dictionary_of(
     own = dict(_identity(node))
     if sheet is None:
         own |= {key: _number(OBJECTS[key]) + node.node_id for key in (*RELATIVE, EMCY)}
-        return Dictionary(entries=tuple(_with(OBJECTS.values(), own)))
+        return Dictionary(
+            entries=tuple(_with(OBJECTS.values(), own)), relative=frozenset((*RELATIVE, EMCY))
+        )
     if not sheet.has(MODE):
         own[MODE_DISPLAY] = CYCLIC
     for key in sheet.relative:
@@ -78,6 +82,7 @@ def dictionary_of(
         hidden=hidden,
         limits=sheet.limits,
         links=(node.link_object.key,),
+        relative=frozenset(sheet.relative),
         temperature=None if warmth is None else warmth.key,
     )
 

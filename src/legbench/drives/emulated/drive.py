@@ -1,37 +1,45 @@
 """An emulated CiA 301/402 drive: frames in, frames out, time is an argument; pure."""
 
 import random
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Container, Sequence
 from typing import final
 
-from legbench.drives.emulated.axis import SYNC_MISSING, Axis
+from legbench.drives.emulated.axis import Axis
 from legbench.drives.emulated.behaviour import Behaviour
+from legbench.drives.emulated.connection import Connection
 from legbench.drives.emulated.dictionary import Dictionary, dictionary_of
 from legbench.drives.emulated.heartbeats import HeartbeatConsumer, HeartbeatProducer
+from legbench.drives.emulated.lss import LssSlave, address_of
+from legbench.drives.emulated.memory import ALL, Memory
 from legbench.drives.emulated.oddities import changed
+from legbench.drives.emulated.power import POWERED
 from legbench.drives.emulated.process_data import ProcessData
+from legbench.drives.emulated.reception import RPDO_LATE, Reception
+from legbench.drives.emulated.rules import COMMUNICATION_PROFILE, ERRORS, objection
 from legbench.drives.emulated.store import ObjectStore
 from legbench.drives.emulated.warmth import HOT, WARM, show_temperature
-from legbench.drives.errors import SdoAbortError
+from legbench.drives.protocol import lss
 from legbench.drives.protocol.cia402 import DriveState
 from legbench.drives.protocol.frame import (
+    COB_MASK,
     HEARTBEAT_BASE,
     LAST_NODE,
     NMT_ID,
     SDO_REPLY_BASE,
     SDO_REQUEST_BASE,
-    SYNC_ID,
     Frame,
 )
 from legbench.drives.protocol.nmt import NmtCommand, NmtState, decode_nmt, heartbeat_frame
 from legbench.drives.protocol.objects import Key
-from legbench.drives.protocol.sdo import Abort
+from legbench.drives.protocol.sdo import Abort, abort_error
 from legbench.drives.protocol.sdo_server import SdoServer
 from legbench.drives.setup.config import NodeConfig, Parameter
 
 UNDER_VOLTAGE, OVER_TEMPERATURE = 0x3220, 0x4310
-HEARTBEAT_LOST, PDO_SHORT, PDO_LONG, SYNC_LENGTH, RPDO_LATE = 0x8130, 0x8210, 0x8220, 0x8240, 0x8250
+HEARTBEAT_LOST = 0x8130
+SYNC = (0x1005, 0)
+ERROR_COUNT, LATEST_ERROR = (0x1003, 0), (0x1003, 1)
+SET_BACK = tuple(index for index in COMMUNICATION_PROFILE if index not in ERRORS)
 _ORDERS = {
     NmtCommand.START: NmtState.OPERATIONAL,
     NmtCommand.STOP: NmtState.STOPPED,
@@ -57,7 +65,7 @@ class EmulatedDrive:
         dictionary: Dictionary | None = None,
     ) -> None:
         """Switch it on; `kept` is what its memory holds instead of the defaults (1010h)."""
-        self._node, self._behaviour, self._kept = node, behaviour or Behaviour(), kept
+        self._node, self._behaviour = node, behaviour or Behaviour()
         self.node_id = node.node_id
         self._random = random.Random(self._behaviour.seed * LAST_NODE + node.node_id)
         how = self._behaviour
@@ -66,69 +74,78 @@ class EmulatedDrive:
             shown.entries, self._check, self._written, shown.hidden, lacking=how.lacking
         )
         self._values = self._store.values
+        self._memory = Memory(self._store, shown, node.node_id, kept)
+        self._memory.recall(self.node_id)
+        self._lss = LssSlave(address_of(self._values), node.node_id)
         self.axis = Axis(node, how, self._values, shown.links)
         self._pdos = ProcessData(self._store)
         self._target = node.target_object.key
-        self._sdo = SdoServer(self._store.read, self._store.write, how.sdo_answers)
+        self._sdo = SdoServer(self._read, self._store.write, how.sdo_answers)
         self.state = NmtState.BOOT_UP
         self._now_ns = 0
         self._tick_ns = 0
         self._boot_ns = 1000 * how.boot_us
         self._beats = HeartbeatProducer()
-        self._sync_ns: int | None = None
-        self._fresh = False
         self._heartbeats = HeartbeatConsumer(self._values)
+        self._connection = Connection(self.axis, self._values)
+        self._reception = Reception(
+            self._values, self.axis, self._pdos, self._connection, self._behaviour.sync_loss_periods
+        )
         self._out: list[tuple[int, Frame]] = []
-        self._recall()
-
-    def _recall(self) -> None:
         show_temperature(self._store, self._dictionary, self._node, WARM)
-        for parameter in self._kept:
-            with suppress(SdoAbortError):
-                self._store.recall(parameter.key, parameter.value)
+        self._pdos.rebuild()
 
     # --- what the wire and the body call -----------------------------------------------------
 
     def take(self) -> list[tuple[int, Frame]]:
         """Frames to send since the last call, each with the time at which it is ready [ns]."""
-        out, self._out = self._out, []
+        out, self._out = self._out + self._connection.outlet.take(), []
         return out
 
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Receive a frame of another node; whatever it says, nothing is raised."""
         self._now_ns = now_ns
-        if frame.error or frame.extended or frame.remote or self.state is NmtState.BOOT_UP:
+        booting = self.state is NmtState.BOOT_UP and self.node_id != lss.UNCONFIGURED
+        if frame.error or frame.extended or frame.remote or booting:
             return
         cob_id, data = frame.cob_id, frame.data
-        if cob_id == SYNC_ID:
-            self._sync(data)
+        if cob_id == lss.REQUEST_ID:
+            self._reply(lss.ANSWER_ID, self._lss.feed(data))
+            if self._lss.released:
+                self._restart(ALL)
+        elif self.node_id == lss.UNCONFIGURED:
+            return
+        elif cob_id == self._values[SYNC] & COB_MASK:
+            if self._reception.is_sync(data, now_ns) and self.state is NmtState.OPERATIONAL:
+                for sample in self._reception.sync(now_ns):
+                    self._send(sample)
         elif cob_id in self._pdos.rpdos:
-            self._rpdo(cob_id, data)
+            if self.state is NmtState.OPERATIONAL:
+                self._reception.rpdo(cob_id, data, now_ns)
         elif cob_id == SDO_REQUEST_BASE + self.node_id:
             if self.state is not NmtState.STOPPED:
-                reply = self._sdo.feed(data)
-                if reply is not None:
-                    self._send(Frame(SDO_REPLY_BASE + self.node_id, reply))
+                self._reply(SDO_REPLY_BASE + self.node_id, self._sdo.feed(data))
         elif cob_id == NMT_ID:
             order = decode_nmt(data)
             if order is not None and order[1] in (0, self.node_id):
                 self._obey(order[0])
-        elif HEARTBEAT_BASE < cob_id <= HEARTBEAT_BASE + LAST_NODE:
-            self._heard(cob_id - HEARTBEAT_BASE, data)
-        self._forward()
+        elif self._heartbeats.hear(cob_id - HEARTBEAT_BASE, data, now_ns):
+            self._connection.over(HEARTBEAT_LOST, now_ns)
+        self._connection.forward(self._now_ns)
 
     def tick(self, now_ns: int) -> float:
         """Move until now and check the timers; returns the true motor position [rad]."""
         step_ns, self._now_ns, self._tick_ns = now_ns - self._tick_ns, now_ns, now_ns
         if step_ns <= 0:
             return self.axis.motion.angle
-        if self.state is NmtState.BOOT_UP:
-            if now_ns >= self._boot_ns:
-                self._boot()
-            return self.axis.motion.angle
-        angle = self.axis.tick(now_ns, step_ns)
-        self._timers()
-        self._forward()
+        booting = self.state is NmtState.BOOT_UP
+        running = self.axis.power.state is not DriveState.NOT_READY_TO_SWITCH_ON
+        if booting and now_ns >= self._boot_ns and self.node_id != lss.UNCONFIGURED:
+            self._boot()
+        angle = self.axis.tick(now_ns, step_ns) if running else self.axis.motion.angle
+        if not booting:
+            self._timers()
+        self._connection.forward(self._now_ns)
         return angle
 
     def sense(self, link_pos: float, spring_torque: float) -> None:
@@ -142,16 +159,25 @@ class EmulatedDrive:
     # --- faults to inject --------------------------------------------------------------------
 
     def reset(self, now_ns: int) -> None:
-        """Start over, as after a brown-out: configuration and state are lost."""
+        """Start over, as after a brown-out: what is not stored is lost, a node id, too."""
         self._now_ns = now_ns
-        self._store.load_defaults()
+        self._connection.outlet.clear()
         self.axis.restart()
+        self._restart(ALL, cold=True)
+        show_temperature(self._store, self._dictionary, self._node, WARM)
+
+    def _restart(self, indices: Container[int], *, cold: bool = False) -> None:
+        """Set objects among some indices back and boot; the node id is that set last over LSS."""
+        self.node_id = self._lss.begin(cold=cold)
+        self.axis.address(self.node_id)
+        self._memory.recall(self.node_id, indices)
         self._pdos.rebuild()
-        self._recall()
         self._heartbeats.clear()
         self._out.clear()
-        self.state, self._sync_ns, self._fresh = NmtState.BOOT_UP, None, False
-        self._boot_ns = now_ns + 1000 * self._behaviour.boot_us
+        self._connection.outlet.mute()
+        self._reception.forget()
+        self.state = NmtState.BOOT_UP
+        self._boot_ns = self._now_ns + 1000 * self._behaviour.boot_us
 
     def trip(self, code: int, now_ns: int) -> None:
         """Bring on the lasting cause of an error, such as `UNDER_VOLTAGE`."""
@@ -160,7 +186,7 @@ class EmulatedDrive:
         if code == OVER_TEMPERATURE:
             show_temperature(self._store, self._dictionary, self._node, HOT)
         self.axis.fault(code)
-        self._forward()
+        self._connection.forward(self._now_ns)
 
     def untrip(self, code: int) -> None:
         """Remove the cause of an error; a fault reset is possible again."""
@@ -169,8 +195,14 @@ class EmulatedDrive:
     def bus_off(self, now_ns: int) -> None:
         """Stop by 6007h, as the drive's own controller is bus-off."""
         self._now_ns = now_ns
-        self.axis.power.connection_lost()
         self._out.clear()
+        self._connection.leave_bus(now_ns)
+
+    def bus_on(self, now_ns: int) -> None:
+        """Report that the drive was off the bus, as it is back."""
+        self._now_ns = now_ns
+        if self.state is not NmtState.BOOT_UP:
+            self._connection.rejoin_bus(now_ns)
 
     def repeat_process_data(self, repeat: bool) -> None:
         """Repeat the last process data to the bit, while everything else goes on."""
@@ -185,75 +217,58 @@ class EmulatedDrive:
     def _check(self, key: Key, value: int) -> Abort | None:
         if (refusal := self._dictionary.refusal(key, value)) is not None:
             return refusal
+        if Memory.owns(key):
+            return Memory.check(key, value, powered=self.axis.power.state in POWERED)
         if ProcessData.owns(key):
             return self._pdos.check(key, value)
-        if key == (0x1019, 0) and self._values[0x1006, 0]:
-            return Abort.DEVICE_STATE
-        return self.axis.check(key, value)
+        return objection(key, value, self._values) or self.axis.check(key, value)
+
+    def _read(self, index: int, sub: int) -> bytes:
+        if (index, sub) == LATEST_ERROR and not self._values[ERROR_COUNT]:
+            raise abort_error(Abort.NO_DATA, index, sub)
+        return self._store.read(index, sub)
 
     def _written(self, key: Key) -> None:
         if ProcessData.owns(key):
             if key[0] & 0x200 or key[1] in (1, 2, 5):
                 self._pdos.rebuild()
+        elif Memory.owns(key):
+            self._memory.obey(key)
         elif key[0] == 0x1016:
             self._heartbeats.clear()
+        elif key == ERROR_COUNT:
+            self._values[LATEST_ERROR] = 0
         elif key[0] >= 0x6000 or key == self._target:
             if key == self._target:
-                self._fresh = True
+                self._reception.fresh = True
             self.axis.written(key, self._now_ns)
 
     def _boot(self) -> None:
         self.state = NmtState.PRE_OPERATIONAL
         self._pdos.rebuild()
-        self.axis.power.boot()
+        if self.axis.power.state is DriveState.NOT_READY_TO_SWITCH_ON:
+            self.axis.boot(self._now_ns)
         self._beats.since_ns = self._now_ns
         self._out.append((self._now_ns, heartbeat_frame(self.node_id, NmtState.BOOT_UP)))
+        self._connection.outlet.unmute(self._now_ns)
 
     def _obey(self, command: NmtCommand) -> None:
-        if command in (NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION):
+        if command is NmtCommand.RESET_NODE:
             self.reset(self._now_ns)
-            return
-        self._enter(_ORDERS[command])
+        elif command is NmtCommand.RESET_COMMUNICATION:
+            self._restart(SET_BACK)
+            self._connection.end(self._now_ns)
+        else:
+            self._enter(_ORDERS[command])
 
     def _enter(self, state: NmtState) -> None:
         before, self.state = self.state, state
         if before is NmtState.OPERATIONAL and state is not NmtState.OPERATIONAL:
-            self.axis.power.connection_lost()
+            self._connection.end(self._now_ns)
             self._pdos.forget()
-            self._sync_ns, self._fresh = None, False
+            self._reception.forget()
         elif state is NmtState.OPERATIONAL and before is not state:
             self._heartbeats.start(self._now_ns)
-
-    def _heard(self, node_id: int, data: bytes) -> None:
-        if self._heartbeats.hear(node_id, data, self._now_ns):
-            self._send_now(self.axis.alarms.clear(HEARTBEAT_LOST))
-
-    def _sync(self, data: bytes) -> None:
-        overflow = self._values[0x1019, 0]
-        if len(data) != (1 if overflow else 0):
-            self._send_now(self.axis.alarms.raise_(SYNC_LENGTH))
-            return
-        if self.state is not NmtState.OPERATIONAL:
-            return
-        for frame in self._pdos.at_sync():
-            self._send(frame)
-        self._pdos.latch()
-        self.axis.sync(self._fresh, self._now_ns)
-        self._fresh, self._sync_ns = False, self._now_ns
-
-    def _rpdo(self, cob_id: int, data: bytes) -> None:
-        if self.state is not NmtState.OPERATIONAL:
-            return
-        size = self._pdos.rpdos[cob_id].layout.size
-        if len(data) < size:
-            self._send_now(self.axis.alarms.raise_(PDO_SHORT))
-            return
-        if len(data) > size:
-            self._send_now(self.axis.alarms.raise_(PDO_LONG))
-        self._send_now(self.axis.alarms.clear(RPDO_LATE))
-        window_ns = 1000 * self._values[0x1007, 0]
-        late = bool(window_ns and self._sync_ns and self._now_ns - self._sync_ns > window_ns)
-        self._pdos.receive(cob_id, data[:size], self._now_ns, late=late)
 
     def _timers(self) -> None:
         now_ns, values = self._now_ns, self._values
@@ -262,35 +277,24 @@ class EmulatedDrive:
         if self._heartbeats.lost(now_ns):
             self._heartbeats.clear()
             self._connection_lost(HEARTBEAT_LOST)
-        for pdo in self._pdos.rpdos.values():
-            late = pdo.seen_ns is not None and now_ns - pdo.seen_ns > pdo.timer_ns
-            if pdo.timer_ns and late:
-                pdo.seen_ns = None
-                self._connection_lost(RPDO_LATE)
-        cycle_ns = 1000 * values[0x1006, 0] * self._behaviour.sync_loss_periods
-        if cycle_ns and self._sync_ns is not None and now_ns - self._sync_ns > cycle_ns:
-            self._sync_ns = None
-            if self.axis.power.state is DriveState.OPERATION_ENABLED:
-                self.axis.fault(SYNC_MISSING)
+        for _ in range(self._reception.late_rpdos(now_ns)):
+            self._connection_lost(RPDO_LATE)
+        self._reception.watch_sync(now_ns)
 
     def _connection_lost(self, code: int) -> None:
         """Handle a communication error: emergency, stop by 6007h, NMT state by 1029h."""
-        self._send_now(self.axis.alarms.raise_(code))
-        self.axis.power.connection_lost()
+        self._connection.lost(code, self._now_ns)
         fallback = {0: NmtState.PRE_OPERATIONAL, 2: NmtState.STOPPED}.get(self._values[0x1029, 1])
         if fallback is not None and self.state is NmtState.OPERATIONAL:
             self._enter(fallback)
 
     # --- output ------------------------------------------------------------------------------
 
+    def _reply(self, cob_id: int, data: bytes | None) -> None:
+        if data is not None:
+            self._send(Frame(cob_id, data))
+
     def _send(self, frame: Frame) -> None:
         low, high = self._behaviour.reply_delay_us
         delay_us = low if low == high else self._random.randint(low, high)
         self._out.append((self._now_ns + 1000 * delay_us, frame))
-
-    def _send_now(self, frame: Frame | None) -> None:
-        if frame is not None:
-            self._out.append((self._now_ns, frame))
-
-    def _forward(self) -> None:
-        self._out += [(self._now_ns, frame) for frame in self.axis.take()]

@@ -1,8 +1,9 @@
-"""Heartbeats of other nodes that an emulated drive watches (CiA 301, object 1016h)."""
+"""Heartbeats that an emulated drive watches, and its own (CiA 301, 1016h and 1017h)."""
 
 from collections.abc import Iterator, Mapping
 from typing import final
 
+from legbench.drives.emulated.rules import watched
 from legbench.drives.protocol.nmt import HeartbeatWatch, decode_heartbeat
 from legbench.drives.protocol.objects import Key
 
@@ -40,9 +41,9 @@ class HeartbeatConsumer:
     def _consumed(self) -> Iterator[tuple[int, int]]:
         """Yield the node and time-out [ns] of every heartbeat to watch (1016h)."""
         for sub in (1, 2):
-            word = self._values[0x1016, sub]
-            if word >> 16 & 0x7F and word & 0xFFFF:
-                yield word >> 16 & 0x7F, 1_000_000 * (word & 0xFFFF)
+            asked = watched(self._values[0x1016, sub])
+            if asked is not None:
+                yield asked[0], 1_000_000 * asked[1]
 
 
 @final

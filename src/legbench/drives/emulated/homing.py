@@ -1,17 +1,23 @@
-"""Homing methods of an emulated drive (6098h): in place, and against the mechanical stops."""
+"""Homing run of an emulated drive (CiA 402-2, homing mode): a sequence of moves, then home."""
 
+from collections.abc import Mapping
+from dataclasses import replace
 from enum import Enum, auto
 from typing import final
 
-from legbench.drives.emulated.motion import Motion
+from legbench.drives.emulated.homing_methods import METHODS, Move, Until, mirrored
+from legbench.drives.emulated.motion import SECOND_NS, Motion
+from legbench.drives.emulated.switches import Switches
+from legbench.drives.protocol.cia402 import StatusBit
 from legbench.drives.protocol.objects import Key
 
-IN_PLACE = (35, 37)
-TO_STOP = {-1: -1, -2: 1, -3: -1, -4: 1}
-"""Method -> direction; -1 and -2 go back to the next index pulse of the encoder."""
-WITH_INDEX = (-1, -2)
 START = 1 << 4
 """Bit 4 of 6040h; homing starts at its rising edge and is interrupted by its end."""
+
+POSITION_POLARITY = 1 << 7
+"""Bit 7 of 607Eh, which turns the sign of positions."""
+AT_INDEX = 1e-3
+"""Distance from an index pulse at which the motor stands on it [counts]."""
 
 
 class HomingState(Enum):
@@ -19,58 +25,103 @@ class HomingState(Enum):
 
     IDLE = auto()
     SEARCHING = auto()
-    LEAVING = auto()
     ATTAINED = auto()
     FAILED = auto()
 
 
+STATUS = {
+    HomingState.ATTAINED: StatusBit.TARGET_REACHED | StatusBit.FOLLOWS_COMMAND,
+    HomingState.FAILED: StatusBit.TARGET_REACHED | StatusBit.FOLLOWING_ERROR,
+    HomingState.IDLE: StatusBit.TARGET_REACHED,
+}
+"""Bits of the statusword by state; homing in progress has none of them."""
+
+
 @final
 class Homing:
-    """Homing run of an emulated motor."""
+    """Homing run of an emulated motor.
 
-    def __init__(self, values: dict[Key, int], counts_per_rev: int) -> None:
-        self._values, self._per_rev = values, counts_per_rev
+    Attributes:
+        state: how far it is.
+        done: whether the position refers to a home since power-on.
+    """
+
+    def __init__(self, values: Mapping[Key, int], switches: Switches) -> None:
+        self._values, self._switches = values, switches
         self.state = HomingState.IDLE
+        self.done = False
         self._asked = False
-        self._index = 0.0
+        self._moves: list[Move] = []
+        self._index: float | None = None
+
+    def status(self, *, halted: bool, standing: bool) -> int:
+        """Bits 10, 12 and 13 of the statusword; a halt interrupts homing once the motor stands."""
+        if halted and standing and self.state is HomingState.SEARCHING:
+            return StatusBit.TARGET_REACHED
+        return STATUS.get(self.state, 0)
 
     def command(self, controlword: int) -> None:
         """Start or interrupt homing by bit 4 of a controlword."""
         asked = bool(controlword & START)
         if asked and not self._asked:
-            known = self._values[0x6098, 0] in (*IN_PLACE, *TO_STOP)
-            self.state = HomingState.SEARCHING if known else HomingState.FAILED
-        elif not asked and self.state in (HomingState.SEARCHING, HomingState.LEAVING):
+            moves = METHODS.get(self._values[0x6098, 0])
+            self.state = HomingState.FAILED if moves is None else HomingState.SEARCHING
+            # The polarity turns the axis round, and its limit switches with it.
+            turned = self._values[0x607E, 0] & POSITION_POLARITY
+            self._moves = list(mirrored(moves or ()) if turned else moves or ())
+            self._index = None
+            self.done = False
+        elif not asked and self.state is HomingState.SEARCHING:
             self.state = HomingState.IDLE
         self._asked = asked
 
     def step(self, motion: Motion, step_ns: int) -> None:
         """Run homing for one motion cycle."""
-        method = self._values[0x6098, 0]
-        home = self._values[0x607C, 0]
-        if self.state is HomingState.SEARCHING:
-            if method in IN_PLACE:
-                motion.call_it(home)
-                self.state = HomingState.ATTAINED
-            elif motion.blocked():
-                motion.demand = motion.actual
-                self._at_stop(motion, method, home)
-            else:
-                motion.seek(TO_STOP[method] * float(self._values[0x6099, 1]), step_ns)
-        elif self.state is HomingState.LEAVING:
-            speed = -TO_STOP[method] * float(self._values[0x6099, 2])
-            motion.seek(speed, step_ns)
-            if (motion.demand - self._index) * speed >= 0.0:
-                motion.demand = self._index
-                motion.drive(step_ns)
-                motion.call_it(home)
-                self.state = HomingState.ATTAINED
-
-    def _at_stop(self, motion: Motion, method: int, home: int) -> None:
-        if method not in WITH_INDEX:
-            motion.call_it(home)
-            self.state = HomingState.ATTAINED
+        if self.state is not HomingState.SEARCHING:
             return
-        turns = motion.actual // self._per_rev
-        self._index = self._per_rev * (turns if TO_STOP[method] > 0 else turns + 1)
-        self.state = HomingState.LEAVING if self._values[0x6099, 2] else HomingState.FAILED
+        while self._moves and self._ended(self._moves[0], motion):
+            self._moves.pop(0)
+            self._index = None
+        if not self._moves:
+            motion.call_it(motion.sign * self._values[0x607C, 0])
+            self.state, self.done = HomingState.ATTAINED, True
+            return
+        move = self._moves[0]
+        speed = float(self._values[0x6099, 1 if move.fast else 2])
+        if not speed or not self._free(move, motion):
+            self.state = HomingState.FAILED
+            motion.seek(0.0, step_ns)
+            return
+        motion.seek(self._moves[0].direction * speed, step_ns)
+        self._catch_index(motion, step_ns)
+
+    def _ended(self, move: Move, motion: Motion) -> bool:
+        if move.until is Until.STOP:
+            if motion.blocked():
+                motion.demand = motion.actual
+                return True
+            return False
+        if move.until is Until.INDEX:
+            if self._index is None:
+                self._index = self._switches.next_index(motion.travel, move.direction)
+            return abs(motion.travel - self._index) < AT_INDEX
+        return self._switches.active(move.until, motion.travel) == move.on
+
+    def _free(self, move: Move, motion: Motion) -> bool:
+        """Whether the way is free; a search that may turn round at a limit switch does it once."""
+        towards = Until.POSITIVE_LIMIT if move.direction > 0 else Until.NEGATIVE_LIMIT
+        # A limit switch lies before its mechanical stop, so no other move ever reaches one.
+        if move.until in (Until.STOP, towards) or not self._switches.active(towards, motion.travel):
+            return True
+        if move.turns:
+            self._moves[0] = replace(move, direction=-move.direction, turns=False)
+        return move.turns
+
+    def _catch_index(self, motion: Motion, step_ns: int) -> None:
+        """Stop at the index pulse itself, which the drive's hardware latches."""
+        move, index = self._moves[0], self._index
+        if move.until is not Until.INDEX or index is None:
+            return
+        left = index - (motion.travel + motion.demand - motion.actual)
+        if left * move.direction <= 0.0:
+            motion.seek(left * SECOND_NS / step_ns, step_ns)

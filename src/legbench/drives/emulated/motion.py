@@ -52,7 +52,17 @@ class Motion:
     @property
     def angle(self) -> float:
         """True motor position, independent of the zero set by homing [rad]."""
-        return (self.actual - self._true_zero) / self._units.counts_per_rad
+        return self.travel / self._units.counts_per_rad
+
+    @property
+    def travel(self) -> float:
+        """Distance of the motor from its true zero, independent of homing [counts]."""
+        return self.actual - self._true_zero
+
+    @property
+    def sign(self) -> int:
+        """Sign between positions of the object dictionary and of the motor: bit 7 of 607Eh."""
+        return -1 if self._values[0x607E, 0] & 0x80 else 1
 
     @property
     def span_ns(self) -> int:
@@ -81,6 +91,8 @@ class Motion:
 
     def _limit(self, goal: float) -> float:
         low, high = self._values[0x607D, 1], self._values[0x607D, 2]
+        if self.sign < 0:
+            low, high = -high, -low
         if low >= high:
             self.limited = False
             return goal

@@ -5,36 +5,26 @@ Nothing here looks at a clock, and the same calls give the same frames to the na
 """
 
 from collections.abc import Callable, Sequence
+from threading import Lock
 from typing import final
 
+from legbench.drives.emulated.body import Body, stiff_body
 from legbench.drives.emulated.drive import EmulatedDrive
+from legbench.drives.emulated.error_frames import BUS_OFF_FRAME, ERROR_FRAME
 from legbench.drives.emulated.faults import Fault, NodeFault
 from legbench.drives.emulated.injector import Injector
-from legbench.drives.emulated.station import Node, Participant, Station
+from legbench.drives.emulated.station import Heard, Node, Participant, Station
 from legbench.drives.emulated.stuffing import Stuffing, bits_of
 from legbench.drives.errors import BusError
 from legbench.drives.protocol.frame import Frame
 from legbench.drives.setup.wire import ERROR_BITS, worst_bits
 
-Body = Callable[[tuple[float, ...]], tuple[Sequence[float], Sequence[float]]]
-"""Function that moves the body for one period, from the motor positions [rad] to the link
-positions [rad] and spring torques [N m] at its end."""
 PASSIVE, BUS_OFF = 128, 256
 """Transmit error counts from which a node is error passive, or off the bus (ISO 11898-1)."""
-
-ERROR_FRAME = Frame(0x88, bytes(8), error=True)
-"""SocketCAN's report of a bus error: protocol violation."""
-BUS_OFF_FRAME = Frame(0x40, bytes(8), error=True)
-"""SocketCAN's report that the own controller has left the bus."""
 
 
 _Pending = tuple[int, int, int, Node, Frame]
 """Frame that waits for the wire: ready at [ns], identifier, sequence number, sender, frame."""
-
-
-def stiff_body(motor_pos: tuple[float, ...]) -> tuple[Sequence[float], Sequence[float]]:
-    """A body without springs: the links are where the motors are."""
-    return motor_pos, (0.0,) * len(motor_pos)
 
 
 @final
@@ -47,6 +37,7 @@ class Network:
         log: every frame that was on the wire with the time of its end, if wanted.
         errors: transmit error counter of every node.
         bitrate: bitrate of the wire and of all drives [bit/s].
+        lock: held by those who call from several threads.
     """
 
     def __init__(
@@ -62,6 +53,7 @@ class Network:
         keep_log: bool = False,
     ) -> None:
         self.now_ns = 0
+        self.lock = Lock()
         self.drives = tuple(drives)
         self.log: list[tuple[int, Frame]] | None = [] if keep_log else None
         self._body = body
@@ -83,14 +75,19 @@ class Network:
         """Stations at another bitrate than the wire's."""
 
     def attach(
-        self, tx_queue: int = 64, bitrate: int | None = None, *, listen_only: bool = False
+        self,
+        tx_queue: int = 64,
+        bitrate: int | None = None,
+        *,
+        listen_only: bool = False,
+        echo: bool = False,
     ) -> Station:
         """Plug a master in, by default at the bitrate of the wire [bit/s].
 
         At another bitrate it reads nothing, nobody reads what it sends, and until its controller is
         error passive it destroys what the others send.
         """
-        station = Station(tx_queue, bitrate or self.bitrate, listen_only=listen_only)
+        station = Station(tx_queue, bitrate or self.bitrate, listen_only=listen_only, echo=echo)
         self._nodes.append(station)
         self.errors[station] = 0
         if station.bitrate != self.bitrate:
@@ -98,11 +95,11 @@ class Network:
         return station
 
     def detach(self, station: Station) -> None:
-        """Unplug a master; what it had not sent yet is lost."""
+        """Let a master go; what it has handed over is still sent, if it is at the bitrate."""
         self._nodes.remove(station)
         if station in self._strangers:
             self._strangers.remove(station)
-        self._pending = [entry for entry in self._pending if entry[3] is not station]
+            self._pending = [entry for entry in self._pending if entry[3] is not station]
 
     def alone(self, station: Station) -> bool:
         """Whether a master is the only one, and nothing but drives takes part besides."""
@@ -116,11 +113,21 @@ class Network:
         """Whether a node has gone bus-off."""
         return self.errors[node] >= BUS_OFF
 
+    def takes(self, station: Station) -> bool:
+        """Whether a master's controller has room for one more frame to send."""
+        return station.waiting < station.tx_queue and not self.off_bus(station)
+
+    def level(self, station: Station) -> int:
+        """The larger error counter of a master's controller."""
+        return max(self.errors[station], station.unread)
+
     def recover(self, node: Node) -> None:
         """Take a node back onto the bus."""
         self.errors[node] = 0
         if isinstance(node, Station):
             node.unread = 0
+        elif isinstance(node, EmulatedDrive):
+            node.bus_on(self.now_ns)
 
     def send(self, station: Station, frame: Frame) -> None:
         """Hand a master's frame to its controller.
@@ -215,7 +222,7 @@ class Network:
         broken = False
         for stranger in self._strangers:
             stranger.unread = min(BUS_OFF, stranger.unread + 8)
-            active = max(self.errors[stranger], stranger.unread) < PASSIVE
+            active = self.level(stranger) < PASSIVE
             broken = broken or (active and not stranger.listen_only)
         return broken
 
@@ -231,6 +238,8 @@ class Network:
             self.errors[sender] = max(0, self.errors[sender] - 1)
         if isinstance(sender, Station):
             sender.waiting -= 1
+            if sender.echo:
+                sender.received.append(Heard(self.now_ns, frame, own=True))
         if sender is self._injector:
             # No node receives a copy of its own frames.
             self._deliver(self._copied.pop(sequence, sender), frame)
@@ -254,7 +263,7 @@ class Network:
             if isinstance(node, Station):
                 if not self.off_bus(node):
                     heard = ERROR_FRAME if node in self._strangers else frame
-                    node.received.append((now_ns, heard))
+                    node.received.append(Heard(now_ns, heard))
             elif not (self.off_bus(node) or self._deaf(node)):
                 node.receive(frame, now_ns)
                 self._collect(node)
@@ -266,7 +275,7 @@ class Network:
         """Send an error frame to all nodes; the sender repeats its frame until it is bus-off."""
         for node in self._nodes:
             if isinstance(node, Station):
-                node.received.append((self.now_ns, ERROR_FRAME))
+                node.received.append(Heard(self.now_ns, ERROR_FRAME))
         if sender not in self.errors:
             return
         self.errors[sender] += 8
@@ -276,7 +285,7 @@ class Network:
         self._pending = [entry for entry in self._pending if entry[3] is not sender]
         if isinstance(sender, Station):
             sender.waiting = 0
-            sender.received.append((self.now_ns, BUS_OFF_FRAME))
+            sender.received.append(Heard(self.now_ns, BUS_OFF_FRAME))
         elif isinstance(sender, EmulatedDrive):
             sender.bus_off(self.now_ns)
 
@@ -285,4 +294,7 @@ class Network:
             if drive.node_id == fault.node_id:
                 self._injector.strike(drive, fault, self.now_ns, begins=begins)
                 if self._injector.cuts_off(fault):
-                    self.errors[drive] = BUS_OFF if begins else 0
+                    if begins:
+                        self.errors[drive] = BUS_OFF
+                    else:
+                        self.recover(drive)

@@ -46,6 +46,11 @@ class PowerStage:
         """Bits 0 to 6 of the statusword (6041h)."""
         return _WORDS[self.state]
 
+    @property
+    def faulted(self) -> bool:
+        """Whether the drive is in a fault, or on its way there."""
+        return self.state in (_S.FAULT, _S.FAULT_REACTION_ACTIVE)
+
     def boot(self) -> None:
         """Enter switch on disabled after the self-test (transition 1)."""
         self._enter(DriveState.SWITCH_ON_DISABLED)
@@ -118,7 +123,7 @@ class PowerStage:
 
     def fault(self) -> None:
         """Start the stop that the fault reaction option code 605Eh selects (transition 13)."""
-        if self.state in (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE):
+        if self.faulted:
             return
         moving = self.state in POWERED
         option = self._values[0x605E, 0]

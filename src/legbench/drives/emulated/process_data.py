@@ -2,6 +2,7 @@
 
 from typing import final
 
+from legbench.drives.emulated.rules import usable
 from legbench.drives.emulated.store import ObjectStore, fit
 from legbench.drives.errors import CodecError, SdoAbortError
 from legbench.drives.protocol.datatypes import size_of
@@ -11,7 +12,8 @@ from legbench.drives.protocol.pdo import Mapped, PdoMap, split_word
 from legbench.drives.protocol.sdo import Abort
 
 RPDO, TPDO = 0x1400, 0x1800
-LAST_SYNCHRONOUS = 240
+ACYCLIC, LAST_SYNCHRONOUS = 0, 240
+"""Transmission types: at SYNC if it has changed, and the last of those at every nth SYNC."""
 _EVENT_TYPES = (254, 255)
 EVENT_DRIVEN = 255
 MAX_MAPPED = 64
@@ -22,9 +24,11 @@ MAX_MAPPED = 64
 class Pdo:
     """Process data object (PDO) as its communication and mapping objects describe it."""
 
-    def __init__(self, cob_id: int, kind: int, timer_ms: int, layout: PdoMap) -> None:
+    def __init__(
+        self, cob_id: int, kind: int, *, inhibit: int, timer_ms: int, layout: PdoMap
+    ) -> None:
         self.cob_id, self.kind, self.layout = cob_id, kind, layout
-        self.timer_ns = 1_000_000 * timer_ms
+        self.inhibit_ns, self.timer_ns = 100_000 * inhibit, 1_000_000 * timer_ms
         self.keys = tuple(entry.key for entry in layout.entries)
         self.waiting: tuple[int, ...] | None = None
         """Values of an RPDO that are received and not yet latched."""
@@ -75,13 +79,10 @@ class ProcessData:
 
     def _check_comm(self, comm: int, sub: int, value: int, exists: bool) -> Abort | None:
         if sub == 1:
-            if (
-                exists
-                and not value & COB_INVALID
-                and (value ^ self._store.values[comm, 1]) & COB_MASK
-            ):
-                return Abort.INVALID_VALUE
-            return None
+            if value & COB_INVALID:
+                return None
+            moved = bool((value ^ self._store.values[comm, 1]) & COB_MASK)
+            return Abort.INVALID_VALUE if (exists and moved) or not usable(value) else None
         if sub == 2 and LAST_SYNCHRONOUS < value < _EVENT_TYPES[0]:
             return Abort.INVALID_VALUE
         return Abort.DEVICE_STATE if sub == 3 and exists else None
@@ -128,8 +129,13 @@ class ProcessData:
             layout = PdoMap([entry for entry in entries if entry is not None])
         except CodecError:
             return None
-        kind, timer_ms = values.get((comm, 2), EVENT_DRIVEN), values.get((comm, 5), 0)
-        pdo = Pdo(cob & COB_MASK, kind, timer_ms, layout)
+        pdo = Pdo(
+            cob & COB_MASK,
+            values.get((comm, 2), EVENT_DRIVEN),
+            inhibit=values.get((comm, 3), 0),
+            timer_ms=values.get((comm, 5), 0),
+            layout=layout,
+        )
         known = old.get(pdo.cob_id)
         if known is not None and known.keys == pdo.keys:
             pdo.seen_ns = known.seen_ns
@@ -152,22 +158,16 @@ class ProcessData:
         """Sample the TPDOs that a SYNC makes due."""
         frames: list[Frame] = []
         for pdo in self.tpdos:
-            if pdo.kind <= LAST_SYNCHRONOUS:
+            if pdo.kind == ACYCLIC:
+                before, data = pdo.last, self.sample(pdo)
+                if data != before:
+                    frames.append(Frame(pdo.cob_id, data))
+            elif pdo.kind <= LAST_SYNCHRONOUS:
                 pdo.syncs += 1
                 if pdo.syncs >= pdo.kind:
                     pdo.syncs = 0
                     frames.append(Frame(pdo.cob_id, self.sample(pdo)))
         return frames
-
-    def receive(self, cob_id: int, data: bytes, now_ns: int, *, late: bool) -> None:
-        """Take an RPDO of the right length; a synchronous one that is late (1007h) is discarded."""
-        pdo = self.rpdos[cob_id]
-        pdo.seen_ns = now_ns
-        values = pdo.layout.unpack(data)
-        if pdo.kind > LAST_SYNCHRONOUS:
-            self.apply(pdo, values)
-        elif not late:
-            pdo.waiting = values
 
     def latch(self) -> None:
         """Apply the synchronous RPDOs received before a SYNC."""
@@ -195,7 +195,10 @@ class ProcessData:
             before, data = pdo.last, self.sample(pdo)
             since_ns = None if pdo.seen_ns is None else now_ns - pdo.seen_ns
             late = bool(pdo.timer_ns) and (since_ns is None or since_ns >= pdo.timer_ns)
-            if data != before or late:
+            if since_ns is not None and since_ns < pdo.inhibit_ns:
+                # What has changed meanwhile is sent when the time is over.
+                pdo.last = before
+            elif data != before or late:
                 pdo.seen_ns = now_ns
                 frames.append(Frame(pdo.cob_id, data))
         return frames

@@ -57,7 +57,7 @@ class SlcanAdapter:
         """Lines of the frames that were received since the last call."""
         station, lines = self._station, b""
         while station is not None and station.received:
-            _, frame = station.received.popleft()
+            frame = station.received.popleft().frame
             # An error frame has no line; the flags of `F` report it.
             if not frame.error:
                 lines += format_frame(frame)
@@ -111,6 +111,6 @@ class SlcanAdapter:
     def _flags(self) -> bytes:
         if self._station is None:
             return REFUSED
-        errors = max(self._network.errors[self._station], self._station.unread)
+        errors = self._network.level(self._station)
         flags = sum(flag for count, flag in ERRORS if errors >= count)
         return f"F{flags:02X}\r".encode()

@@ -1,7 +1,7 @@
 """Nodes of an emulated bus: participants that speak by themselves, and a master's controller."""
 
 from collections import deque
-from typing import Protocol, final
+from typing import NamedTuple, Protocol, final
 
 from legbench.drives.protocol.frame import Frame
 
@@ -22,13 +22,27 @@ class Participant(Protocol):
         ...
 
 
+class Heard(NamedTuple):
+    """A frame that a master's controller has received."""
+
+    at_ns: int
+    """Time of its end on the wire [ns]."""
+    frame: Frame
+    own: bool = False
+    """Whether this controller has sent it itself."""
+
+
 @final
 class Station:
     """A master's controller: a queue of received frames and an error counter."""
 
-    def __init__(self, tx_queue: int, bitrate: int, *, listen_only: bool) -> None:
-        self.received: deque[tuple[int, Frame]] = deque()
+    def __init__(
+        self, tx_queue: int, bitrate: int, *, listen_only: bool = False, echo: bool = False
+    ) -> None:
+        self.received: deque[Heard] = deque()
         self.tx_queue, self.bitrate, self.listen_only = tx_queue, bitrate, listen_only
+        self.echo = echo
+        """Whether it receives its own frames, too, when they were on the wire."""
         self.waiting = 0
         """Number of frames that have not been on the wire yet."""
         self.unread = 0

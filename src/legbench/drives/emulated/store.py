@@ -1,6 +1,6 @@
 """The object dictionary inside a drive: values, and access to them by SDO."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping
 from typing import final
 
 from legbench.drives.errors import CodecError
@@ -56,10 +56,12 @@ class ObjectStore:
         self._texts: dict[Key, Value] = {}
         self.load_defaults()
 
-    def load_defaults(self) -> None:
-        """Set every object to its power-on default."""
-        self.values.update(self._hidden)
+    def load_defaults(self, indices: Container[int] = range(0x10000)) -> None:
+        """Set every object among some indices, by default all, to its power-on default."""
+        self.values |= {key: value for key, value in self._hidden.items() if key[0] in indices}
         for key, entry in self._entries.items():
+            if entry.index not in indices:
+                continue
             if isinstance(entry.default, int):
                 self.values[key] = entry.default
             else:
@@ -109,16 +111,6 @@ class ObjectStore:
             raise abort_error(refusal, entry.index, entry.sub)
         self.values[entry.key] = value
         self._written(entry.key)
-
-    def recall(self, key: Key, value: int) -> None:
-        """Take a number from the drive's own memory; one that cannot be written keeps its value.
-
-        Raises:
-            SdoAbortError: the drive refuses the value.
-        """
-        entry = self._entries.get(key)
-        if entry is not None and entry.access is Access.RW:
-            self.put(entry, value)
 
     def show(self, key: Key, value: float) -> None:
         """Publish a measured value, rounded and saturated to what its object holds."""

@@ -10,11 +10,21 @@ from pathlib import Path
 from typing import final
 
 from legbench.closing import Closing
-from legbench.drives.emulated.network import Network
+from legbench.drives.emulated.error_frames import OVERFLOW_FRAME
+from legbench.drives.emulated.network import PASSIVE, Network
 from legbench.drives.emulated.pacer import Pacer
-from legbench.drives.emulated.station import Station
+from legbench.drives.emulated.station import Heard, Station
 from legbench.drives.errors import BusError
-from legbench.drives.transport.unix_bus import PACKET, opened_at, pack_frame, unpack_frame
+from legbench.drives.transport.unix_packet import (
+    PACKET,
+    Controller,
+    opening_of,
+    pack_frame,
+    unpack_frame,
+)
+
+UNREAD = 4096
+"""Number of frames that wait for a master who does not read; what comes then is lost to it."""
 
 
 @final
@@ -53,8 +63,14 @@ class UnixServer(Closing):
                 path.unlink()
 
     def poll(self) -> None:
-        """Wait a moment for frames, pass them on and advance virtual time."""
-        ready, _, _ = select.select([self._listener, *self._stations], [], [], self._pacer.wait_s())
+        """Wait a moment for frames, pass them on and advance virtual time.
+
+        Frames for which a controller has no room stay in the kernel's queue, so that in the end it
+        is their sender who gets an error.
+        """
+        takes = self.network.takes
+        heard = [client for client, station in self._stations.items() if takes(station)]
+        ready, _, _ = select.select([self._listener, *heard], [], [], self._pacer.wait_s())
         self._pacer.advance()
         for one in ready:
             if one is self._listener:
@@ -65,42 +81,55 @@ class UnixServer(Closing):
                 self._take(one)
         for client, station in tuple(self._stations.items()):
             self._give(client, station)
+            if self.network.off_bus(station) and _hung_up(client):
+                self._drop(client)
 
     def _take(self, client: socket.socket) -> None:
-        while True:
+        while self.network.takes(self._stations[client]):
             try:
                 packet = client.recv(PACKET.size + 1)
             except BlockingIOError:
                 return
-            except OSError:
-                packet = b""
+            except ConnectionResetError:
+                # It has gone and left frames unread; what it has sent before is still there.
+                continue
             if not packet:
                 self._drop(client)
                 return
             frame = unpack_frame(packet)
             if frame is None:
                 continue
-            bitrate = opened_at(frame)
-            if bitrate is not None:
+            asked = opening_of(frame)
+            if asked is not None:
                 self.network.detach(self._stations[client])
-                self._stations[client] = self.network.attach(bitrate=bitrate)
-                continue
-            try:
+                station = self.network.attach(bitrate=asked.bitrate, echo=asked.own)
+                self._stations[client] = station
+            elif not frame.error:
                 self.network.send(self._stations[client], frame)
-            except BusError:
-                # A full queue or bus-off loses the frame, as on a real bus.
-                continue
 
     def _give(self, client: socket.socket, station: Station) -> None:
-        while station.received:
-            _, frame = station.received.popleft()
+        received, controller = station.received, self._controller(station)
+        while received:
+            _, frame, own = received[0]
             try:
-                client.send(pack_frame(frame))
+                client.send(pack_frame(frame, controller, own=own))
             except BlockingIOError:
-                continue
+                break
             except OSError:
-                self._drop(client)
+                # It has gone; the end of what it has sent says so, in its turn.
+                received.clear()
                 return
+            received.popleft()
+        if len(received) > UNREAD:
+            while len(received) >= UNREAD:
+                received.pop()
+            received.append(Heard(self.network.now_ns, OVERFLOW_FRAME))
+
+    def _controller(self, station: Station) -> Controller:
+        if self.network.off_bus(station):
+            return Controller.BUS_OFF
+        passive = self.network.level(station) >= PASSIVE
+        return Controller.PASSIVE if passive else Controller.ACTIVE
 
     def _drop(self, client: socket.socket) -> None:
         self.network.detach(self._stations.pop(client))
@@ -114,3 +143,10 @@ class UnixServer(Closing):
             self._listener.close()
             if self.path.exists():
                 os.unlink(self.path)
+
+
+def _hung_up(client: socket.socket) -> bool:
+    """Whether a master that is not read from has gone."""
+    poll = select.poll()
+    poll.register(client, 0)
+    return bool(poll.poll(0))

@@ -9,6 +9,9 @@ from legbench.recording.abstract_disk import AbstractLog
 
 LOG_FAILED = "bus log not written"
 """Event of a run whose log ends before it does."""
+ERROR_FLAG, BUS_ERROR = 0x20000000, 0x80
+"""Bits of SocketCAN's error frames: that one is an error frame, and that a bus error is among its
+reasons. python-can's reader takes what lacks either of them for data."""
 
 
 @final
@@ -32,12 +35,12 @@ class BusLog(Closing):
     def __call__(self, message: can.Message) -> None:
         """Add one frame to the log."""
         if message.is_error_frame:
-            name = f"{0x20000000 | message.arbitration_id:08X}"
+            name = f"{ERROR_FLAG | BUS_ERROR | message.arbitration_id:08X}"
         elif message.is_extended_id:
             name = f"{message.arbitration_id:08X}"
         else:
             name = f"{message.arbitration_id:03X}"
-        data = "R" if message.is_remote_frame else message.data.hex().upper()
+        data = f"R{message.dlc}" if message.is_remote_frame else message.data.hex().upper()
         self._write(f"({message.timestamp:.6f}) {self._channel} {name}#{data}\n".encode())
 
     def close(self) -> None:

@@ -34,7 +34,7 @@ def enable(
         text = parts.bring_up.error_text(axis.node)
         raise DriveError(
             f"drive '{axis.node.name}' (node {axis.node.node_id}) is in fault: {text}; remove "
-            "the cause, then start with a fault reset"
+            f"the cause, then run `legbench drives reset --node {axis.node.name}`"
         )
     sample = motion.sample(ticks.last)
     motion.check(sample)

@@ -13,6 +13,7 @@ from legbench.drives.protocol.frame import (
     SDO_REQUEST_BASE,
     SYNC_ID,
 )
+from legbench.drives.protocol.lss import REQUEST_ID as LSS_REQUEST
 from legbench.drives.setup.config import BusConfig, NodeConfig
 from legbench.drives.transport.open_bus import listening_ns
 from legbench.errors import PlantFault
@@ -23,8 +24,9 @@ class Lookout:
     """Detector of any other master that leads the drives of a bus file or accesses their objects.
 
     A master of a leg is heard by its SYNC, its commands (RPDOs), its orders (NMT), its questions
-    (SDO requests) and its heartbeat. A node that the bus file does not name may be anything, such
-    as a sensor: its heartbeat is a master's if a drive watches for it (1016h), see `watched`.
+    (SDO and LSS requests) and its heartbeat. A node that the bus file does not name may be
+    anything, such as a sensor: its heartbeat is a master's if a drive watches for it (1016h), see
+    `watched`.
 
     Attributes:
         stranger: identifier of the first frame that only a master sends, and another one did.
@@ -36,6 +38,7 @@ class Lookout:
         self._names = {
             NMT_ID: "NMT order",
             SYNC_ID: "SYNC",
+            LSS_REQUEST: "LSS request",
             HEARTBEAT_BASE + config.master_id: f"heartbeat of master {config.master_id}",
         }
         for node in config.nodes:

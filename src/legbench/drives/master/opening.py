@@ -5,7 +5,12 @@ from typing import final
 from legbench.drives.master.link_parts import LinkParts
 from legbench.drives.master.link_state import LinkState
 from legbench.drives.master.port import Listener
-from legbench.drives.master.preparation import prepare_to_move, read_temperatures, refuse_led
+from legbench.drives.master.preparation import (
+    check_homed,
+    prepare_to_move,
+    read_temperatures,
+    refuse_led,
+)
 from legbench.drives.master.read_only import may_pace, may_read
 from legbench.drives.setup.master_watch import check_master_watch
 from legbench.drives.setup.taken import Outcomes, tells_heartbeat, unprotected
@@ -89,6 +94,7 @@ class Opening:
             parts.channel.take()
             parts.bring_up.listen()
         parts.bring_up.identify()
+        check_homed(parts.bring_up, parts.config.nodes)
         self._took(parts.bring_up.refuse_differences())
         if listening:
             return

@@ -1,10 +1,12 @@
 """Preparation of the drives by SDO, before process data begins and before anything moves."""
 
+from collections.abc import Sequence
+
 from legbench.drives.errors import DriveError
 from legbench.drives.master.bring_up import BringUp
 from legbench.drives.master.cycle import Cycle
 from legbench.drives.protocol.nmt import NmtState
-from legbench.drives.setup.config import BusConfig
+from legbench.drives.setup.config import BusConfig, NodeConfig
 from legbench.drives.setup.outcome import Outcome
 from legbench.drives.setup.taken import check_taken
 
@@ -24,12 +26,13 @@ def prepare_to_move(
 
     Raises:
         BusError: nobody can be talked to.
-        DriveError: a drive is missing, is another one, refuses what is required, or is not
-            protected by what it took.
+        DriveError: a drive is missing, is another one, is not homed, refuses what is required, or
+            is not protected by what it took.
         PlantFault: somebody else leads the drives.
     """
     bring_up.listen()
     bring_up.identify()
+    check_homed(bring_up, config.nodes)
     bring_up.unpower()
     bring_up.glance()
     bring_up.pre_operational()
@@ -39,6 +42,43 @@ def prepare_to_move(
         bring_up.check_soft_limits(node)
         bring_up.preload(node)
     return outcomes
+
+
+def is_homed(bring_up: BringUp, node: NodeConfig) -> bool | None:
+    """Whether a drive says that its position refers to its home; none if it need not be homed."""
+    wanted = node.homed
+    if wanted is None:
+        return None
+    entry = wanted.object
+    return wanted.met(bring_up.sdo(node).get_int(entry.index, entry.sub, entry.kind))
+
+
+def check_homed(bring_up: BringUp, nodes: Sequence[NodeConfig]) -> None:
+    """Refuse drives whose positions mean nothing yet; nothing has been written by then.
+
+    Raises:
+        DriveError: the bus file says how a drive shows that it is homed, and it does not.
+    """
+    for node in nodes:
+        if is_homed(bring_up, node) is False:
+            raise DriveError(
+                f"drive '{node.name}' (node {node.node_id}) is not homed ({node.homed}): its "
+                f"position means nothing yet; run `legbench drives home --node {node.name}`"
+            )
+
+
+def refuse_powered(bring_up: BringUp, nodes: Sequence[NodeConfig]) -> None:
+    """Refuse drives that are found with power, for those who change what drives keep.
+
+    Raises:
+        DriveError: the motor of one may have torque.
+    """
+    for node in nodes:
+        if bring_up.powered(node):
+            raise DriveError(
+                f"drive '{node.name}' (node {node.node_id}) has power; end the program that leads "
+                "it, or press the stop button: nothing has been written"
+            )
 
 
 def refuse_led(bring_up: BringUp, cycle: Cycle, config: BusConfig) -> None:

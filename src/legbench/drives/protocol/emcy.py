@@ -17,6 +17,7 @@ MEANINGS = {
     0x5441: "safe torque off",
     0x6320: "parameter error",
     0x7305: "encoder",
+    0x8100: "connection ended",
     0x8110: "CAN overrun",
     0x8120: "CAN error passive",
     0x8130: "heartbeat lost",

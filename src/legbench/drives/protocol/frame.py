@@ -38,6 +38,13 @@ class Frame(NamedTuple):
     remote: bool = False
     extended: bool = False
     error: bool = False
+    dlc: int = 0
+    """Length that a remote frame asks for; 0 for all others, which have their data [bytes]."""
+
+    @property
+    def length(self) -> int:
+        """Data length code on the wire [bytes]."""
+        return self.dlc if self.remote else len(self.data)
 
     def __str__(self) -> str:
         return f"{self.cob_id:03X}#{self.data.hex().upper()}"

@@ -59,6 +59,14 @@ _TABLE = """
 1006 0 u32 rw 0 - Communication cycle period [us]
 1007 0 u32 rw 0 - Synchronous window length [us]
 1008 0 str const legbench-drive - Manufacturer device name
+1010 0 u8 const 3 - Store parameters count
+1010 1 u32 rw 1 - Store all parameters
+1010 2 u32 rw 1 - Store communication parameters
+1010 3 u32 rw 1 - Store application parameters
+1011 0 u8 const 3 - Restore default parameters count
+1011 1 u32 rw 1 - Restore all default parameters
+1011 2 u32 rw 1 - Restore communication default parameters
+1011 3 u32 rw 1 - Restore application default parameters
 1014 0 u32 ro 0x80 - COB-ID EMCY
 1015 0 u16 rw 0 - Inhibit time EMCY [100 us]
 1016 0 u8 const 2 - Consumer heartbeat time count
@@ -91,7 +99,7 @@ _TABLE = """
 6065 0 u32 rw 0xFFFFFFFF - Following error window
 6066 0 u16 rw 0 - Following error time out [ms]
 606C 0 i32 ro 0 m Velocity actual value
-6071 0 i16 rw 0 m Target torque
+6071 0 i16 ro 0 m Target torque
 6072 0 u16 rw 1000 m Max torque [permille]
 6077 0 i16 ro 0 m Torque actual value [permille]
 607A 0 i32 rw 0 m Target position
@@ -101,8 +109,8 @@ _TABLE = """
 607D 2 i32 rw 0 - Max position limit
 607E 0 u8 rw 0 - Polarity
 6080 0 u32 rw 0 - Max motor speed [counts/s]
-6081 0 u32 rw 0 - Profile velocity
-6083 0 u32 rw 0 - Profile acceleration
+6081 0 u32 ro 0 - Profile velocity
+6083 0 u32 ro 0 - Profile acceleration
 6084 0 u32 rw 0 - Profile deceleration [counts/s2]
 6085 0 u32 rw 0 - Quick stop deceleration [counts/s2]
 6098 0 i8 rw 37 - Homing method
@@ -150,7 +158,9 @@ def _pdo_rows() -> Iterator[ObjectEntry]:
             cob = COB_INVALID | bases[number]
             yield ObjectEntry(comm, 1, f"{words} COB-ID", u32, Access.RW, cob)
             yield ObjectEntry(comm, 2, f"{words} transmission type", u8, Access.RW, 255)
-            yield ObjectEntry(comm, 3, f"{words} inhibit time [100 us]", u16, Access.RW, 0)
+            # An RPDO has no inhibit time.
+            inhibit = Access.RO if base == 0x1400 else Access.RW
+            yield ObjectEntry(comm, 3, f"{words} inhibit time [100 us]", u16, inhibit, 0)
             yield ObjectEntry(comm, 5, f"{words} event timer [ms]", u16, Access.RW, 0)
             yield ObjectEntry(mapping, 0, f"{words} mapped objects", u8, Access.RW, 0)
             for sub in range(1, MAX_MAPPED + 1):

@@ -41,8 +41,10 @@ class Abort(IntEnum):
     TOO_HIGH = 0x06090031
     TOO_LOW = 0x06090032
     GENERAL = 0x08000000
+    NOT_TRANSFERRED = 0x08000020
     LOCAL_CONTROL = 0x08000021
     DEVICE_STATE = 0x08000022
+    NO_DATA = 0x08000024
 
 
 ABSENT = (Abort.NO_OBJECT, Abort.NO_SUB_INDEX, Abort.UNSUPPORTED_ACCESS, Abort.GENERAL)
@@ -70,8 +72,10 @@ MEANINGS = {
     Abort.TOO_HIGH: "value of parameter written too high",
     Abort.TOO_LOW: "value of parameter written too low",
     Abort.GENERAL: "general error",
+    Abort.NOT_TRANSFERRED: "data cannot be transferred or stored to the application",
     Abort.LOCAL_CONTROL: "data cannot be transferred because of local control",
     Abort.DEVICE_STATE: "data cannot be transferred in the present device state",
+    Abort.NO_DATA: "no data available",
 }
 
 

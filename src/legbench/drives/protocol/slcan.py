@@ -27,7 +27,7 @@ def format_frame(frame: Frame) -> bytes:
     width = EXTENDED if frame.extended else STANDARD
     letter = letter.upper() if frame.extended else letter
     data = "" if frame.remote else frame.data.hex().upper()
-    return f"{letter}{frame.cob_id:0{width}X}{len(frame.data)}{data}\r".encode()
+    return f"{letter}{frame.cob_id:0{width}X}{frame.length}{data}\r".encode()
 
 
 def parse_frame(line: str) -> Frame | None:
@@ -46,7 +46,8 @@ def parse_frame(line: str) -> Frame | None:
         return None
     if cob_id >= 1 << (29 if width == EXTENDED else 11):
         return None
-    return Frame(cob_id, content, remote, width == EXTENDED)
+    dlc = count if remote else 0
+    return Frame(cob_id, content, remote, width == EXTENDED, dlc=dlc)
 
 
 def bitrate_of_registers(text: str) -> int | None:

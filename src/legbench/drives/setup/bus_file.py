@@ -4,14 +4,17 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from legbench.drives.errors import CodecError
 from legbench.drives.protocol.datatypes import SHORT_NAMES
 from legbench.drives.protocol.objects import name_of
 from legbench.drives.protocol.pdo import Mapped
-from legbench.drives.setup.config import NOT_IN_FILES, BusConfig, Identity, NodeConfig, Parameter
+from legbench.drives.setup.building import Built, at, build, finite
+from legbench.drives.setup.config import BusConfig, Identity, NodeConfig, Parameter
+from legbench.drives.setup.configuration import interpolation_time
 from legbench.drives.setup.encoders import Side
+from legbench.drives.setup.homed import HomedCondition
 from legbench.drives.setup.pdos import (
     CONTROLWORD,
     LINK_POSITION_SHORT,
@@ -28,14 +31,8 @@ from legbench.errors import ConfigError
 from legbench.limits.safety import SafetyLimits
 from legbench.reading import UnreadableError, read_toml
 
-Built = TypeVar("Built")
 _OBJECT = re.compile(r"([0-9A-Fa-f]{4}):([0-9A-Fa-f]{2}) ([a-z]+[0-9]*)")
 _IDENTITY = tuple(field.name for field in fields(Identity))
-_PLAIN_TYPES: dict[str, tuple[type, ...]] = {
-    "str": (str,),
-    "float": (int, float),
-    "bool": (bool,),
-}
 OBJECT_KEYS = (
     "motor_object",
     "target_object",
@@ -44,8 +41,6 @@ OBJECT_KEYS = (
     "temperature_object",
 )
 """Keys of a node that name an object."""
-LARGEST = 1e18
-"""Bound that the magnitude of every number of a file stays below."""
 AXES = 2
 """Axes of a leg, and so pairs of a range."""
 
@@ -68,9 +63,9 @@ def load_limits(path: Path) -> SafetyLimits:
     return _load(path, limits_from_mapping)
 
 
-def _load(path: Path, build: Callable[[Mapping[str, Any]], Built]) -> Built:
+def _load(path: Path, make: Callable[[Mapping[str, Any]], Built]) -> Built:
     try:
-        return build(read_toml(path))
+        return make(read_toml(path))
     except FileNotFoundError:
         raise ConfigError(f"{path}: no such file; hardware/ holds the bench's") from None
     except (ConfigError, UnreadableError) as error:
@@ -94,7 +89,7 @@ def limits_from_mapping(content: Mapping[str, Any]) -> SafetyLimits:
             given[name] = _range(name, given[name])
     _waive(given)
     done = ("motor_range", "joint_range", "motor_knee_range", "joint_knee_range", "waive")
-    return _build(SafetyLimits, "limits", given, converted=done)
+    return build(SafetyLimits, "limits", given, converted=done)
 
 
 def bus_from_mapping(content: Mapping[str, Any], folder: Path = Path()) -> BusConfig:
@@ -103,9 +98,14 @@ def bus_from_mapping(content: Mapping[str, Any], folder: Path = Path()) -> BusCo
     tables = _list("node", given.pop("node", []))
     # A data sheet of the bus is that of every node which names none.
     usual = {"eds": given.pop("eds")} if "eds" in given else {}
-    given["nodes"] = tuple(_node(usual | _table("node", table), folder) for table in tables)
+    given["nodes"] = tuple(
+        _node(usual | _table("node", table), place, folder)
+        for place, table in enumerate(tables, start=1)
+    )
     _waive(given)
-    return _build(BusConfig, "bus", given, converted=("nodes", "waive"))
+    bus = build(BusConfig, "bus", given, converted=("nodes", "waive"))
+    interpolation_time(bus.period_us)
+    return bus
 
 
 def _waive(given: dict[str, Any]) -> None:
@@ -117,11 +117,15 @@ def _waive(given: dict[str, Any]) -> None:
         given["waive"] = tuple(names)
 
 
-def _node(given: dict[str, Any], folder: Path) -> NodeConfig:
-    name = str(given.get("name", "?"))
-    where = f"node '{name}'"
+def _node(given: dict[str, Any], place: int, folder: Path) -> NodeConfig:
+    where = f"node '{given['name']}'" if "name" in given else f"node {place} of the file"
+    with at(where):
+        return _node_of(given, where, folder)
+
+
+def _node_of(given: dict[str, Any], where: str, folder: Path) -> NodeConfig:
     identity = {key: given.pop(key) for key in _IDENTITY if key in given}
-    given["identity"] = _build(Identity, where, identity)
+    given["identity"] = build(Identity, where, identity)
     _encoders(where, given)
     if "eds" in given:
         if not isinstance(given["eds"], str):
@@ -131,9 +135,13 @@ def _node(given: dict[str, Any], folder: Path) -> NodeConfig:
         given["node_id"] = given.pop("id")
     for key in OBJECT_KEYS:
         if key in given:
-            given[key] = parse_object(given[key])
+            with at(f"{where}: {key}"):
+                given[key] = parse_object(given[key])
     given["quirks"] = _quirks(where, given.get("quirks", {}))
     _pdos(where, given)
+    if "homed" in given:
+        with at(f"{where} homed"):
+            given["homed"] = _homed(f"{where} homed", given["homed"])
     if "soft_limits" in given:
         given["soft_limits"] = _range("soft_limits", given["soft_limits"])
     parameters = _table("parameters", given.get("parameters", {}))
@@ -143,7 +151,14 @@ def _node(given: dict[str, Any], folder: Path) -> NodeConfig:
         if keys.count(key) > 1:
             raise ConfigError(f"{where} gives parameter {name_of(*key)} twice")
     done = ("identity", "motor", "link", "side", "quirks", "rpdos", "tpdos", "eds", *OBJECT_KEYS)
-    return _build(NodeConfig, where, given, converted=(*done, "parameters", "soft_limits"))
+    return build(NodeConfig, where, given, converted=(*done, "parameters", "soft_limits", "homed"))
+
+
+def _homed(where: str, table: object) -> HomedCondition:
+    given = _table("homed", table)
+    if "object" in given:
+        given["object"] = parse_object(given["object"])
+    return build(HomedCondition, where, given, converted=("object",))
 
 
 def _encoders(where: str, given: dict[str, Any]) -> None:
@@ -154,9 +169,10 @@ def _encoders(where: str, given: dict[str, Any]) -> None:
     found = [axis for axis in ("motor", "link") if axis in given]
     if not found:
         raise ConfigError(f"{where} has no encoder; describe it in [node.motor], [node.link]")
-    units = {
-        axis: _build(AxisUnits, f"{where} {axis}", _table(axis, given[axis])) for axis in found
-    }
+    units: dict[str, AxisUnits] = {}
+    for axis in found:
+        with at(f"{where} {axis}"):
+            units[axis] = build(AxisUnits, f"{where} {axis}", _table(axis, given[axis]))
     given["motor"] = units[found[0]]
     given["link"] = units["link"] if len(found) == 2 else None
     given["side"] = Side(found[0])
@@ -175,7 +191,7 @@ def _quirks(where: str, value: object) -> Quirks:
             f"{where} quirks: mode_shown is {shown!r}; it must be one of {', '.join(ModeShown)}"
         )
     given["mode_shown"] = ModeShown(shown)
-    return _build(Quirks, f"{where} quirks", given, converted=("warnings", "mode_shown"))
+    return build(Quirks, f"{where} quirks", given, converted=("warnings", "mode_shown"))
 
 
 def _pdos(where: str, given: dict[str, Any]) -> None:
@@ -183,7 +199,9 @@ def _pdos(where: str, given: dict[str, Any]) -> None:
     for key, plural in (("rpdo", "rpdos"), ("tpdo", "tpdos")):
         if key in given:
             usual = {"deadline_ms": RPDO.deadline_ms} if key == "rpdo" else {}
-            given[plural] = tuple(_pdo(where, entry, usual) for entry in _list(key, given.pop(key)))
+            pdos = _list(key, given.pop(key))
+            with at(f"{where}: {key}"):
+                given[plural] = tuple(_pdo(where, entry, usual) for entry in pdos)
     target = given.get("target_object", TARGET_POSITION)
     given.setdefault("rpdos", packed((CONTROLWORD, target), RPDO.deadline_ms))
     answers = [STATUSWORD, given.get("motor_object", POSITION_ACTUAL)]
@@ -198,7 +216,7 @@ def _pdo(where: str, table: object, usual: Mapping[str, int]) -> PdoConfig:
     given = dict(usual) | _table("PDO", table)
     objects = _list("objects", given.get("objects", []))
     given["objects"] = tuple(parse_object(text) for text in objects)
-    return _build(PdoConfig, f"{where} PDO", given, converted=("objects",))
+    return build(PdoConfig, f"{where} PDO", given, converted=("objects",))
 
 
 def _parameter(text: str, value: object) -> Parameter:
@@ -229,52 +247,6 @@ def format_object(entry: Mapped) -> str:
     return f"{entry.index:04X}:{entry.sub:02X} {short}"
 
 
-def _build(
-    kind: Callable[..., Built],
-    where: str,
-    given: Mapping[str, Any],
-    converted: tuple[str, ...] = (),
-) -> Built:
-    """A dataclass from keys: unknown and missing ones are named, plain types checked."""
-    known = {
-        field.name: field
-        for field in fields(kind)  # pyright: ignore[reportArgumentType]
-        if field.init and NOT_IN_FILES not in field.metadata
-    }
-    unknown = sorted(set(given) - set(known))
-    if unknown:
-        raise ConfigError(
-            f"{where} has unknown keys: {', '.join(unknown)}; it knows {', '.join(known)}"
-        )
-    for name, value in given.items():
-        if name in converted:
-            continue
-        words = str(getattr(known[name].type, "__name__", known[name].type)).split(" | ")[0]
-        allowed = _PLAIN_TYPES.get(words, (int,))
-        if (isinstance(value, bool) and words != "bool") or not isinstance(value, allowed):
-            raise ConfigError(f"{where}: {name} is {value!r}; it must be of type {words}")
-    plain = {
-        name: _finite(where, name, value)
-        for name, value in given.items()
-        if name not in converted and isinstance(value, int | float)
-    }
-    try:
-        return kind(**(dict(given) | plain))
-    except TypeError as error:
-        raise ConfigError(f"{where}: {str(error).partition(') ')[2] or error}") from None
-
-
-def _finite(where: str, name: str, value: float) -> float:
-    """Return a number of a file, refusing one that is infinite, not a number or too large."""
-    if not abs(value) < LARGEST:
-        text = f"{value}" if isinstance(value, float) else "too large"
-        raise ConfigError(
-            f"{where}: {name} is {text}; it must be a number below {LARGEST:g}: a limit that is "
-            "not to act is left out"
-        )
-    return value
-
-
 def _table(name: str, value: object) -> dict[str, Any]:
     if not isinstance(value, Mapping):
         raise ConfigError(f"'{name}' must be a table, not {value!r}")
@@ -293,5 +265,5 @@ def _range(name: str, pair: object) -> tuple[float, float]:
         isinstance(number, int | float) and not isinstance(number, bool) for number in numbers
     ):
         raise ConfigError(f"{name} needs pairs [low, high] in rad, not {pair!r}")
-    low, high = (float(_finite("range", name, number)) for number in numbers)
+    low, high = (float(finite("range", name, number)) for number in numbers)
     return (low, high)

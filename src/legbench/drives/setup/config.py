@@ -9,6 +9,7 @@ from legbench.drives.protocol.pdo import Mapped
 from legbench.drives.setup.bus_numbers import BUS_NUMBERS, check_bus_numbers
 from legbench.drives.setup.cob_ids import check_distinct
 from legbench.drives.setup.encoders import Side, check_encoder, check_sides, known_signals
+from legbench.drives.setup.homed import HomedCondition
 from legbench.drives.setup.identity import Identity as Identity
 from legbench.drives.setup.parameters import Parameter, check_parameter
 from legbench.drives.setup.pdos import (
@@ -70,6 +71,9 @@ class NodeConfig:
     heartbeat_consumer: bool = True
     """Whether the drive has 1016h, and so stops when its master's heartbeat is missing; some have
     not, and must be given a `deadline_ms` of their commands instead."""
+    homed: HomedCondition | None = None
+    """How the drive shows that it is homed, without which nothing moves; none needs no homing, as
+    with an absolute encoder."""
     eds: Path | None = None
     """Electronic data sheet of the drive, relative to the bus file; an emulated one wears it."""
     soft_limits: Range | None = None

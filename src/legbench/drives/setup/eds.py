@@ -1,6 +1,8 @@
 """Electronic data sheets (CiA 306-1) from the object table, and DCFs with a node's values."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from datetime import datetime
 from itertools import groupby
 
 from legbench.drives.protocol.datatypes import DataType
@@ -12,25 +14,58 @@ from legbench.drives.setup.configuration import configuration
 MANDATORY = (0x1000, 0x1001, 0x1018)
 MANUFACTURER = range(0x2000, 0x6000)
 VAR, ARRAY, RECORD = 0x7, 0x8, 0x9
-ARRAYS = (0x1003, 0x1016, 0x1029, 0x607D, 0x6099, 0x60E4)
+ARRAYS = (0x1003, 0x1010, 0x1011, 0x1016, 0x1029, 0x607D, 0x6099, 0x60E4)
 BAUD_RATES = (10, 20, 50, 125, 250, 500, 800, 1000)
 """Bitrates that an EDS names [kbit/s]."""
+EDS_NAME = "legbench-drive.eds"
+CREATED = datetime(2026, 11, 22, 13, 27)
+"""Time at which the data sheet of the emulated drives was first written."""
+DATE, TIME = "%m-%d-%Y", "%I:%M%p"
+"""Notation of dates and times in data sheets (CiA 306-1, 6.3)."""
 
 
-def eds_text() -> str:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stamps:
+    """Times in the head of a data sheet, to the minute."""
+
+    created: datetime = CREATED
+    modified: datetime = CREATED
+
+
+def stamps_of(text: str) -> Stamps | None:
+    """Times that the head of a data sheet names; none if it names none."""
+    lines = {key: value for key, _, value in (line.partition("=") for line in text.splitlines())}
+    try:
+        created, modified = (
+            datetime.strptime(f"{lines[f'{what}Date']} {lines[f'{what}Time']}", f"{DATE} {TIME}")
+            for what in ("Creation", "Modification")
+        )
+    except (KeyError, ValueError):
+        return None
+    return Stamps(created=created, modified=modified)
+
+
+def eds_text(stamps: Stamps | None = None) -> str:
     """The data sheet of the drives that are emulated here."""
-    return _text("legbench-drive.eds", {}, None)
+    return _text(_head(EDS_NAME, stamps or Stamps(), {}), {}, {})
 
 
-def dcf_text(bus: BusConfig, node: NodeConfig) -> str:
-    """The data sheet with what `node` is and is told: parameter values and node id."""
-    values: dict[Key, int] = {
-        (0x1018, 1): node.identity.vendor,
-        (0x1018, 2): node.identity.product or 0,
-        (0x1018, 3): node.identity.revision or 0,
-        (0x1018, 4): node.identity.serial or 0,
+def dcf_text(bus: BusConfig, node: NodeConfig, stamps: Stamps | None = None) -> str:
+    """The data sheet with what `node` is and is told: identity, parameter values and node id.
+
+    An identity is constant, so it is the default of 1018h and no parameter value.
+    """
+    identity = node.identity
+    numbers = {
+        "VendorNumber": identity.vendor,
+        "ProductNumber": identity.product or 0,
+        "RevisionNumber": identity.revision or 0,
     }
-    values |= {parameter.key: parameter.value for parameter in configuration(bus, node)}
+    defaults: dict[Key, int] = {
+        (0x1018, sub): number
+        for sub, number in enumerate((*numbers.values(), identity.serial or 0), start=1)
+    }
+    values = {parameter.key: parameter.value for parameter in configuration(bus, node)}
     commissioning = {
         "NodeID": str(node.node_id),
         "NodeName": node.name,
@@ -40,14 +75,17 @@ def dcf_text(bus: BusConfig, node: NodeConfig) -> str:
         "CANopenManager": "0",
         "LSS_SerialNumber": str(node.identity.serial or 0),
     }
-    return _text(f"{node.name}.dcf", values, commissioning)
-
-
-def _text(name: str, values: Mapping[Key, int], commissioning: Mapping[str, str] | None) -> str:
-    sections = [*_head(name)]
-    if commissioning is not None:
+    head = [
+        *_head(f"{node.name}.dcf", stamps or Stamps(), numbers),
         # The spelling is that of CiA 306.
-        sections.append(_section("DeviceComissioning", commissioning))
+        _section("DeviceComissioning", commissioning),
+    ]
+    return _text(head, defaults, values)
+
+
+def _text(head: Iterable[str], defaults: Mapping[Key, int], values: Mapping[Key, int]) -> str:
+    """Data sheet: head, lists of objects, each object with its default and its value."""
+    sections = [*head]
     indices = sorted({index for index, _ in OBJECTS})
     for words, chosen in (
         ("MandatoryObjects", [index for index in indices if index in MANDATORY]),
@@ -57,20 +95,30 @@ def _text(name: str, values: Mapping[Key, int], commissioning: Mapping[str, str]
         listed = {str(place): f"0x{index:04X}" for place, index in enumerate(chosen, start=1)}
         sections.append(_section(words, {"SupportedObjects": str(len(chosen)), **listed}))
     for index, group in groupby(OBJECTS.values(), key=lambda entry: entry.index):
-        sections += _objects(index, list(group), values)
+        entries = [
+            replace(entry, default=defaults.get(entry.key, entry.default)) for entry in group
+        ]
+        sections += _objects(index, entries, values)
     return "\n".join(sections)
 
 
-def _head(name: str) -> Iterator[str]:
+def _head(name: str, stamps: Stamps, numbers: Mapping[str, int]) -> Iterator[str]:
+    """Head of a data sheet; one with numbers of a device is a DCF, which names its EDS."""
     yield _section(
         "FileInfo",
         {
             "FileName": name,
             "FileVersion": "1",
-            "FileRevision": "0",
+            "FileRevision": "1",
+            **({"LastEDS": EDS_NAME} if numbers else {}),
             "EDSVersion": "4.0",
             "Description": "Servo drive in cyclic synchronous position mode",
+            "CreationTime": stamps.created.strftime(TIME),
+            "CreationDate": stamps.created.strftime(DATE),
             "CreatedBy": "legbench",
+            "ModificationTime": stamps.modified.strftime(TIME),
+            "ModificationDate": stamps.modified.strftime(DATE),
+            "ModifiedBy": "legbench",
         },
     )
     rates = {f"BaudRate_{rate}": "1" for rate in BAUD_RATES}
@@ -78,10 +126,10 @@ def _head(name: str) -> Iterator[str]:
         "DeviceInfo",
         {
             "VendorName": "legbench",
-            "VendorNumber": "0",
+            "VendorNumber": f"0x{numbers.get('VendorNumber', 0):X}",
             "ProductName": "legbench-drive",
-            "ProductNumber": "0",
-            "RevisionNumber": "0",
+            "ProductNumber": f"0x{numbers.get('ProductNumber', 0):X}",
+            "RevisionNumber": f"0x{numbers.get('RevisionNumber', 0):X}",
             "OrderCode": "none",
             **rates,
             "SimpleBootUpMaster": "0",
@@ -91,7 +139,7 @@ def _head(name: str) -> Iterator[str]:
             "GroupMessaging": "0",
             "NrOfRXPDO": "4",
             "NrOfTXPDO": "4",
-            "LSS_Supported": "0",
+            "LSS_Supported": "1",
         },
     )
     yield _section("DummyUsage", {f"Dummy{index:04X}": "0" for index in range(1, 8)})
@@ -121,7 +169,7 @@ def _entry(entry: ObjectEntry, kind: int, values: Mapping[Key, int]) -> dict[str
         "DefaultValue": _default(entry),
         "PDOMapping": str(int(entry.mappable)),
     }
-    if entry.key in values and entry.access is not Access.RO:
+    if entry.key in values and entry.access in (Access.RW, Access.WO):
         lines["ParameterValue"] = _number(entry, values[entry.key])
     return lines
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from legbench.drives.protocol.datatypes import FORMATS, DataType, range_of
+from legbench.drives.protocol.datatypes import FORMATS, SHORT_NAMES, DataType, range_of
 from legbench.drives.protocol.objects import Key, name_of
 from legbench.errors import ConfigError
 
@@ -21,11 +21,19 @@ class Parameter:
         """Index and sub-index."""
         return (self.index, self.sub)
 
+    def __str__(self) -> str:
+        short = next(name for name, kind in SHORT_NAMES.items() if kind is self.kind)
+        return f'{name_of(*self.key)} ("{self.index:04X}:{self.sub:02X} {short}")'
+
 
 OWN_OBJECTS = (0x1005, 0x1006, 0x1016, 0x1017, 0x1029, 0x6007, 0x6040, 0x605A, 0x6060)
 OWN_OBJECTS += (0x607A, 0x60B0, 0x60C2)
 """Written from the rest of the bus file; a parameter would undo it."""
 PDO_OBJECTS = range(0x1400, 0x1C00)
+MEMORY_OBJECTS = (0x1010, 0x1011)
+"""Objects that store a configuration in a drive's memory, or load its defaults."""
+SERVICE_OBJECTS = (0x1012, 0x1014, *range(0x1200, 0x1300))
+"""COB-IDs of TIME, EMCY and the SDO channels, which a master expects where CiA 301 has them."""
 STOP_OBJECTS = range(0x605B, 0x605F)
 FOLLOWING_WINDOW, NO_WINDOW, SOFT_LIMITS = 0x6065, 0xFFFFFFFF, 0x607D
 
@@ -39,6 +47,10 @@ def check_parameter(name: str, parameter: Parameter) -> None:
         what = f"is {parameter.value}, but its type {parameter.kind.name} {held}: correct one"
     if index in OWN_OBJECTS or index in PDO_OBJECTS:
         what = "is written by itself, from the rest of the bus file: leave it out"
+    elif index in MEMORY_OBJECTS:
+        what = "would wear out the drive's memory at every start: run `legbench drives store` once"
+    elif index in SERVICE_OBJECTS:
+        what = "moves a service of CiA 301 to where this master does not look: leave it out"
     elif index == SOFT_LIMITS:
         what = "would not move with offset_counts: give soft_limits = [low, high] in rad"
     elif index in STOP_OBJECTS and parameter.value <= 0:
@@ -46,4 +58,4 @@ def check_parameter(name: str, parameter: Parameter) -> None:
     elif index == FOLLOWING_WINDOW and parameter.value == NO_WINDOW:
         what = "switches the following error off: give a window in counts"
     if what is not None:
-        raise ConfigError(f"node '{name}': parameter {name_of(index, parameter.sub)} {what}")
+        raise ConfigError(f"node '{name}': parameter {parameter} {what}")

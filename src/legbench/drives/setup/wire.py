@@ -46,13 +46,12 @@ def exact_bits(frame: Frame) -> int:
 
 def _stream(frame: Frame) -> list[int]:
     """Bits from start of frame to CRC sequence."""
-    length = len(frame.data)
     if frame.extended:
         head = [*_bits(frame.cob_id >> 18, 11), 1, 1, *_bits(frame.cob_id & 0x3FFFF, 18)]
     else:
         head = _bits(frame.cob_id, 11)
     control = [int(frame.remote), 0, 0]
-    stream = [0, *head, *control, *_bits(length, 4)]
+    stream = [0, *head, *control, *_bits(frame.length, 4)]
     for byte in frame.data:
         stream += _bits(byte, 8)
     crc = 0

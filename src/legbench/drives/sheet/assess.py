@@ -15,7 +15,8 @@ from legbench.drives.setup.taken import not_given
 from legbench.drives.sheet.data_sheet import DataSheet
 from legbench.drives.sheet.predict import predict
 
-CSP_BIT = 1 << 7
+PROFILE_402, CSP_BIT = 0x0192, 1 << 7
+"""Device profile in the low word of 1000h, and the bit of the cyclic mode in 6502h (CiA 402-2)."""
 CYCLIC = (0x6040, 0x6041, 0x6061, 0x6064, 0x607A)
 """Objects of every cycle, and the display of the mode."""
 READ = {
@@ -166,6 +167,9 @@ def _reads(sheet: DataSheet) -> Iterator[Finding]:
 
 def _problems(sheet: DataSheet, node: NodeConfig, outcomes: Iterable[Outcome]) -> Iterator[str]:
     """Yield reasons for which the drive cannot be used, each with its object and the way out."""
+    device = sheet.default((0x1000, 0), node.node_id)
+    if device is not None and device & 0xFFFF != PROFILE_402:
+        yield f"1000h:00 is {device:08X}h: it is no CiA 402 drive, whose type ends with 0192h"
     modes = sheet.default((0x6502, 0), node.node_id)
     if modes is not None and not modes & CSP_BIT:
         yield f"6502h:00 is {modes:#x}: it knows no cyclic synchronous position mode; another drive"

@@ -23,6 +23,8 @@ BYTES |= {0x16: 3, 0x18: 5, 0x19: 6, 0x1A: 7}
 """Lengths of the basic types that are no whole numbers of 1, 2, 4 or 8 bytes [bytes]."""
 REAL64 = 0x11
 KINDS = frozenset(DataType) - BYTES.keys()
+NEVER_ZERO = ((0x1000, 0), (0x6502, 0))
+"""Device type and supported modes, which are not 0 on any drive: there 0 says nothing."""
 ACCESS = {"ro": Access.RO, "wo": Access.WO, "const": Access.CONST}
 
 
@@ -53,6 +55,8 @@ def sheet_of(content: bytes, name: str) -> DataSheet:
     for variable in variables:
         key = (variable.index, variable.subindex)
         kind, default = _typed(variable)
+        if key in NEVER_ZERO and default == 0:
+            default = None
         objects[key] = ObjectEntry(
             *key,
             variable.name,

@@ -15,8 +15,8 @@ from typing import Any, final
 import can
 from can.interfaces.slcan import slcanBus
 
-from legbench.drives.protocol.frame import Frame
 from legbench.drives.protocol.slcan import OK, REFUSED, format_frame, parse_frame
+from legbench.drives.transport.messages import frame_of, message_of
 
 CHUNK = 4096
 """Largest number of bytes read at once."""
@@ -31,7 +31,7 @@ class SlcanBus(slcanBus):
     def __init__(self, channel: str, **options: Any) -> None:
         """Open the adapter; raises as python-can's `slcanBus` does."""
         self._partial, self._unsent = b"", b""
-        self._lines: deque[bytes] = deque()
+        self._lines: deque[tuple[bytes, float]] = deque()
         self._is_shutdown = True  # A bus that fails to open has nothing to shut down.
         super().__init__(channel, **options)
         self._is_shutdown = False
@@ -39,14 +39,19 @@ class SlcanBus(slcanBus):
         self.channel_info = f"slcan {channel}"
         self.channel = channel
 
+    def _check_open(self) -> None:
+        if self._is_shutdown:
+            raise can.CanOperationError(f"{self.channel_info} is shut down")
+
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
         """Hand a frame to the serial port; waits for nothing.
 
         Raises:
-            can.CanOperationError: the port has no room, or the adapter is gone.
+            can.CanOperationError: the port has no room, the adapter is gone, or this is no frame of
+                classic CAN.
         """
-        frame = Frame(msg.arbitration_id, bytes(msg.data), msg.is_remote_frame, msg.is_extended_id)
-        line = self._unsent + format_frame(frame)
+        self._check_open()
+        line = self._unsent + format_frame(frame_of(msg))
         try:
             count = os.write(self.fileno(), line)
         except BlockingIOError:
@@ -64,11 +69,12 @@ class SlcanBus(slcanBus):
         Raises:
             can.CanOperationError: the adapter is gone.
         """
+        self._check_open()
         line = self.fileno()
         until = None if timeout is None else time.monotonic() + timeout
         while True:
             while self._lines:
-                message = self._message(self._lines.popleft())
+                message = self._message(*self._lines.popleft())
                 if message is not None:
                     return message
             left = None if until is None else max(0.0, until - time.monotonic())
@@ -84,20 +90,14 @@ class SlcanBus(slcanBus):
         if not chunk:
             raise can.CanOperationError(f"{self.channel}: the adapter is gone")
         *lines, self._partial = (self._partial + chunk).replace(REFUSED, OK).split(OK)
-        self._lines.extend(lines)
+        # The port does not say when its bytes came; this is the next best.
+        came = time.time()
+        self._lines.extend((line, came) for line in lines)
 
-    def _message(self, line: bytes) -> can.Message | None:
-        """The frame of a line; none for acknowledgements, and for what has been garbled."""
+    def _message(self, line: bytes, came: float) -> can.Message | None:
+        """The frame of a line that came at a time [s]; none for acknowledgements and garbage."""
         frame = parse_frame(line.decode("ascii", "replace"))
         if frame is None:
             return None
-        message = can.Message(
-            timestamp=time.time(),
-            arbitration_id=frame.cob_id,
-            is_extended_id=frame.extended,
-            is_remote_frame=frame.remote,
-            dlc=len(frame.data),
-            data=frame.data,
-            channel=self.channel,
-        )
+        message = message_of(frame, came, self.channel)
         return message if self._filters is None or self._matches_filters(message) else None

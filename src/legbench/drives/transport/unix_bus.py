@@ -3,7 +3,8 @@
     can.Bus(interface="legbench_unix", channel="PATH")
 
 Behind the path sits `legbench drives emulate`. One packet is one frame; nothing is buffered in
-this process, so the kernel's queue is the controller's.
+this process, so the kernel's queue is the controller's: a server that has no room for a frame
+leaves it there, and once it is full the sender gets an error.
 """
 
 import select
@@ -15,48 +16,31 @@ from typing import Any, final
 import can
 from can.typechecking import CanFilters
 
-from legbench.drives.protocol.frame import Frame
+from legbench.drives.transport.messages import frame_of, message_of, refuse_fd
+from legbench.drives.transport.unix_packet import (
+    NOTE,
+    PACKET,
+    Controller,
+    Opening,
+    controller_of,
+    is_own,
+    pack_frame,
+    pack_opening,
+    unpack_frame,
+)
 
-PACKET = struct.Struct("<IB8s")
-"""Layout of a packet: identifier with flags, length, data."""
-EXTENDED, REMOTE, ERROR, ID_MASK = 1 << 31, 1 << 30, 1 << 29, (1 << 29) - 1
-BITRATE = struct.Struct("<I")
-
-
-def pack_frame(frame: Frame) -> bytes:
-    """Pack a frame into one packet."""
-    flags = EXTENDED * frame.extended | REMOTE * frame.remote | ERROR * frame.error
-    return PACKET.pack(frame.cob_id | flags, len(frame.data), frame.data)
-
-
-def opening(bitrate: int) -> bytes:
-    """The packet with which a master says at which bitrate its controller runs [bit/s].
-
-    No master sends error frames, so it is one.
-    """
-    return pack_frame(Frame(0, BITRATE.pack(bitrate), error=True))
-
-
-def opened_at(frame: Frame) -> int | None:
-    """The bitrate that an opening packet says; none if it is a frame like any other."""
-    plain = not frame.error or len(frame.data) != BITRATE.size
-    return None if plain else BITRATE.unpack(frame.data)[0]
-
-
-def unpack_frame(packet: bytes) -> Frame | None:
-    """A packet as a frame; none if it is none."""
-    if len(packet) != PACKET.size:
-        return None
-    word, length, data = PACKET.unpack(packet)
-    if length > len(data):
-        return None
-    return Frame(
-        word & ID_MASK,
-        data[:length],
-        bool(word & REMOTE),
-        bool(word & EXTENDED),
-        bool(word & ERROR),
-    )
+SO_TIMESTAMPNS, SO_PEEK_OFF = 35, 42
+"""Options of sockets that the `socket` module does not name (asm-generic/socket.h)."""
+STAMP = struct.Struct("@qq")
+"""`struct timespec` of SO_TIMESTAMPNS: seconds and nanoseconds since 1970."""
+STAMP_SPACE = socket.CMSG_SPACE(STAMP.size)
+SPACE = PACKET.size + 1
+"""Space for a packet, and for a byte by which one that is too long is known [bytes]."""
+STATES = {
+    Controller.ACTIVE: can.BusState.ACTIVE,
+    Controller.PASSIVE: can.BusState.PASSIVE,
+    Controller.BUS_OFF: can.BusState.ERROR,
+}
 
 
 @final
@@ -69,46 +53,118 @@ class UnixBus(can.BusABC):
         can_filters: CanFilters | None = None,
         *,
         bitrate: int | None = None,
-        **_others: object,
+        receive_own_messages: bool = False,
+        fd: bool = False,
+        single_handle: bool = False,
     ) -> None:
-        """Connect, by default at the bitrate of the wire behind [bit/s].
+        """Connect.
+
+        Args:
+            channel: path of the socket.
+            can_filters: frames to receive; by default all.
+            bitrate: bitrate of this controller; by default that of the wire behind [bit/s].
+            receive_own_messages: receive the frames that are sent here, when they were on the wire.
+            fd: flexible data rate, which these buses do not have.
+            single_handle: without effect; python-can's programs give it to every interface.
 
         Raises:
-            can.CanInitializationError: nobody serves a bus there.
+            can.CanInitializationError: nobody serves a bus there, or `fd` is set.
         """
-        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        try:
-            self._socket.connect(channel)
-            if bitrate is not None:
-                self._socket.send(opening(bitrate))
-        except OSError as error:
-            self._socket.close()
-            self._is_shutdown = True
-            raise can.CanInitializationError(
-                f"{error.strerror}; `legbench drives emulate --channel {channel}` serves one"
-            ) from error
+        refuse_fd(fd)
+        self._asked = Opening(bitrate, receive_own_messages)
         self.channel_info = f"unix bus {channel}"
         self.channel = channel
+        self._connect()
+        self._open = True
         super().__init__(channel=channel, can_filters=can_filters)
 
+    def _connect(self) -> None:
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._readable = (self._socket.fileno(),)
+        self._controller = Controller.ACTIVE
+        try:
+            self._socket.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
+            # Every look at what waits goes on where the last one has ended, see `state`.
+            self._socket.setsockopt(socket.SOL_SOCKET, SO_PEEK_OFF, 0)
+            self._socket.connect(self.channel)
+            if self._asked != Opening():
+                self._socket.send(pack_opening(self._asked))
+        except OSError as error:
+            self._socket.close()
+            raise can.CanInitializationError(
+                f"{error.strerror}; `legbench drives emulate --channel {self.channel}` serves one"
+            ) from error
+
+    @property
+    def state(self) -> can.BusState:
+        """State of the controller as of the last frame that has come, read or not.
+
+        Setting `ACTIVE` restarts the controller: what it has not sent or not read yet is lost.
+        """
+        try:
+            while packet := self._socket.recv(PACKET.size, socket.MSG_PEEK | socket.MSG_DONTWAIT):
+                self._controller = controller_of(packet)
+        except OSError:
+            # Nothing more has come; that the server is gone is told by `recv`.
+            pass
+        return STATES[self._controller]
+
+    @state.setter
+    def state(self, new_state: can.BusState) -> None:
+        if new_state is not can.BusState.ACTIVE:
+            raise NotImplementedError(f"{new_state.name} cannot be set, only ACTIVE")
+        self._check_open()
+        self._socket.close()
+        self._connect()
+
+    def _check_open(self) -> None:
+        if not self._open:
+            raise can.CanOperationError(f"{self.channel_info} is shut down")
+
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
-        """Send one frame.
+        """Hand a frame to the controller; waits for room only if a time-out is given [s].
 
         Raises:
-            can.CanOperationError: the other process is gone, or does not read any more.
+            can.CanOperationError: the queue is full, the controller is bus-off, the other process
+                is gone, or this is no frame of classic CAN.
         """
-        frame = Frame(msg.arbitration_id, bytes(msg.data), msg.is_remote_frame, msg.is_extended_id)
+        self._check_open()
+        packet = pack_frame(frame_of(msg))
+        if self._controller is Controller.BUS_OFF:
+            raise self._bus_off()
         try:
-            self._socket.send(pack_frame(frame), socket.MSG_DONTWAIT)
+            self._socket.send(packet, socket.MSG_DONTWAIT)
+        except BlockingIOError:
+            self._send_late(packet, timeout or 0.0)
         except OSError as error:
             raise can.CanOperationError(f"{self.channel}: {error.strerror}") from error
 
-    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
-        ready, _, _ = select.select([self._socket], [], [], timeout)
-        if not ready:
-            return None, False
+    def _send_late(self, packet: bytes, timeout: float) -> None:
+        """Send once there is room."""
         try:
-            packet = self._socket.recv(PACKET.size + 1)
+            if select.select([], [self._socket], [], timeout)[1]:
+                self._socket.send(packet, socket.MSG_DONTWAIT)
+                return
+        except OSError as error:
+            raise can.CanOperationError(f"{self.channel}: {error.strerror}") from error
+        if self.state is can.BusState.ERROR:
+            raise self._bus_off()
+        raise can.CanOperationError(f"{self.channel}: the transmit queue is full")
+
+    def _bus_off(self) -> can.CanOperationError:
+        return can.CanOperationError(
+            f"{self.channel}: the controller is bus-off; find the cause, then open the bus again"
+        )
+
+    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+        self._check_open()
+        try:
+            if not select.select(self._readable, (), (), timeout)[0]:
+                return None, False
+            packet, stamps, _, _ = self._socket.recvmsg(SPACE, STAMP_SPACE, socket.MSG_DONTWAIT)
+        except BlockingIOError:
+            # Another thread was faster.
+            return None, False
         except OSError as error:
             raise can.CanOperationError(f"{self.channel}: {error.strerror}") from error
         if not packet:
@@ -116,15 +172,9 @@ class UnixBus(can.BusABC):
         frame = unpack_frame(packet)
         if frame is None:
             return None, False
-        message = can.Message(
-            timestamp=1e-9 * time.monotonic_ns(),
-            arbitration_id=frame.cob_id,
-            is_extended_id=frame.extended,
-            is_remote_frame=frame.remote,
-            is_error_frame=frame.error,
-            data=frame.data,
-            channel=self.channel,
-        )
+        if packet[NOTE] and controller_of(packet) is Controller.BUS_OFF:
+            self._controller = Controller.BUS_OFF
+        message = message_of(frame, _stamp_of(stamps), self.channel, own=is_own(packet))
         return message, False
 
     def fileno(self) -> int:
@@ -132,11 +182,20 @@ class UnixBus(can.BusABC):
         return self._socket.fileno()
 
     def shutdown(self) -> None:
-        """Disconnect from the serving process."""
-        if not self._is_shutdown:
-            self._socket.close()
+        """End what is sent periodically and disconnect from the serving process."""
         super().shutdown()
+        self._open = False
+        self._socket.close()
 
     @staticmethod
     def _detect_available_configs() -> list[Any]:
         return []
+
+
+def _stamp_of(ancillary: list[tuple[int, int, bytes]]) -> float:
+    """Time at which a packet came, as the kernel says [s since 1970]."""
+    if not ancillary:
+        return time.time()
+    # Nothing else has been asked for.
+    seconds, nanoseconds = STAMP.unpack(ancillary[0][2])
+    return seconds + 1e-9 * nanoseconds

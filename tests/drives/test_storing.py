@@ -1,0 +1,103 @@
+"""Storing of what drives hold (1010h)."""
+
+import pytest
+from service_rig import BENCH, MS, opened, written
+
+from legbench.commissioning.store import store
+from legbench.drives.errors import DriveError, NoAnswerError
+from legbench.drives.protocol.cia402 import DriveState
+from legbench.drives.protocol.frame import Frame
+from legbench.drives.protocol.sdo import Abort
+from legbench.errors import ConfigError
+
+
+def test_what_the_drives_hold_outlasts_their_power() -> None:
+    session, network = opened()
+    with session:
+        for node in session.config.nodes:
+            session.bring_up().configure(node)
+        done = store(session, session.config.nodes)
+        assert [(one.node, one.part, one.by_itself) for one in done] == [
+            ("motor1", 1, False),
+            ("motor2", 1, False),
+        ]
+        for drive in network.drives:
+            drive.reset(network.now_ns)
+        network.advance(network.now_ns + 20 * MS)
+        # All but the command frames, which are stored switched off.
+        for node in session.config.nodes:
+            left = session.bring_up().differences(node)
+            assert [(one.parameter.key, one.there) for one in left] == [
+                ((0x1400, 1), 1 << 31 | 0x200 + node.node_id)
+            ]
+    # The signature is "save", once a drive.
+    saves = [frame for frame in written(network) if frame.data[1:4] == b"\x10\x10\x01"]
+    assert [frame.data[4:] for frame in saves] == [b"save", b"save"]
+
+
+@pytest.mark.parametrize("place", [0, 1])
+def test_nothing_is_stored_while_any_drive_has_power(place: int) -> None:
+    session, network = opened()
+    network.drives[place].axis.power.state = DriveState.OPERATION_ENABLED
+    name = BENCH.nodes[place].name
+    with session, pytest.raises(DriveError, match=f"'{name}' .* has power.*nothing has been"):
+        store(session, session.config.nodes[:1])
+    assert written(network) == []
+
+
+def test_a_drive_that_refuses_or_has_no_memory_is_named_with_those_before_it() -> None:
+    session, network = opened()
+    del network.drives[1]._store._entries[0x1010, 1]
+    with session, pytest.raises(DriveError, match=r"'motor2' .*cannot store part 1") as caught:
+        store(session, session.config.nodes)
+    assert caught.value.__notes__ == ["stored before that: motor1"]
+    session, network = opened()
+    network.drives[0]._values[0x1010, 1] = 2
+    with (
+        session,
+        pytest.raises(DriveError, match=r"stores nothing on command: 1010h:01 reads 0000"),
+    ):
+        store(session, session.config.nodes)
+    assert not [frame for frame in written(network) if frame.data[1:3] == b"\x10\x10"]
+
+
+def test_nothing_is_stored_where_command_frames_stay_on() -> None:
+    session, network = opened()
+    drive = network.drives[0]
+    with session:
+        session.bring_up().configure(session.config.nodes[0])
+        drive._pdos.check = lambda key, value: Abort.DEVICE_STATE if key == (0x1400, 1) else None
+        with pytest.raises(DriveError, match=r"'motor1' .* is not parked.*nothing has been stored"):
+            store(session, session.config.nodes)
+    assert not [frame for frame in written(network) if frame.data[1:3] == b"\x10\x10"]
+
+
+def test_a_drive_that_never_answers_to_the_signature_is_told_as_unknown() -> None:
+    session, network = opened()
+    drive = network.drives[0]
+    real = drive.receive
+
+    def receive(frame: Frame, now_ns: int) -> None:
+        if frame.data[1:3] != b"\x10\x10" or frame.data[0] >> 5 != 1:
+            real(frame, now_ns)
+
+    drive.receive = receive  # pyright: ignore[reportAttributeAccessIssue]
+    with session, pytest.raises(NoAnswerError, match=r"within 3 s, so whether it has stored"):
+        store(session, session.config.nodes, timeout=3.0)
+    assert len([frame for frame in written(network) if frame.data[1:3] == b"\x10\x10"]) == 1
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"part": 0}, "part is 0; it must be 1 to 127"),
+        ({"part": 128}, "part is 128"),
+        ({"timeout": 0.0}, "timeout is 0 s; it must be positive, 60 s at most"),
+        ({"timeout": 61.0}, "timeout is 61 s"),
+    ],
+)
+def test_settings_of_store_have_two_ends(changes: dict[str, float], words: str) -> None:
+    session, network = opened()
+    with session, pytest.raises(ConfigError, match=words):
+        store(session, session.config.nodes, **changes)  # pyright: ignore[reportArgumentType]
+    assert written(network) == []
