@@ -131,7 +131,7 @@ def test_classes_of_metrics_and_viz_have_names_of_their_own() -> None:
     ("call", "home"),
     [
         ("savefig", "viz/print/save.py"),
-        ("replace(path)", "recording/files.py"),
+        ("replace(path)", "writing.py"),
         ("os.replace", None),
         ("isfinite(value) else", "strict_json.py"),
     ],

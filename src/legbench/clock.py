@@ -7,23 +7,23 @@ from typing import final
 
 
 class AbstractClock(ABC):
-    """Says when a cycle may begin."""
+    """Clock that says when a cycle may begin."""
 
     @abstractmethod
     def start(self) -> None:
-        """Cycle 0 begins now."""
+        """Begin cycle 0 now."""
 
     @abstractmethod
     def wait(self, cycle: int) -> float:
-        """Return when `cycle` is due; how late that is [s]."""
+        """Wait until `cycle` is due; returns how late it is then [s]."""
 
 
 @final
 class VirtualClock(AbstractClock):
-    """Never waits, is never late."""
+    """Clock in virtual time, which never waits and is never late."""
 
     def start(self) -> None:
-        """Nothing to remember."""
+        """Begin cycle 0, which needs no time."""
 
     def wait(self, cycle: int) -> float:
         """Return at once."""
@@ -32,7 +32,7 @@ class VirtualClock(AbstractClock):
 
 @final
 class WallClock(AbstractClock):
-    """Cycle k is due k periods after the start, however long the others took."""
+    """Clock in wall time: cycle k is due k periods after the start, whatever the others took."""
 
     def __init__(
         self,
@@ -40,7 +40,7 @@ class WallClock(AbstractClock):
         now: Callable[[], float] = time.perf_counter,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        """Periods, and what `now` and `sleep` count in, are seconds."""
+        """Prepare to pace cycles; the period, `now` and `sleep` count in seconds."""
         self._period, self._now, self._sleep = period, now, sleep
         self._start = 0.0
 
@@ -49,7 +49,7 @@ class WallClock(AbstractClock):
         self._start = self._now()
 
     def wait(self, cycle: int) -> float:
-        """Sleep until the deadline, if it lies ahead."""
+        """Sleep until the deadline, if it lies ahead; returns how late the cycle is then [s]."""
         due = self._start + cycle * self._period
         ahead = due - self._now()
         if ahead > 0.0:

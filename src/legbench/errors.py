@@ -10,27 +10,27 @@ class LegbenchError(Exception):
 
 
 class DesignError(LegbenchError, ValueError):
-    """A design file or a parameter set that no leg can have."""
+    """Error of a design file or a parameter set that no leg can have."""
 
 
 class ConfigError(LegbenchError, ValueError):
-    """A setting that the chosen design, setup or controller refuses."""
+    """Error of a setting that the chosen design, setup or controller refuses."""
 
 
 class RecordingError(LegbenchError, OSError):
-    """A run folder that cannot be written, read or repaired."""
+    """Error of a run folder that cannot be written, read or repaired."""
 
 
 class FormatError(RecordingError):
-    """A run folder written in a format that this version does not know."""
+    """Error of a run folder in a format that this version does not know."""
 
 
 class MissingExtraError(LegbenchError, ImportError):
-    """An optional package or a display that a command needs is not there."""
+    """Error of an optional package or a display that a command needs and that is not there."""
 
 
 class PlantFault(LegbenchError, RuntimeError):
-    """The plant cannot go on: the run ends, the cause is kept, the recording survives.
+    """Fault of a plant that cannot go on: the run ends, the cause is kept, the recording survives.
 
     Attributes:
         cause: a short name of the fault, as written into the run's manifest.

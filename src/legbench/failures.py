@@ -1,4 +1,4 @@
-"""What to tell the user about an exception that was raised by somebody else's code."""
+"""Messages about an exception that was raised by the code of a guest."""
 
 import linecache
 import traceback
@@ -9,7 +9,7 @@ from types import CodeType
 from legbench.errors import PlantFault
 
 FRAMES = 3
-"""Lines of source that a message shows, the innermost ones."""
+"""Number of lines of source that a message shows, the innermost ones."""
 
 
 HERE = Path(__file__).parent

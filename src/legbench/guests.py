@@ -1,4 +1,4 @@
-"""Finding classes that are built in, installed beside legbench, or written in a file of one's own.
+"""Registries of classes that are built in, installed beside legbench, or in a user's file.
 
 A class is named by one text: the kind of a built-in or an entry point, `package.module:Class`,
 or `path/to/mine.py:Class`. It is loaded when it is asked for, so that a guest that does not
@@ -28,11 +28,11 @@ canonical text."""
 
 
 class GuestError(ConfigError):
-    """A guest that does not import; the message ends with its own traceback."""
+    """Error of a guest that does not import; the message ends with its own traceback."""
 
 
 def load_text(text: str) -> Any:
-    """What `package.module:name` stands for; imports the module.
+    """Return what `package.module:name` stands for; imports the module.
 
     Raises:
         ImportError, AttributeError: it is not there.
@@ -42,25 +42,25 @@ def load_text(text: str) -> Any:
 
 
 def entry_points(group: str) -> "Iterable[EntryPoint]":
-    """What installed packages offer to a group; only this needs `importlib.metadata`."""
+    """Entry points of a group in installed packages; only this needs `importlib.metadata`."""
     return load_text("importlib.metadata:entry_points")(group=group)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Registry:
-    """The ways in which one sort of class is found."""
+    """Registry of one sort of class, with the ways in which one is found."""
 
     what: str
-    """The sort in words, such as `controller`."""
+    """Sort of the classes in words, such as `controller`."""
     builtin: Mapping[str, str]
-    """Kind -> `package.module:Class`."""
+    """Place of each built-in kind as `package.module:Class`."""
     group: str
     """Entry-point group of installed packages."""
     members: Mapping[str, str]
     """Name of what a class must have besides `kind` -> how it is written."""
 
     def find(self, name: str) -> type[Any]:
-        """The class that a text names.
+        """Return the class that a text names.
 
         Raises:
             GuestError: its file or package does not import.
@@ -84,11 +84,11 @@ class Registry:
         return self._checked(guest, name)
 
     def names(self) -> tuple[str, ...]:
-        """Kinds that are built in or installed; loads none of them."""
+        """Names of the kinds that are built in or installed, none of which is loaded."""
         return (*self.builtin, *(name for name in self._entry_points() if name not in self.builtin))
 
     def reference(self, guest: type[Any]) -> str:
-        """The text that finds this class again, in another process, too.
+        """Return the text that finds this class again, in another process, too.
 
         Raises:
             ConfigError: it was written in a notebook or a prompt, where no other process looks.
@@ -165,7 +165,7 @@ def _lives_in_file(guest: type[Any]) -> bool:
 
 
 def source_of(guest: type[Any]) -> Path | None:
-    """The file that a class was written in, if there is one."""
+    """Return the file that a class was written in, if there is one."""
     file = getattr(sys.modules.get(guest.__module__), "__file__", None)
     path = None if file is None else Path(file)
     return path if path is not None and path.is_file() else None

@@ -18,7 +18,7 @@ from types import FrameType, TracebackType
 from typing import Any, Self, final
 
 STOP_SIGNALS = (signal.SIGHUP, signal.SIGTERM, signal.SIGINT)
-"""The terminal's end, a polite end, and ^C."""
+"""Signals that end a run: the end of the terminal, a request to end, and ^C."""
 INSIST = 2.0
 """A signal that comes so long after the first raises once more: the first was lost in code that
 swallows exceptions, or hangs. Every stop of drives is over by then [s]."""
@@ -41,7 +41,7 @@ class StopFlag:
         self.raises = raises
 
     def set(self) -> None:
-        """Ask for the end.
+        """Set the request to end.
 
         Raises:
             KeyboardInterrupt: no loop looks at the flag.
@@ -130,7 +130,7 @@ class Shield:
             raise self._held
 
     def _raise(self) -> None:
-        """Put our handlers in the place of those that do something."""
+        """Replace the handlers of those signals that have one."""
         for number in STOP_SIGNALS:
             handler = signal.getsignal(number)
             if handler not in (None, signal.SIG_IGN, self._remember):

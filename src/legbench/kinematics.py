@@ -13,7 +13,7 @@ from legbench.signals import Floats
 
 
 class ModalConvention(StrEnum):
-    """How eq. (15) is read."""
+    """Reading of eq. (15)."""
 
     ORTHONORMAL = "orthonormal"
     """z = [q1 + q2, q2 - q1] / sqrt(2): columns of W of unit length, as the text calls them."""
@@ -36,22 +36,25 @@ def direction(angle: Floats) -> Floats:
 
 
 def half_angle(joint_pos: Floats) -> Floats:
-    """(q2 - q1) / 2 [rad]: zero for the straight leg, pi/2 for the folded one."""
+    """Half angle of the knee, (q2 - q1) / 2 [rad]: zero for the straight leg, pi/2 folded."""
     return 0.5 * (joint_pos[..., 1] - joint_pos[..., 0])
+
+
+def polar_angle(joint_pos: Floats) -> Floats:
+    """Polar angle x1 = (q1 + q2) / 2 [rad]: direction of the foot tip seen from the hip."""
+    return 0.5 * (joint_pos[..., 0] + joint_pos[..., 1])
 
 
 def joint_to_polar(joint_pos: Floats, shank_length: float) -> Floats:
     """Polar angle x1 [rad] and leg length x2 [m] of the foot seen from the hip, eq. (2)."""
-    x1 = 0.5 * (joint_pos[..., 0] + joint_pos[..., 1])
     x2 = 2.0 * shank_length * np.cos(half_angle(joint_pos))
-    return np.stack([x1, x2], axis=-1)
+    return np.stack([polar_angle(joint_pos), x2], axis=-1)
 
 
 def joint_to_polar_rate(joint_pos: Floats, joint_vel: Floats, shank_length: float) -> Floats:
     """Time derivative of `joint_to_polar`: [rad/s], [m/s]."""
-    rate1 = 0.5 * (joint_vel[..., 0] + joint_vel[..., 1])
     rate2 = -2.0 * shank_length * np.sin(half_angle(joint_pos)) * half_angle(joint_vel)
-    return np.stack([rate1, rate2], axis=-1)
+    return np.stack([polar_angle(joint_vel), rate2], axis=-1)
 
 
 def joint_to_modal(

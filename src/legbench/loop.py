@@ -11,18 +11,19 @@ from legbench.control.check import CommandError, check_command
 from legbench.errors import LegbenchError, PlantFault
 from legbench.failures import defined_at, failed, own_lines
 from legbench.interrupts import StopFlag
+from legbench.limits.safety import OVERRUNS
 from legbench.onlooker import Onlooker
 from legbench.plant.abstract import AbstractPlant
 from legbench.signals import Command, Floats, Observation
 
 Progress = Callable[[int, int], None]
-"""Called now and then, and at the end, with cycles done and cycles in all."""
+"""Function that is called now and then, and at the end, with cycles done and cycles in all."""
 PROGRESS_EVERY = 250
-"""Cycles between two calls of the progress function."""
+"""Number of cycles between two calls of the progress function."""
 
 
 class RowSink(Protocol):
-    """What the loop needs of a recording."""
+    """Part of a recording that the loop needs."""
 
     def append(
         self, command: Command, observation: Observation, cycle_us: float, late_us: float
@@ -33,17 +34,17 @@ class RowSink(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """How a run ended."""
+    """Outcome of a run: how it ended."""
 
     status: str
-    """`complete`, `interrupted` (^C) or `fault`."""
+    """Status of the run: `complete`, `interrupted` (^C) or `fault`."""
     cause: str | None
     """Short name of the fault, if one ended the run."""
     message: str | None
-    """What to tell the user about it."""
+    """Message for the user about the end; none if there is nothing to say."""
     cycles: int
     wall_time: float
-    """[s]"""
+    """Wall time of all cycles [s]."""
     time: float = 0.0
     """Plant time of the last observation [s]."""
 
@@ -57,6 +58,7 @@ def run(
     sink: RowSink | None = None,
     stop: StopFlag | None = None,
     progress: Progress | None = None,
+    now: Callable[[], float] = time.perf_counter,
 ) -> Outcome:
     """Control a plant for a number of cycles.
 
@@ -66,9 +68,10 @@ def run(
 
     The first fault ends the run and is returned as its cause; every row until then is kept. What
     the controller raises, or returns instead of a command, is a fault, too ("controller failed"),
-    and so is what the plant raises beside its faults ("plant failed"). Faults and exceptions of
-    any kind close the plant before anything else happens: drives come to rest while disks are
-    still busy. `progress` ends nothing, whatever it raises.
+    and so is what the plant raises beside its faults ("plant failed"). A fault of missed ticks
+    shows the controller if its step took longer than a period. Faults and exceptions of any kind
+    close the plant before anything else happens: drives come to rest while disks are still busy.
+    `progress` ends nothing, whatever it raises. The time `now` [s] measures cycles.
 
     Raises:
         PlantFault: the plant did not get to its start.
@@ -81,7 +84,7 @@ def run(
         observation = _start(plant)
         began, stop.raises = True, False
         watched = progress if isinstance(progress, Onlooker) else Onlooker("progress", progress)
-        outcome = _cycle(plant, controller, observation, cycles, clock, sink, stop, watched)
+        outcome = _cycle(plant, controller, observation, cycles, clock, sink, stop, watched, now)
         return _to_rest(plant, controller.start_motor_pos, outcome, stop)
     except BaseException as error:
         stop.raises = False
@@ -111,16 +114,16 @@ def _cycle(
     sink: RowSink | None,
     stop: StopFlag,
     progress: Onlooker,
+    now: Callable[[], float],
 ) -> Outcome:
     """The loop itself, from the first observation on."""
-    began = time.perf_counter()
-    previous = began
-    cycle_us = 0.0
-    cycle = 0
+    began = previous = now()
+    cycle, cycle_us = 0, 0.0
     fault = _reset(plant, controller, observation)
     clock.start()
     while fault is None and cycle < cycles and not stop.is_set:
         late = clock.wait(cycle)
+        asked = now()
         try:
             command = controller.step(observation)
             check_command(command, observation)
@@ -128,6 +131,7 @@ def _cycle(
             plant.close()
             fault = _controller_failed(controller, error, observation)
             break
+        took = now() - asked
         if sink is not None:
             sink.append(command, observation, cycle_us, 1e6 * late)
         cycle += 1
@@ -135,13 +139,13 @@ def _cycle(
             observation = plant.step(command)
         except Exception as error:
             plant.close()
-            fault = _plant_failed(error, observation)
+            fault = _plant_failed(error, observation, controller, took / plant.period)
             break
         if cycle % PROGRESS_EVERY == 0 or cycle == cycles:
             progress(cycle, cycles)
-        now = time.perf_counter()
-        cycle_us, previous = 1e6 * (now - previous), now
-    wall_time = time.perf_counter() - began
+        ended = now()
+        cycle_us, previous = 1e6 * (ended - previous), ended
+    wall_time = now() - began
     status, cause, message = _ending(fault, stop)
     return Outcome(
         status=status,
@@ -154,7 +158,7 @@ def _cycle(
 
 
 def _ending(fault: PlantFault | None, stop: StopFlag) -> tuple[str, str | None, str | None]:
-    """Status, cause and message of a loop that has ended."""
+    """Return status, cause and message of a loop that has ended."""
     if fault is not None:
         return "fault", fault.cause, str(fault)
     return "interrupted" if stop.is_set else "complete", None, None
@@ -175,7 +179,7 @@ def _to_rest(plant: AbstractPlant, motor_pos: Floats, outcome: Outcome, stop: St
 def _reset(
     plant: AbstractPlant, controller: AbstractController, observation: Observation
 ) -> PlantFault | None:
-    """Show a controller the leg at rest; the fault with which the run ends if it cannot take it."""
+    """Show a controller the leg at rest; returns the fault of the run if that fails."""
     try:
         controller.reset(observation)
     except Exception as error:
@@ -193,7 +197,14 @@ def _controller_failed(
     return failed("controller", f"at t = {seen.time:.3f} s", error, lines, told=told)
 
 
-def _plant_failed(error: Exception, seen: Observation) -> PlantFault:
-    if isinstance(error, PlantFault):
+def _plant_failed(
+    error: Exception, seen: Observation, controller: AbstractController, periods: float
+) -> PlantFault:
+    """Return the fault of a plant; of missed ticks with the step that took as many `periods`."""
+    if not isinstance(error, PlantFault):
+        return failed("plant", f"after t = {seen.time:.3f} s", error, own_lines(error))
+    if error.cause != OVERRUNS or periods <= 1.0:
         return error
-    return failed("plant", f"after t = {seen.time:.3f} s", error, own_lines(error))
+    what = f"{error}; the controller's step took {periods:.3g} periods"
+    lines = defined_at(type(controller.law).step)
+    return PlantFault(OVERRUNS, "".join([what, *(f"\n  {line}" for line in lines)]))

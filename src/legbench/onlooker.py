@@ -6,7 +6,7 @@ from typing import final
 
 @final
 class Onlooker:
-    """Calls a function that only watches, such as a progress bar, and raises nothing it raises.
+    """Caller of a function that only watches, such as a progress bar; its errors end nothing.
 
     Once the function has failed it is not called any more: what is broken stays broken, and a
     control loop has no time to try. SystemExit and KeyboardInterrupt pass, they are the user's.

@@ -1,4 +1,4 @@
-"""What the paper reports, as data to compare with. Nothing is computed from it."""
+"""Results that the paper reports, as data to compare with; nothing is computed from them."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""What a controller says of itself, so that nobody who measures or draws a run asks for its name.
+"""Description of a controller, by which its runs are measured and drawn without its name.
 
 A phase is what a controller is doing, recorded as a number in every row. Its role says what that
 means for the leg; metrics and pictures ask for roles alone.
@@ -12,11 +12,11 @@ from legbench.errors import ConfigError
 from legbench.signals import Signal
 
 LARGEST_CODE = 127
-"""Phases are recorded as signed bytes."""
+"""Largest code of a phase: phases are recorded as signed bytes."""
 
 
 class Role(StrEnum):
-    """What a phase of a controller means for the leg."""
+    """Role of a phase: what it means for the leg."""
 
     REST = "rest"
     """The rest posture is held; nothing has been commanded yet."""
@@ -59,7 +59,7 @@ class PhaseInfo:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Counting:
-    """Which oscillation periods of a run count in its rating: the leading ones (Fig. 5)."""
+    """Oscillation periods of a run that count in its rating: the leading ones (Fig. 5)."""
 
     most: int | None = None
     """Largest number of periods; none: all."""
@@ -69,7 +69,7 @@ class Counting:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ControllerDescription:
-    """What a controller leaves in a recording and how it is to be measured.
+    """Description of a controller: what it leaves in a recording and how that is measured.
 
     Raises:
         ConfigError: two phases share a code or a name.
@@ -77,7 +77,7 @@ class ControllerDescription:
 
     phases: tuple[PhaseInfo, ...]
     signals: tuple[Signal, ...] = ()
-    """Quantities of its own that it records with every row."""
+    """Own signals of the controller, which are recorded with every row."""
     counting: Counting = Counting()
 
     def __post_init__(self) -> None:

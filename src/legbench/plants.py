@@ -23,7 +23,7 @@ PLANTS: Final = Registry(
     group="legbench.plants",
     members={"open": "open(leg) -> AbstractPlant"},
 )
-"""Every plant that can be asked for."""
+"""Registry of every plant."""
 
 __all__ = [
     "BUS_LOG",

@@ -29,7 +29,7 @@ _KINDS = (
 
 
 class UnreadableError(LegbenchError, ValueError):
-    """A file or a text that is not what its reader can take; callers put the path in front."""
+    """Error of a file or a text that its reader cannot take; callers put the path in front."""
 
 
 def read_file(path: Path, largest: int) -> bytes:

@@ -1,4 +1,4 @@
-"""What a drive makes of a commanded position: slew, bandwidth, delay, quantisation.
+"""Model of a servo drive: slew, bandwidth, delay and quantisation of a commanded position.
 
 The drives follow a position at 1 kHz behind series springs, so whatever they do to the command
 is part of every result. The default is the perfect motor of the paper's equations.
@@ -15,7 +15,7 @@ from legbench.errors import ConfigError
 from legbench.signals import Floats
 
 MAX_DELAY_CYCLES = 1000
-"""One second: a drive that reacts later is broken, not slow."""
+"""Largest delay, one second: a drive that reacts later is broken, not slow."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,9 +31,9 @@ class ServoConfig:
     bandwidth: float | None = None
     """Corner frequency of the first-order position response [Hz]."""
     delay_cycles: int = 0
-    """Cycles between a command and the motor's first reaction to it."""
+    """Number of cycles between a command and the motor's first reaction to it."""
     encoder_counts: int | None = None
-    """Counts per revolution of motor and link encoders; none: they resolve everything."""
+    """Number of counts per revolution of motor and link encoders; none: they resolve everything."""
 
     def __post_init__(self) -> None:
         for name, value, unit in (
@@ -56,7 +56,7 @@ class ServoConfig:
 
 @final
 class Servo:
-    """Motor positions of one leg or a batch, cycle by cycle."""
+    """Servo of one leg or a batch, which computes motor positions cycle by cycle."""
 
     def __init__(self, config: ServoConfig, period: float) -> None:
         self._ideal, self._delay = config.ideal, config.delay_cycles
@@ -78,7 +78,7 @@ class Servo:
         self._waiting = deque(position.copy() for _ in range(self._delay))
 
     def follow(self, command: Floats) -> Floats:
-        """Motor positions (..., 2) [rad] held over the cycle that starts with `command`."""
+        """Return motor positions (..., 2) [rad] held over the cycle that starts with `command`."""
         if self._ideal:
             self._position = command
             return command
@@ -89,7 +89,7 @@ class Servo:
         return self._position
 
     def encode(self, position: Floats) -> Floats:
-        """An angle as the encoders show it: rounded to whole counts."""
+        """Return an angle as the encoders show it: rounded to whole counts."""
         if self._resolution is None:
             return position
         return np.round(position / self._resolution) * self._resolution

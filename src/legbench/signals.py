@@ -1,4 +1,4 @@
-"""The words that cross the plant seam, and the columns in which a run remembers them.
+"""Observations and commands, which plant and controller exchange, and the columns of a recording.
 
 Every array has the leg's components last; a batch adds one leading dimension, nothing else
 changes. Angles are absolute in the plane of motion, measured from straight down, positive
@@ -21,20 +21,20 @@ REST = 0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Truth:
-    """What only a simulation knows; shapes `(..., 2)` are (forward, up) in the plane of motion.
+    """Quantities that only a simulation knows; `(..., 2)` are (forward, up) in the plane of motion.
 
     The contact force is that of the plant's last internal step, one substep before `time`:
     a solver reports a force over a step, not at an instant.
     """
 
     trunk_pos: Floats
-    """Hip in the world (..., 2) [m]."""
+    """Position of the hip in the world (..., 2) [m]."""
     trunk_vel: Floats
-    """(..., 2) [m/s]."""
+    """Velocity of the hip in the world (..., 2) [m/s]."""
     foot_pos: Floats
-    """Foot tip in the world (..., 2) [m]."""
+    """Position of the foot tip in the world (..., 2) [m]."""
     contact_force: Floats
-    """Ground on foot (..., 2) [N]."""
+    """Force of the ground on the foot (..., 2) [N]."""
     contact: Bools
     """Whether the foot touches the ground (...)."""
     energy: Floats
@@ -45,7 +45,7 @@ class Truth:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Observation:
-    """What the plant shows at `time`; the effect of the command given before that time."""
+    """Observation of a plant at `time`: the effect of the command given before that time."""
 
     time: float
     """Plant time since reset [s]."""
@@ -54,7 +54,7 @@ class Observation:
     joint_pos: Floats
     """Measured link angles q1, q2 (..., 2) [rad]."""
     joint_vel: Floats
-    """(..., 2) [rad/s]."""
+    """Velocities of the links (..., 2) [rad/s]."""
     spring_torque: Floats
     """Torque of the series springs on the links, stiffness only (..., 2) [N m]."""
     applied_pos: Floats
@@ -64,7 +64,7 @@ class Observation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Command:
-    """What a controller asks of the motors over the next period."""
+    """Command of a controller to the motors over the next period."""
 
     motor_pos: Floats
     """Desired motor positions (..., 2) [rad]."""
@@ -76,7 +76,7 @@ class Command:
 
     @classmethod
     def holding(cls, motor_pos: Floats) -> "Command":
-        """Stay at `motor_pos` (..., 2) [rad], at rest."""
+        """Return the command to stay at `motor_pos` (..., 2) [rad], at rest."""
         phase = np.full(motor_pos.shape[:-1], REST, dtype=np.int64)
         return cls(motor_pos=motor_pos, phase=phase)
 

@@ -1,4 +1,4 @@
-"""Numbers that JSON lacks: one way in which results are written for other programs."""
+"""Results for other programs, in which numbers that JSON lacks are null."""
 
 import math
 from collections.abc import Mapping

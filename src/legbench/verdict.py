@@ -1,4 +1,4 @@
-"""Whether a run that has lasted its time has ended well; its plant may know better."""
+"""Verdict on the end of a run that has lasted its time, which its plant may turn into a fault."""
 
 from dataclasses import replace
 

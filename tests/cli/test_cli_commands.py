@@ -249,5 +249,5 @@ def test_a_json_file_is_whole_or_what_it_was(tmp_path: Path) -> None:
         write_json(target, {"a": object()})
     assert json.loads(target.read_text()) == {"a": None}
     assert [path.name for path in target.parent.iterdir()] == ["found.json"]
-    with pytest.raises(ConfigError, match="cannot be written"):
+    with pytest.raises(ConfigError, match="cannot write"):
         write_json(target / "below.json", {})

@@ -4,18 +4,22 @@ none measured.
 
 import json
 import os
-import shutil
+import re
 import signal
-import subprocess
-import sys
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
-from can_rig import BUS, LIMITS, ROOT
+from can_rig import ROOT
+from served_drives import (
+    LOOSE,
+    PATIENCE,
+    end,
+    interrupted,
+    leading,
+    run_folder,
+    served,
+    started,
+)
 
 from legbench.commissioning import configure, jitter, zero
 from legbench.commissioning.home import home
@@ -30,152 +34,20 @@ from legbench.plants import limits_for
 from legbench.recording.events import read_events
 from legbench.recording.repair import recover
 
-PATIENCE = 30.0
-"""Longest that anything may take on a busy machine [s]."""
-LOOSE = {
-    "lost_frames": 5000,
-    "overrun_cycles": 5000,
-    "following_cycles": 5000,
-    "joint_speed": 1000.0,
-    "standing": 6.0,
-    "sway": 6.0,
-}
-"""Limits that act while a machine is busy. Drives that were kept waiting make up for it by 3 ms at
-once: between two SYNCs their leg then moves three times as fast as it is."""
-CALL = "import sys\nfrom legbench.cli import main\nsys.exit(main(sys.argv[1:]))"
-
-
-@dataclass
-class Served:
-    """Emulated drives that other processes can reach."""
-
-    folder: Path
-    process: subprocess.Popen[str]
-    seen: list[tuple[str, str]] = field(default_factory=list)
-
-    def await_state(self, state: str, count: int = 2) -> None:
-        """Read on until so many drives have come to a state."""
-        assert self.process.stdout is not None
-        found = 0
-        while found < count:
-            line = self.process.stdout.readline()
-            assert line, f"the drives ended; seen: {self.seen}"
-            told = json.loads(line)
-            self.seen.append((told["node"], told["state"]))
-            found += told["state"] == state
-
-
-def calm(folder: Path, deadline_ms: int = 4000) -> Path:
-    """The bench's files, patient enough for a machine that stands still for seconds."""
-    text = BUS.read_text(encoding="utf-8")
-    waived = 'waive = ["master watch", "drive heartbeat"]'
-    text = text.replace("master_heartbeat_ms = 10", f"master_heartbeat_ms = 2000\n{waived}")
-    text = text.replace("heartbeat_ms = 20\n", "heartbeat_ms = 2000\n", 1)
-    rpdo = '\n[[node.rpdo]]\nnumber = 1\nobjects = ["6040:00 u16", "607A:00 i32"]\n'
-    text = text.replace(
-        "\n[node.parameters]", rpdo + f"deadline_ms = {deadline_ms}\n\n[node.parameters]"
-    )
-    (folder / "leg.toml").write_text(text, encoding="utf-8")
-    shutil.copy(LIMITS, folder / "limits.toml")
-    loose = (folder / "limits.toml").read_text(encoding="utf-8")
-    for name, value in LOOSE.items():
-        loose = "\n".join(
-            f"{name} = {value:g}" if line.startswith(name) else line for line in loose.splitlines()
-        )
-    waive = f"waive = {json.dumps(list(LOOSE))}\n"
-    (folder / "limits.toml").write_text(loose + "\n" + waive, encoding="utf-8")
-    return folder / "leg.toml"
-
-
-def started(folder: Path, *arguments: str) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        [sys.executable, "-c", CALL, *arguments],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        cwd=folder,
-    )
-
-
-def end(process: subprocess.Popen[str]) -> None:
-    with suppress(ProcessLookupError):
-        os.kill(process.pid, signal.SIGKILL)
-    process.communicate()
-
-
-@contextmanager
-def served(
-    folder: Path, *how: str, seconds: float = 3 * PATIENCE, deadline_ms: int = 4000
-) -> Iterator[Served]:
-    """Drives over AF_UNIX that end by themselves after a while [s]."""
-    calm(folder, deadline_ms)
-    process = started(
-        folder,
-        *("drives", "emulate", "--bus", "leg.toml", "--channel", "leg.sock", "--bare", "--json"),
-        *how,
-        *("--patience", "5000", "--seconds", str(seconds)),
-        *("--design", str(ROOT / "models" / "optimal.toml")),
-    )
-    try:
-        yield Served(folder, process)
-    finally:
-        end(process)
-
-
-def master(folder: Path) -> subprocess.Popen[str]:
-    return started(
-        folder,
-        *("run", "position-jump", "--plant", "can", "--bus", "leg.toml", "--duration", "25"),
-        *("--interface", "legbench_unix", "--channel", "leg.sock", "--out", "runs"),
-        *("--design", str(ROOT / "models" / "optimal.toml")),
-    )
-
-
-def run_folder(folder: Path) -> Path:
-    return next((folder / "runs").iterdir())
-
-
-def rows_on_disk(folder: Path) -> None:
-    """Wait until the recording has begun."""
-    until = time.monotonic() + PATIENCE
-    while time.monotonic() < until:
-        found = list((folder / "runs").glob("*/samples.arrows"))
-        if found and found[0].stat().st_size > 20_000:
-            return
-        time.sleep(0.02)
-    pytest.fail("no rows")
-
 
 @pytest.mark.parametrize("name", ["SIGKILL", "SIGSTOP"])
 def test_drives_stop_by_themselves_when_the_master_is_gone(name: str, tmp_path: Path) -> None:
-    with served(tmp_path, deadline_ms=1000) as drives:
+    with served(tmp_path, deadline_ms=1000) as drives, leading(tmp_path, drives) as run:
+        os.kill(run.pid, getattr(signal, name))
         drives.await_state("switch on disabled")
-        run = master(tmp_path)
-        try:
-            drives.await_state("operation enabled")
-            rows_on_disk(tmp_path)
-            os.kill(run.pid, getattr(signal, name))
-            drives.await_state("switch on disabled")
-            assert [state for _, state in drives.seen[-4:]].count("quick stop active") >= 1
-        finally:
-            end(run)
+        assert [state for _, state in drives.seen[-4:]].count("quick stop active") >= 1
     report = recover(run_folder(tmp_path))
     assert report.rows_kept > 0
 
 
 def test_interrupting_the_master_stops_both_drives_and_keeps_the_run(tmp_path: Path) -> None:
-    with served(tmp_path) as drives:
-        drives.await_state("switch on disabled")
-        run = master(tmp_path)
-        try:
-            drives.await_state("operation enabled")
-            rows_on_disk(tmp_path)
-            os.kill(run.pid, signal.SIGINT)
-            drives.await_state("switch on disabled")
-            _, complaint = run.communicate(timeout=PATIENCE)
-        finally:
-            end(run)
-    assert run.returncode == 0, complaint
+    with served(tmp_path) as drives, leading(tmp_path, drives) as run:
+        interrupted(drives, run)
     manifest = json.loads((run_folder(tmp_path) / "run.json").read_text())
     assert manifest["status"] == "interrupted"
     assert manifest["plant"]["realtime"]["kernel"]
@@ -205,28 +77,16 @@ def test_a_run_over_the_slcan_of_python_can(tmp_path: Path) -> None:
 
 
 def test_looking_beside_a_master_changes_nothing_for_it(tmp_path: Path) -> None:
-    with served(tmp_path) as drives:
-        drives.await_state("switch on disabled")
-        run = master(tmp_path)
-        try:
-            drives.await_state("operation enabled")
-            rows_on_disk(tmp_path)
-            look = started(
-                tmp_path,
-                *("run", "position-jump", "--plant", "can", "--bus", "leg.toml", "--read-only"),
-                *("--interface", "legbench_unix", "--channel", "leg.sock", "--out", "looks"),
-                *("--duration", "0.3", "--design", str(ROOT / "models" / "optimal.toml")),
-            )
-            _, complaint = look.communicate(timeout=PATIENCE)
-            assert look.returncode == 0, complaint
-            if run.poll() is not None:
-                pytest.fail(f"the master ended beside a looker: {run.communicate()[1]}")
-            os.kill(run.pid, signal.SIGINT)
-            drives.await_state("switch on disabled")
-            _, trouble = run.communicate(timeout=PATIENCE)
-        finally:
-            end(run)
-    assert run.returncode == 0, trouble
+    with served(tmp_path) as drives, leading(tmp_path, drives) as run:
+        look = started(
+            tmp_path,
+            *("run", "position-jump", "--plant", "can", "--bus", "leg.toml", "--read-only"),
+            *("--interface", "legbench_unix", "--channel", "leg.sock", "--out", "looks"),
+            *("--duration", "0.3", "--design", str(ROOT / "models" / "optimal.toml")),
+        )
+        _, complaint = look.communicate(timeout=PATIENCE)
+        assert look.returncode == 0, complaint
+        interrupted(drives, run)
     kept = run_folder(tmp_path)
     assert json.loads((kept / "run.json").read_text())["status"] == "interrupted"
     # The drives stayed enabled from the master's start to its ^C.
@@ -235,39 +95,25 @@ def test_looking_beside_a_master_changes_nothing_for_it(tmp_path: Path) -> None:
 
 def test_nobody_acts_beside_a_master_of_another_computer(tmp_path: Path) -> None:
     """The lock keeps others of this computer away; those of another one have only the wire."""
-    with served(tmp_path) as drives:
-        drives.await_state("switch on disabled")
-        run = master(tmp_path)
-        try:
-            drives.await_state("operation enabled")
-            rows_on_disk(tmp_path)
-            config = load_bus(tmp_path / "leg.toml")
-            limits = limits_for(
-                tmp_path / "limits.toml", load_design(ROOT / "models" / "optimal.toml")
-            )
-            for act in (
-                configure.write,
-                lambda it: home(it, config.nodes[0], 37),
-                lambda it: jog(it, limits, (4.0, 5.0), "motor1", by=0.01, speed=0.1, back=True),
-                lambda it: jitter.measure(it, (4.0, 5.0), 10),
-                lambda it: zero.measure(it, (0.0, 0.0)),
-                lambda it: it.link(limits, (4.0, 5.0)).start(),
+    with served(tmp_path) as drives, leading(tmp_path, drives) as run:
+        config = load_bus(tmp_path / "leg.toml")
+        limits = limits_for(tmp_path / "limits.toml", load_design(ROOT / "models" / "optimal.toml"))
+        for act in (
+            configure.write,
+            lambda it: home(it, config.nodes[0], 37),
+            lambda it: jog(it, limits, (4.0, 5.0), "motor1", by=0.01, speed=0.1, back=True),
+            lambda it: jitter.measure(it, (4.0, 5.0), 10),
+            lambda it: zero.measure(it, (0.0, 0.0)),
+            lambda it: it.link(limits, (4.0, 5.0)).start(),
+        ):
+            bus = UnixBus(str(tmp_path / "leg.sock"))
+            with (
+                Session(bus, config, lock=ChannelLock.private("another computer")) as session,
+                pytest.raises(PlantFault, match="somebody else sends") as caught,
             ):
-                bus = UnixBus(str(tmp_path / "leg.sock"))
-                with (
-                    Session(bus, config, lock=ChannelLock.private("another computer")) as session,
-                    pytest.raises(PlantFault, match="somebody else sends") as caught,
-                ):
-                    act(session)
-                assert caught.value.cause == "second master"
-            if run.poll() is not None:
-                pytest.fail(f"the master ended beside a looker: {run.communicate()[1]}")
-            os.kill(run.pid, signal.SIGINT)
-            drives.await_state("switch on disabled")
-            _, trouble = run.communicate(timeout=PATIENCE)
-        finally:
-            end(run)
-    assert run.returncode == 0, trouble
+                act(session)
+            assert caught.value.cause == "second master"
+        trouble = interrupted(drives, run)
     manifest = json.loads((run_folder(tmp_path) / "run.json").read_text())
     assert manifest["status"] == "interrupted"
     assert [state for _, state in drives.seen].count("operation enabled") == 2
@@ -277,3 +123,39 @@ def test_nobody_acts_beside_a_master_of_another_computer(tmp_path: Path) -> None
     assert manifest["plant"]["limits"]["waive"] == list(LOOSE)
     (told,) = [event for event in read_events(run_folder(tmp_path))[0] if event["name"] == "waived"]
     assert len(told["protections"]) == 2 + len(LOOSE)
+
+
+SLOW = 0.05
+"""Time that each step of a guest takes [s]."""
+
+
+def test_a_guest_that_takes_too_long_is_the_fault_with_its_own_lines(tmp_path: Path) -> None:
+    own = (ROOT / "scripts" / "examples" / "own_controller.py").read_text(encoding="utf-8")
+    step = "    def step(self, observation):\n"
+    sleeping = f"        __import__('time').sleep({SLOW})\n"
+    (tmp_path / "mine.py").write_text(own.replace(step, step + sleeping), encoding="utf-8")
+    with served(tmp_path) as drives:
+        limits = (tmp_path / "limits.toml").read_text(encoding="utf-8")
+        fewer = limits.replace("overrun_cycles = 5000", "overrun_cycles = 1000")
+        (tmp_path / "limits.toml").write_text(fewer, encoding="utf-8")
+        drives.await_state("switch on disabled")
+        run = started(
+            tmp_path,
+            *("run", "mine.py:Pump", "--plant", "can", "--bus", "leg.toml", "--duration", "10"),
+            *("--interface", "legbench_unix", "--channel", "leg.sock", "--out", "runs"),
+            *("--design", str(ROOT / "models" / "optimal.toml")),
+        )
+        try:
+            drives.await_state("operation enabled")
+            drives.await_state("switch on disabled")
+            _, complaint = run.communicate(timeout=PATIENCE)
+        finally:
+            end(run)
+    assert run.returncode == 1, complaint
+    assert "Traceback" not in complaint
+    number = own[: own.index(step)].count("\n") + 1
+    assert f"mine.py:{number} in step: def step(self, observation):" in complaint
+    assert re.search(r"the controller's step took [0-9.]+ periods", complaint)
+    manifest = json.loads((run_folder(tmp_path) / "run.json").read_text())
+    assert (manifest["status"], manifest["cause"]) == ("fault", "cycle overruns")
+    assert manifest["rows"] >= 10

@@ -3,27 +3,18 @@
 import math
 
 import pytest
+from guard_rig import BOUNDS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from legbench.limits.plausibility import (
     SWAY_CYCLES,
-    Bounds,
     Doubt,
     LinkWatch,
     MotorWatch,
 )
 
-PERIOD = 1e-3
-BOUNDS = Bounds(
-    period=PERIOD,
-    following_error=0.03,
-    following_cycles=5,
-    servo_bandwidth=15.0,
-    joint_speed=60.0,
-    standing=0.02,
-    sway=0.05,
-)
+PERIOD = BOUNDS.period
 BOTH: tuple[bool, bool] = (True, True)
 
 

@@ -2,18 +2,14 @@
 
 import itertools
 import math
-from typing import Any
 
 import pytest
+from guard_rig import PERIOD, REST, fault, pair, started
 
-from legbench.errors import PlantFault
 from legbench.limits.guard import Guard
 from legbench.limits.safety import SafetyLimits
 
-PERIOD = 0.25
-"""So long that steps, ranges and speeds are exact binary numbers [s]."""
 STEP = 0.125
-REST = (-0.5, 0.5)
 LIMITS = SafetyLimits(
     motor_range=((-2.0, 1.0), (-1.0, 2.0)),
     joint_range=((-1.0, 1.0), (-0.5, 1.5)),
@@ -26,26 +22,6 @@ LIMITS = SafetyLimits(
 )
 FREE = SafetyLimits(command_speed=STEP / PERIOD)
 """Slewed, and nothing else."""
-
-
-def started(limits: SafetyLimits, place: tuple[float, float] = REST) -> Guard:
-    guard = Guard(limits, PERIOD)
-    guard.start_at(place)
-    return guard
-
-
-def pair(axis: int, value: float, other: float) -> tuple[float, float]:
-    """A value for one axis, and one for the other."""
-    return (value, other) if axis == 0 else (other, value)
-
-
-def fault(act: Any, *args: Any, **kwargs: Any) -> str | None:
-    """Cause and text of the fault that is raised, if one is."""
-    try:
-        act(*args, **kwargs)
-    except PlantFault as error:
-        return f"{error.cause}: {error}"
-    return None
 
 
 # --- commands --------------------------------------------------------------------------------

@@ -4,40 +4,17 @@ import math
 from typing import Any
 
 import pytest
+from guard_rig import REST, fault, pair, started
 
-from legbench.errors import PlantFault
 from legbench.limits.guard import Guard
 from legbench.limits.safety import SafetyLimits
 
-PERIOD = 0.25
-"""So long that steps, ranges and speeds are exact binary numbers [s]."""
-REST = (-0.5, 0.5)
 LIMITS = SafetyLimits(
     joint_range=((-1.0, 1.0), (-0.5, 1.5)),
     joint_knee_range=(0.125, 2.5),
     spring_torque=8.0,
     temperature=80.0,
 )
-
-
-def started(limits: SafetyLimits, place: tuple[float, float] = REST) -> Guard:
-    guard = Guard(limits, PERIOD)
-    guard.start_at(place)
-    return guard
-
-
-def pair(axis: int, value: float, other: float) -> tuple[float, float]:
-    """A value for one axis, and one for the other."""
-    return (value, other) if axis == 0 else (other, value)
-
-
-def fault(act: Any, *args: Any, **kwargs: Any) -> str | None:
-    """Cause and text of the fault that is raised, if one is."""
-    try:
-        act(*args, **kwargs)
-    except PlantFault as error:
-        return f"{error.cause}: {error}"
-    return None
 
 
 def seen(guard: Guard, **changes: Any) -> str | None:

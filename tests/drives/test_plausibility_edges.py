@@ -4,28 +4,15 @@ import math
 from dataclasses import replace
 
 import pytest
+from guard_rig import BOUNDS, REST, pair
 
-from legbench.limits.plausibility import Bounds, Doubt, LinkWatch, MotorWatch
+from legbench.limits.plausibility import Doubt, LinkWatch, MotorWatch
 
-PERIOD = 1e-3
-BOUNDS = Bounds(
-    period=PERIOD,
-    following_error=0.03,
-    following_cycles=5,
-    servo_bandwidth=15.0,
-    joint_speed=60.0,
-    standing=0.02,
-    sway=0.05,
-)
-REST = (-0.5, 0.5)
+PERIOD = BOUNDS.period
 FORGET = 1e-3
 """Share of a lasting sway that its reference takes up in one cycle, for a memory of 1 s."""
 FADE = 1.0 - 2e-4
 """What remains of a sway that has been from one cycle to the next, for a memory of 5 s."""
-
-
-def pair(axis: int, value: float, other: float) -> tuple[float, float]:
-    return (value, other) if axis == 0 else (other, value)
 
 
 def turned(axis: int, angle: float) -> tuple[float, float]:

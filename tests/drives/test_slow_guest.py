@@ -18,6 +18,7 @@ from legbench.recording.memory import MemoryRun
 from legbench.signals import Command, Floats, Observation
 
 OWN = Path(__file__).parents[2] / "scripts" / "examples" / "own_controller.py"
+STEP = "def step(self, observation: Observation) -> Command:"
 SLOW_FROM = 50
 """Cycle from which a step takes 5 ms."""
 
@@ -53,15 +54,17 @@ def test_a_law_that_takes_five_milliseconds_ends_the_run_and_stops_the_drives() 
             "controller": controller_table(settings.kind, settings.describe()),
         }
         writer = MemoryRun(manifest)
-        outcome = run(it.plant, Slow(it.controller, it.network), 500, sink=writer)
+        slow, now = Slow(it.controller, it.network), lambda: 1e-9 * it.network.now_ns
+        outcome = run(it.plant, slow, 500, sink=writer, now=now)
         writer.close(outcome.status, outcome.cause)
         recording = writer.recording()
         powers = [drive.axis.power.state for drive in it.network.drives]
     assert powers == [DriveState.SWITCH_ON_DISABLED] * 2
     assert outcome.cause == "cycle overruns"
-    assert "ticks of 1000 us missed in a row, the limit is 3; free the processor" in str(
-        outcome.message
-    )
+    said, own = str(outcome.message).split("\n")
+    assert "ticks of 1000 us missed in a row, the limit is 3; free the processor" in said
+    assert said.endswith("; the controller's step took 5 periods")
+    assert own == f"  {__file__}:{Slow.step.__code__.co_firstlineno} in step: {STEP}"
     assert recording.description.cause == "cycle overruns"
     assert len(recording.time) == outcome.cycles == SLOW_FROM + 1
     assert np.all(np.isfinite(recording["fold_rate"]))

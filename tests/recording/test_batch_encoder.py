@@ -34,7 +34,7 @@ def expected(columns: Floats) -> pa.RecordBatch:
     return pa.RecordBatch.from_pydict(values, schema=SCHEMA)
 
 
-def read_back(*messages: memoryview) -> list[pa.RecordBatch]:
+def read_back(*messages: bytes | memoryview) -> list[pa.RecordBatch]:
     stream = io.BytesIO(bytes(encode_schema(SCHEMA)) + b"".join(bytes(part) for part in messages))
     return list(ipc.open_stream(stream))
 
@@ -45,7 +45,7 @@ def test_each_message_is_of_its_own_rows(count: int, truth: bool) -> None:
     batches = [rows(seed, count, truth=truth) for seed in range(3)]
     encoder = BatchEncoder(batches[0], SCHEMA)
     assert all(encoder.fits(columns) for columns in batches)
-    messages = [encoder.encode(columns) for columns in batches]
+    messages = [bytes(encoder.encode(columns)) for columns in batches]
     for columns, found in zip(batches, read_back(*messages), strict=True):
         found.validate(full=True)
         assert found.equals(expected(columns))

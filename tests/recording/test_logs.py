@@ -20,7 +20,7 @@ from recorded_rows import append_rows
 
 from legbench.errors import RecordingError
 from legbench.recording.files import Appender
-from legbench.recording.logs import ENDED_EARLY, THREAD_LINES, TOO_SLOW
+from legbench.recording.logs import ENDED_EARLY, LINES_AT_ONCE, TOO_SLOW
 from legbench.recording.process_disk import ProcessDisk
 from legbench.recording.reader import load
 from legbench.recording.repair import recover
@@ -29,7 +29,7 @@ from legbench.recording.writer import RunWriter
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="shared memory files are Linux's")
 WAYS = [False, pytest.param(True, marks=LINUX)]
-"""By the recording thread, by the recording process."""
+"""By the loop itself, by the recording process."""
 PATIENCE = 30.0
 """Longest that a process may take on a busy machine [s]."""
 PIPE_BYTES = 1 << 16
@@ -97,10 +97,10 @@ def drained(pipe: int) -> Iterator[bytearray]:
     reader.join()
 
 
-@pytest.mark.parametrize("realtime", WAYS)
-def test_a_disk_that_stalls_holds_up_no_line_and_loses_none(tmp_path: Path, realtime: bool) -> None:
+@LINUX
+def test_a_disk_that_stalls_holds_up_no_line_and_loses_none(tmp_path: Path) -> None:
     wanted = lines(30_000)
-    with RunWriter.create(tmp_path, {}, realtime=realtime) as writer, stuck() as (pipe, file):
+    with RunWriter.create(tmp_path, {}, realtime=True) as writer, stuck() as (pipe, file):
         log = writer._disk.log(file)
         for number, line in enumerate(wanted):
             log.write(line)
@@ -116,12 +116,10 @@ def test_a_disk_that_stalls_holds_up_no_line_and_loses_none(tmp_path: Path, real
     assert len(load(writer.path).time) == 30
 
 
-@pytest.mark.parametrize("realtime", WAYS)
-def test_a_disk_that_stalls_for_too_long_ends_the_log_not_the_run(
-    tmp_path: Path, realtime: bool
-) -> None:
+@LINUX
+def test_a_disk_that_stalls_for_too_long_ends_the_log_not_the_run(tmp_path: Path) -> None:
     wanted = lines(RING_BYTES // 1000 + 2000, size=1000)
-    with RunWriter.create(tmp_path, {}, realtime=realtime) as writer, stuck() as (pipe, file):
+    with RunWriter.create(tmp_path, {}, realtime=True) as writer, stuck() as (pipe, file):
         log = writer._disk.log(file)
         for line in wanted:
             log.write(line)
@@ -170,18 +168,28 @@ def test_a_log_that_cannot_be_made_is_refused(tmp_path: Path, realtime: bool) ->
         writer.log("other.log")
 
 
-@pytest.mark.parametrize("realtime", WAYS)
-def test_a_run_that_is_closed_before_its_log_says_what_is_missing(
-    tmp_path: Path, realtime: bool
-) -> None:
-    writer = RunWriter.create(tmp_path, {}, realtime=realtime)
+def test_a_loop_that_writes_its_own_log_loses_no_line_of_it(tmp_path: Path) -> None:
+    writer = RunWriter.create(tmp_path, {})
     log = writer.log("lines.log")
-    for line in lines(THREAD_LINES):
+    for line in lines(LINES_AT_ONCE + 1):
+        log.write(line)
+    writer.close()
+    log.close()
+    log.write(b"too late\n")
+    assert (writer.path / "lines.log").read_bytes() == b"".join(lines(LINES_AT_ONCE + 1))
+    assert log.error is None
+
+
+@LINUX
+def test_a_run_that_is_closed_before_its_log_says_what_is_missing(tmp_path: Path) -> None:
+    writer = RunWriter.create(tmp_path, {}, realtime=True)
+    log = writer.log("lines.log")
+    for line in lines(LINES_AT_ONCE):
         log.write(line)
     writer.close()
     log.write(b"lost\n")
     log.close()
-    assert (writer.path / "lines.log").read_bytes() == b"".join(lines(THREAD_LINES))
+    assert (writer.path / "lines.log").read_bytes() == b"".join(lines(LINES_AT_ONCE))
     assert log.error == ENDED_EARLY
 
 

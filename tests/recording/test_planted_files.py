@@ -10,8 +10,8 @@ from legbench.errors import RecordingError
 from legbench.reading import LARGEST_JSON
 from legbench.recording import events
 from legbench.recording.events import read_events
-from legbench.recording.files import write_whole
 from legbench.recording.manifest import read_manifest
+from legbench.writing import write_whole
 
 
 @pytest.mark.parametrize("name", ["run.json", "events.jsonl"])

@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 from recorded_rows import append_rows, cycle
 
-from legbench import __version__
+from legbench import __version__, writing
 from legbench.errors import ConfigError, PlantFault, RecordingError
-from legbench.recording import files
 from legbench.recording import writer as writer_module
 from legbench.recording.reader import load
 from legbench.recording.writer import RunWriter
@@ -79,7 +78,7 @@ def test_a_refused_start_leaves_no_folder(tmp_path: Path, monkeypatch: pytest.Mo
     def refuse(draft: Path, path: Path) -> None:
         raise OSError(errno.EROFS, os.strerror(errno.EROFS))
 
-    monkeypatch.setattr(files, "put_in_place", refuse)
+    monkeypatch.setattr(writing, "put_in_place", refuse)
     with pytest.raises(RecordingError, match=r"Read-only file system \[EROFS\]"):
         RunWriter.create(tmp_path, {})
     assert list(tmp_path.iterdir()) == []

@@ -53,12 +53,38 @@ def replayed_and_drawn(
     assert main(list(words)) == 0
     assert json.loads(capfd.readouterr().out)["rating_periods"] == ratings
     assert figure.read_text(encoding="utf-8").startswith("<?xml")
-    assert "pump" in phase_figure(run).get_suptitle()
+    drawn = phase_figure(run)
+    assert "pump" in drawn.get_suptitle()
+    own = drawn.axes[3]
+    assert own.get_title(loc="left") == "(d) fold_rate: half the rate at which the knee folds"
+    assert own.get_ylabel() == "fold_rate [rad/s]"
+    np.testing.assert_array_equal(own.get_lines()[0].get_ydata(), run["fold_rate"])
     shown = viz_rrd.temporal(rrd)
     np.testing.assert_allclose(
         np.ravel(shown["/series/own/fold_rate"]["scalars"]), run["fold_rate"]
     )
     assert {state[0] for state in shown["/states/controller"]["state"]} == {"kick", "pump"}
+
+
+def test_it_runs_again_to_the_same_rows_and_is_filmed(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    status, told, errors = ran(OWN, ("sim",), tmp_path / "first", capfd, "0.4")
+    assert status == 0, errors
+    first = Path(str(told["run"]))
+    words = ("run", "--again", str(first), "--out", str(tmp_path / "second"), "--json")
+    assert main(list(words)) == 0
+    again = load(Path(json.loads(capfd.readouterr().out)["run"]))
+    run = load(first)
+    assert set(run.columns) == set(again.columns)
+    for name in set(run.columns) - {"cycle_us", "late_us"}:
+        np.testing.assert_array_equal(run.columns[name], again.columns[name], err_msg=name)
+    film = tmp_path / "leg.gif"
+    assert main(["render", str(first), "--out", str(film)]) == 0
+    assert film.read_bytes()[:6] == b"GIF89a"
+    still = tmp_path / "leg.png"
+    assert main(["render", str(first), "--out", str(still), "--time", "0.2"]) == 0
+    assert still.read_bytes()[:4] == b"\x89PNG"
 
 
 GOOD = "        return Command("

@@ -46,6 +46,19 @@ def test_a_jump_shows_its_last_three_jumps_by_stance_and_flight(hop: Recording) 
     ]
 
 
+@pytest.mark.parametrize("rows", [500, 860, 1200, 1600, 2500])
+def test_the_title_says_over_how_many_jumps_it_rates(hop: Recording, rows: int) -> None:
+    run = part(hop, 0, rows)
+    jumps = len(Analysis(run).gait.jumps)
+    title = str(phase_figure(run).get_suptitle())
+    expected = {0: "", 1: "(1 jump)", 2: "(2 jumps)", 3: "(3 jumps)"}
+    assert title.endswith(expected.get(jumps, "(last 3 jumps)"))
+    ratings = Analysis(run).ratings.chosen
+    shown = min(3, jumps)
+    for name, values in (("st", ratings.stance), ("fl", ratings.flight)) if jumps else ():
+        assert f"$P^r_{{{name}}}$ = {np.nanmean(values[-shown:]):.3f}" in title
+
+
 def test_periods_have_a_colour_each_and_a_bar(swing: Recording) -> None:
     figure = phase_figure(swing)
     periods = Analysis(swing).periods
@@ -96,7 +109,8 @@ def test_a_stub_of_a_run_has_a_figure(hop: Recording, rows: int, tmp_path: Path)
 def test_wrong_wishes_say_what_is_possible(hop: Recording, tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"'a\.jpg'; choose from \.png, \.svg, \.pdf"):
         save_figure(Figure(), tmp_path / "a.jpg")
-    with pytest.raises(RecordingError, match=r"cannot write .* No such file or directory"):
-        save_figure(Figure(), tmp_path / "nowhere" / "a.png")
+    (tmp_path / "file").touch()
+    with pytest.raises(RecordingError, match=r"cannot write .*: File exists \[EEXIST\]"):
+        save_figure(Figure(), tmp_path / "file" / "a.png")
     with pytest.raises(RecordingError, match="has no rows"):
         phase_figure(part(hop, 0, 0))

@@ -17,6 +17,7 @@ from legbench.viz.facts import as_markdown, facts_of
 from legbench.viz.live.blueprint import blueprint
 from legbench.viz.live.rrd import write_rrd
 from legbench.viz.print.figures import phase_figure
+from legbench.viz.print.save import save_figure
 
 TARGET = Signal("target", ("hip", "knee"), "rad", "set point")
 EFFORT = Signal("effort", (), "W", "power asked for")
@@ -76,9 +77,51 @@ def _view_names(container: object) -> list[str]:
 def test_a_figure_of_a_guest_is_coloured_by_period(guest: Recording) -> None:
     figure = phase_figure(guest)
     assert "mine.py:Sine" in figure.get_suptitle()
-    assert len(figure.axes) == 4
+    *_, target, effort, bar = figure.axes
+    assert len(figure.axes) == 6
+    assert bar.get_ylabel() == "oscillation period"
+    assert target.get_title(loc="left") == "(d) target: set point"
+    assert target.get_ylabel() == "target [rad]"
+    hip, knee = target.get_lines()
+    assert (hip.get_label(), knee.get_label()) == ("hip", "knee")
+    np.testing.assert_array_equal(hip.get_ydata(), -guest.time)
+    np.testing.assert_array_equal(knee.get_xdata(), guest.time)
+    assert effort.get_title(loc="left") == "(e) effort: power asked for"
+    assert effort.get_ylabel() == "effort [W]"
+    np.testing.assert_array_equal(effort.get_lines()[0].get_ydata(), guest["effort"])
     np.testing.assert_array_equal(guest["target"][:, 1], guest.time)
     np.testing.assert_array_equal(part(guest, 0, 300)["effort"][100:], guest.time[100:300])
+
+
+def test_own_signals_come_below_the_differences_and_those_of_both_runs_are_laid_over(
+    guest: Recording,
+) -> None:
+    figure = phase_figure(guest, [part(guest, 0, 900)])
+    radial, joint, target, effort = figure.axes[3:7]
+    titles = [each.get_title(loc="left")[:3] for each in (radial, joint, target, effort)]
+    assert titles == ["(d)", "(e)", "(f)", "(g)"]
+    assert target.get_position().y1 < radial.get_position().y0
+    lines = target.get_lines()
+    assert [len(np.asarray(line.get_xdata())) for line in lines] == [1200, 1200, 900, 900]
+    assert len(figure.axes) == 8
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 30])
+def test_every_own_signal_has_a_panel_and_dollars_are_no_mathematics(
+    guest: Recording, count: int, tmp_path: Path
+) -> None:
+    own = tuple(Signal(f"own{n}", (), "$", "price $x_ in $") for n in range(count))
+    said = replace(SAID, signals=own)
+    manifest = {**guest.manifest, "controller": controller_table("mine.py:Sine", said)}
+    columns = {**guest.columns, **{signal.name: guest.time for signal in own}}
+    run = replace(
+        guest, manifest=manifest, described=described(manifest, guest.path), columns=columns
+    )
+    figure = phase_figure(run)
+    panels = figure.axes[3 : 3 + count]
+    assert [panel.get_ylabel() for panel in panels] == [f"own{n} [\\$]" for n in range(count)]
+    assert len({panel.get_title(loc="left").split(")")[0] for panel in panels}) == count
+    assert save_figure(figure, tmp_path / "own.svg", dpi=30).stat().st_size > 0
 
 
 def test_the_facts_of_a_guest_are_its_settings(guest: Recording) -> None:

@@ -34,7 +34,7 @@ A testbed for segmented legs whose natural motion is a pure radial oscillation.
 
 
 def usage() -> str:
-    """The text of `legbench --help`."""
+    """Text of `legbench --help`."""
     lines = [f"  {name:<10} {text}" for name, text in COMMANDS.items()]
     return USAGE.format(commands="\n".join(lines))
 
@@ -70,7 +70,7 @@ def _occupy_standard_streams() -> None:
 
 
 def _reader_left() -> bool:
-    """Whether what reads our output has gone; what is still to be flushed is then dropped."""
+    """Whether the reader of our output has gone; what is still to be flushed is dropped then."""
     output = sys.stdout.fileno()
     watch = select.poll()
     watch.register(output, 0)
@@ -103,5 +103,5 @@ def _run(arguments: list[str] | None) -> int:
 
 
 def _notes(error: BaseException) -> list[str]:
-    """What was added to an exception on its way, such as drives that keep their power."""
+    """Notes that were added to an exception, such as drives that keep their power."""
     return getattr(error, "__notes__", [])

@@ -32,11 +32,11 @@ class CheckArguments:
     model: bool = True
     """Whether to measure the conditions on the generated MuJoCo model, too."""
     target: Path | None = None
-    """Design file that the leg was to be: prints the weights that bring it there."""
+    """Design file of the planned leg: prints the weights that bring the built one there."""
     tolerances: str | None = None
     """`default` or a tolerance file: makes legs with that scatter and counts those that work."""
     legs: int = 1000
-    """How many are made."""
+    """Number of scattered legs."""
     seed: int = 0
     """Seed of the scatter."""
     json: bool = False
@@ -44,7 +44,7 @@ class CheckArguments:
 
 
 def main(arguments: list[str]) -> int:
-    """Print the verdicts."""
+    """Run `legbench check`: print the verdict on each condition."""
     from legbench.synthesis.report import condition_lines
 
     chosen = parse(CheckArguments, "check", arguments)
@@ -134,7 +134,7 @@ def add_yield(
 
 
 def tolerances_named(name: str) -> Any:
-    """The default tolerances, or those of a file."""
+    """Tolerances by name: the default ones, or those of a file."""
     from legbench.synthesis.tolerance import Tolerances, load_tolerances
 
     return Tolerances() if name == "default" else load_tolerances(Path(name))

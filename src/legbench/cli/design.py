@@ -42,12 +42,12 @@ class DesignArguments:
     trace: Path | None = None
     """File that keeps every evaluation; a search whose file exists is continued."""
     cross_check: bool = True
-    """Whether to solve the same by differential evolution, too."""
+    """Whether to search by differential evolution as well, and compare."""
     tolerances: str | None = None
     """`default` or a tolerance file: candidates also pay for the P^r that scatter costs them, and
     the yield of the result is measured. Takes minutes."""
     legs: int = 1000
-    """How many legs the yield is measured on."""
+    """Number of legs on which the yield is measured."""
     measured: Path | None = None
     """Design file of a leg that was built: prints the weights that bring it to the result."""
     out: Path | None = None
@@ -61,7 +61,7 @@ class DesignArguments:
 
 
 def main(arguments: list[str]) -> int:
-    """Search, judge, write."""
+    """Run `legbench design`: search a leg, judge it, write it."""
     from legbench.synthesis.manufacture import manufacture_table, table_to_json
     from legbench.synthesis.search import SearchSettings, identity_of
     from legbench.synthesis.trace import Trace
@@ -96,7 +96,7 @@ def main(arguments: list[str]) -> int:
 
 
 def requirements_of(chosen: DesignArguments) -> Requirements:
-    """The preset or file that was asked for.
+    """Requirements of the preset or the file that the flags name.
 
     Raises:
         DesignError: a file or a body mass that makes no sense.
@@ -129,7 +129,7 @@ def _problem(requirements: Requirements, tolerances: str | None) -> dict[str, An
 def _solve(
     chosen: DesignArguments, requirements: Requirements, settings: Any, trace: "Trace"
 ) -> tuple["Solution", bool]:
-    """The solution, and whether ^C asked for it early."""
+    """Solution of the search, and whether ^C ended the search early."""
     from legbench.interrupts import stop_on_interrupt
     from legbench.synthesis.solve import solve
 
@@ -190,18 +190,14 @@ def _angle(solution: "Solution") -> float:
 
 
 def _write(chosen: DesignArguments, solution: "Solution", trace: "Trace") -> None:
-    """Write what was asked for."""
-    try:
-        if chosen.out is not None:
-            chosen.out.parent.mkdir(parents=True, exist_ok=True)
-            save_design(solution.design, chosen.out)
-            note(f"wrote {chosen.out}")
-        if chosen.drawing is not None:
-            _draw(chosen.drawing, solution)
-        if chosen.plot is not None:
-            _plot(chosen.plot, solution, trace)
-    except OSError as error:
-        raise ConfigError(f"cannot write {error.filename}: {error.strerror}") from None
+    """Write the design file, the drawing and the plot that the flags name."""
+    if chosen.out is not None:
+        save_design(solution.design, chosen.out)
+        note(f"wrote {chosen.out}")
+    if chosen.drawing is not None:
+        _draw(chosen.drawing, solution)
+    if chosen.plot is not None:
+        _plot(chosen.plot, solution, trace)
 
 
 def _draw(path: Path, solution: "Solution") -> None:

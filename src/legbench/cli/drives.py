@@ -87,7 +87,7 @@ class DrivesArguments:
 
 
 def main(arguments: list[str]) -> int:
-    """Do one action; 0 when it went well, 1 when something is not as it should be.
+    """Run one action; its exit status is 1 if something is not as it should be, else 0.
 
     ^C, SIGTERM and SIGHUP raise one KeyboardInterrupt, whatever the action is: drives that have
     power lose it on the way out, and later signals change nothing about that.

@@ -14,7 +14,7 @@ from legbench.plants import LIMITS_NAME, limits_for
 
 
 def tell(granted: Granted | None) -> None:
-    """What the system granted to those who move motors; in virtual time nothing was asked."""
+    """Say on stderr what real-time scheduling was granted; in virtual time none was asked for."""
     if granted is not None:
         note(f"SCHED_FIFO {granted.fifo}; locked memory {granted.mlockall}")
 
@@ -67,7 +67,7 @@ class Zero:
     out: Path | None = None
     """Bus file to write; by default the one that is read."""
     dry_run: bool = False
-    """Print only."""
+    """Whether to print the offsets without writing them."""
 
     def run(self, bench: Bench) -> int:
         """Measure, print, write the offsets into the bus file."""
@@ -94,12 +94,12 @@ class Home:
     """Home one drive by its own procedure; with methods that search, IT MOVES."""
 
     node: str
-    """Name in the bus file."""
+    """Name of the drive in the bus file."""
     method: int = 37
     """Homing method (6098h): 35 and 37 call the present position zero, all others search and MOVE:
     1 to 34 limit switch, home switch or index pulse (CiA 402), -1 to -128 are the maker's own."""
     timeout: float = 20.0
-    """Longest time that the search may take [s]."""
+    """Longest duration of the search [s]."""
 
     def run(self, bench: Bench) -> int:
         """Home and print the counts before and after."""
@@ -124,16 +124,16 @@ class Jog:
     """Move one motor a little and slowly, under all limits; both drives are enabled."""
 
     node: str
-    """Name in the bus file."""
+    """Name of the drive in the bus file."""
     by: float = 0.05
-    """How far, at most 0.3 rad [rad]."""
+    """Angle by which the motor moves, at most 0.3 rad [rad]."""
     speed: float = 0.2
-    """How fast, at most 1 rad/s [rad/s]."""
+    """Speed of the motion, at most 1 rad/s [rad/s]."""
     stay: bool = False
-    """Do not go back."""
+    """Whether to stay at the end of the motion instead of going back."""
 
     def run(self, bench: Bench) -> int:
-        """Jog and print where the motors and links were."""
+        """Jog the motor and print the positions of motors and links."""
         from legbench.commissioning.jog import jog
 
         design = bench.leg()

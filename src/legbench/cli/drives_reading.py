@@ -22,16 +22,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bench:
-    """Which bus, and how to print."""
+    """Flags of every action on a bus: which bus it is, and how results are printed."""
 
     bus: Path = Path("hardware/leg.toml")
-    """Bus file."""
+    """Bus file, which describes the drives."""
     interface: str | None = None
-    """python-can's name of the interface; else the bus file's."""
+    """Name of the interface in python-can; by default the bus file's."""
     channel: str | None = None
-    """Such as can0; else the bus file's."""
+    """Channel of the interface, such as can0; by default the bus file's."""
     bitrate: int | None = None
-    """Bitrate of interfaces that set their own; else the bus file's [bit/s]."""
+    """Bitrate of interfaces that set their own; by default the bus file's [bit/s]."""
     design: Path = Path("models/optimal.toml")
     """Design file: springs, and the limits that no limits file may exceed."""
     limits: Path | None = None
@@ -47,15 +47,15 @@ class Bench:
         )
 
     def config(self) -> BusConfig:
-        """The bus file; raises ConfigError."""
+        """Drives of the bus file; raises ConfigError."""
         return load_bus(self.bus)
 
     def leg(self) -> LegDesign:
-        """The design; raises DesignError."""
+        """Design of the leg; raises DesignError."""
         return load_design(self.design)
 
     def session(self, *, leads: bool, read_only: bool = False) -> AbstractContextManager[Session]:
-        """The bus, open, its channel locked by whoever leads; raises ConfigError, BusError."""
+        """Open the bus; whoever leads drives locks its channel; raises ConfigError, BusError."""
         if leads:
             tell_waived(self.bus, None)
         choice = replace(self.choice, read_only=read_only)
@@ -64,7 +64,7 @@ class Bench:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scan:
-    """Who is on the bus; writes nothing."""
+    """List the nodes on the bus; nothing is written."""
 
     last: int = 127
     """Highest node id to ask."""
@@ -106,7 +106,7 @@ class Scan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Status:
-    """What the drives say of themselves, in words."""
+    """Print what the drives say of themselves, in words."""
 
     def run(self, bench: Bench) -> int:
         """Print state, mode, error and encoders of every drive."""
@@ -131,7 +131,7 @@ class Status:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Budget:
-    """What the schedule of the bus file takes of the wire at worst; opens no bus.
+    """Compute the worst bus load of the schedule in the bus file; no bus is opened.
 
     It also says how soon every drive stands when its master is gone, and checks bus and limits
     files against each other.

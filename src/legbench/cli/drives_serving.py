@@ -64,7 +64,7 @@ def _print_state(as_json: bool, at: float, node: str, state: str) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Emulate:
-    """An emulated leg for other processes, at --channel: a socket file for legbench_unix.
+    """Emulate a leg for other processes, at --channel: a socket file for legbench_unix.
 
     With --serve slcan it sits behind a pseudo terminal, as behind an adapter on a serial line, and
     --channel may name a link to it. With --interface it sits on that bus, such as socketcan on a
@@ -72,17 +72,17 @@ class Emulate:
     """
 
     serve: Literal["unix", "slcan"] = "unix"
-    """How other processes reach it: a socket file, or python-can's slcan on a terminal."""
+    """Way in which other processes reach it: a socket file, or python-can's slcan on a terminal."""
     bare: bool = False
-    """Nothing on the shafts: no MuJoCo."""
+    """Whether the shafts are bare, so that MuJoCo is not needed."""
     only: str | None = None
     """Name of the only drive of the bus file on this bus, bare, such as for `drives node-id`."""
     eds: Path | None = None
     """Data sheet (EDS) whose dictionary all drives wear; else those that the bus file names."""
     patience: int = 5
-    """Periods without SYNC or target that fault an enabled drive; more on a busy machine."""
+    """Number of periods without SYNC or target that fault a drive; more on a busy machine."""
     seconds: float = math.inf
-    """End after so long [s]."""
+    """Time after which the command ends [s]."""
 
     def run(self, bench: Bench) -> int:
         """Serve until ^C or SIGTERM, printing every change of a drive's state."""
@@ -160,10 +160,10 @@ class Emulate:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Monitor:
-    """Listen beside a master, send nothing, tell what the drives say."""
+    """Listen beside a master without sending anything, and print what the drives report."""
 
     seconds: float = math.inf
-    """End after so long [s]."""
+    """Time after which the command ends [s]."""
     every: float = 0.2
     """Time between two looks [s]."""
 

@@ -23,12 +23,12 @@ WITH, WITHOUT = "with", "without"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Jitter:
-    """How punctual the cycle is; SYNC and process data flow, nothing is enabled."""
+    """Measure how punctual the cycle is; SYNC and process data flow, no drive is enabled."""
 
     cycles: int = 5000
-    """How many."""
+    """Number of cycles."""
     cpu: int | None = None
-    """Processor to stay on."""
+    """Processor that the cycle stays on."""
     recording: Literal["with", "without", "both"] = WITH
     """Whether every cycle is recorded, as in a run; both measures twice."""
     out: Path | None = None

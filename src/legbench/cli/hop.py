@@ -16,6 +16,7 @@ from legbench.control import JumpConfig
 from legbench.design import LegDesign, load_design
 from legbench.design.statics import Support
 from legbench.errors import ConfigError
+from legbench.kinematics import half_angle
 from legbench.modes.basin import Axis, Fate, Question, map_basin
 from legbench.modes.drive import JumpLaw, Passive
 from legbench.modes.fixed_point import FixedPoint, fixed_point
@@ -31,7 +32,7 @@ WHY = {
     Ending.FAULT: "the controller has lost step, it takes vibration in flight for the ground; take "
     "a longer --touchdown-time",
 }
-"""What to say of a leg that does not come to its next apex."""
+"""Advice for each way in which a leg fails to come to its next apex."""
 MATCHED = 1e-5
 """Polar set point of the motors that is smaller than a count of most encoders [rad]."""
 DROPS = (0.02, 0.05, 0.1)
@@ -40,39 +41,39 @@ DROPS = (0.02, 0.05, 0.1)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HopArguments:
-    """Hopping as a map from apex to apex."""
+    """Compute the hopping of a leg as a map from apex to apex."""
 
     design: Annotated[Path, tyro.conf.Positional]
     """Design file."""
     passive: bool = False
-    """Motors held and no damping, instead of the jump controller."""
+    """Whether motors are held and damping is left out, instead of the jump controller."""
     rest: float = 0.9
-    """Passive: set point z2 of the standing leg, orthonormal [rad]."""
+    """Set point z2 of the standing leg, orthonormal, for passive hops [rad]."""
     jump: JumpConfig = field(default_factory=JumpConfig)
     height: float | None = None
     """Apex of the centre of mass to start from [m]; none: 30 mm over standing."""
     hops: int = 60
-    """Hops until the leg should be periodic."""
+    """Number of hops after which the leg should be periodic."""
     basin: int = 0
-    """Points a side of the basin map; 0: none."""
+    """Number of points on each side of the basin map; 0 makes none."""
     across: str = "z1"
-    """What varies to the right in the basin map."""
+    """Coordinate that varies to the right in the basin map."""
     across_span: float = 0.3
-    """How far, either way."""
+    """Range of that coordinate to either side."""
     up: str = "height"
-    """What varies upwards."""
+    """Coordinate that varies upwards in the basin map."""
     up_span: float = 0.08
-    """How far, either way."""
+    """Range of that coordinate to either side."""
     workers: int = 2
-    """Processes for the basin map."""
+    """Number of processes that compute the basin map."""
     out: Path | None = None
     """Folder for hop.json, pictures and the basin's rows; a map begun there is continued."""
     json: bool = False
-    """One JSON object instead of tables."""
+    """Whether to print one JSON object instead of tables."""
 
 
 def main(arguments: list[str]) -> int:
-    """Run the command."""
+    """Run `legbench hop`."""
     flags = parse(HopArguments, "hop", arguments)
     _check(flags)
     design = load_design(flags.design)
@@ -156,7 +157,7 @@ def _passive(flags: HopArguments, design: LegDesign) -> dict[str, Any]:
     from legbench.design.setup import SetupKind
 
     scene = make_scene(design, SetupKind.JUMP, flags.rest)
-    half = 0.5 * (scene.motor[1] - scene.motor[0])
+    half = float(half_angle(np.array(scene.motor)))
     leg = TaylorLeg(LegModel.of(design, undamped=True), probe=Passive.probe)
     hops = []
     for depth in depths(leg, half, np.linspace(scene.rest[1], 0.5 * design.limits.knee[1], 150)):

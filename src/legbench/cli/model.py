@@ -9,7 +9,7 @@ from legbench.design import load_design
 from legbench.design.setup import Setup, SetupKind
 from legbench.errors import RecordingError
 from legbench.mjcf import BuildOptions, Linkage, LinkageKind, build_spec, to_xml, xml_hash
-from legbench.recording.files import write_whole
+from legbench.writing import reason, write_whole
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,21 +19,21 @@ class ModelArguments:
     design: Path = Path("models/optimal.toml")
     """Design file of the leg."""
     setup: SetupKind = SetupKind.JUMP
-    """How the leg is held."""
+    """Setup in which the leg is held."""
     boom_radius: float | None = None
     """Length of the boom that guides the trunk in ffs [m]; by default a plane."""
     linkage: LinkageKind = LinkageKind.BARS
-    """Physical parallel bars, or the constraint they make."""
+    """Linkage of the segments: physical parallel bars, or the constraint that they make."""
     out: Path | None = None
     """MJCF file to write; by default it goes to stdout."""
     view: bool = False
-    """Open it in MuJoCo's viewer."""
+    """Whether to open the model in MuJoCo's viewer."""
     json: bool = False
     """Print one JSON object on stdout: file and SHA-256."""
 
 
 def main(arguments: list[str]) -> int:
-    """Build, then write or view."""
+    """Run `legbench model`: build the model, then write or view it."""
     chosen = parse(ModelArguments, "model", arguments)
     options = BuildOptions(
         setup=Setup(kind=chosen.setup, boom_radius=chosen.boom_radius),
@@ -62,4 +62,4 @@ def _write(path: Path, xml: str) -> None:
         else:
             path.write_text(xml, encoding="utf-8")
     except OSError as error:
-        raise RecordingError(f"cannot write {path}: {error.strerror}") from None
+        raise RecordingError(f"cannot write {path}: {reason(error)}") from None

@@ -25,7 +25,7 @@ class ModesArguments:
     design: Annotated[Path, tyro.conf.Positional]
     """Design file."""
     setup: SetupKind = SetupKind.FFS
-    """How the leg is held; `jump` means its stance."""
+    """Setup in which the leg is held; `jump` means its stance."""
     z2: float = 0.9
     """Set point at which the link rests, orthonormal [rad]."""
     energy: float = 0.2
@@ -35,13 +35,13 @@ class ModesArguments:
     reach: float = 0.3
     """Range of z2 either way over which strictness is checked, within the joint limits [rad]."""
     out: Path | None = None
-    """Folder for modes.json and modes.png; none: nothing is written."""
+    """Folder for modes.json and modes.png; without it nothing is written."""
     json: bool = False
-    """One JSON object instead of tables."""
+    """Whether to print one JSON object instead of tables."""
 
 
 def main(arguments: list[str]) -> int:
-    """Run the command."""
+    """Run `legbench modes`."""
     flags = parse(ModesArguments, "modes", arguments)
     for name in ("energy", "at", "reach"):
         value = getattr(flags, name)

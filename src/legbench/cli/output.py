@@ -1,4 +1,4 @@
-"""What commands print: results on stdout, everything else on stderr."""
+"""Output of the commands: results on stdout, everything else on stderr."""
 
 import os
 import select
@@ -8,17 +8,16 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from legbench.errors import ConfigError
 from legbench.strict_json import null_for_nan
 
 
 def report_error(message: str) -> None:
-    """One line that begins with `legbench: `."""
+    """Print an error as one line on stderr that begins with `legbench: `."""
     note(f"legbench: {message}")
 
 
 def note(message: str) -> None:
-    """Something that a person may want to know and a script does not.
+    """Print a line on stderr that a person may want to know and a script does not.
 
     Where nobody reads it any more, or stderr was closed before the program began, it is dropped:
     words end no command.
@@ -41,14 +40,9 @@ def write_json(path: Path, content: Mapping[str, Any]) -> None:
     """
     import json
 
-    from legbench.recording.files import write_whole
+    from legbench.writing import save_whole
 
-    text = json.dumps(null_for_nan(content), indent=1, allow_nan=False)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(path, f"{text}\n".encode())
-    except OSError as error:
-        raise ConfigError(f"{path.parent} cannot be written: {error}") from error
+    save_whole(path, json.dumps(null_for_nan(content), indent=1, allow_nan=False) + "\n")
 
 
 def progress(done: int, total: int) -> None:

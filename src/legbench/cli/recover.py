@@ -22,7 +22,7 @@ class RecoverArguments:
 
 
 def main(arguments: list[str]) -> int:
-    """Repair; 0 also when there was nothing to do."""
+    """Run `legbench recover`; its exit status is 0 also if there was nothing to repair."""
     chosen = parse(RecoverArguments, "recover", arguments)
     report = recover(chosen.run)
     if chosen.json:

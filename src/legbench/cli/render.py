@@ -20,13 +20,13 @@ class RenderArguments:
     out: Path = Path("leg.mp4")
     """File to write: .mp4, .gif, or .png for stills of one jump."""
     time: float | None = None
-    """Draw this one instant instead, .png only [s]."""
+    """Time of the one instant to draw instead, .png only [s]."""
     json: bool = False
     """Print one JSON object on stdout: the file."""
 
 
 def main(arguments: list[str]) -> int:
-    """Render."""
+    """Run `legbench render`."""
     chosen = parse(RenderArguments, "render", arguments)
     recording = load(chosen.run)
     from legbench.viz.film.render import render

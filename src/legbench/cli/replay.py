@@ -26,9 +26,9 @@ class ReplayArguments:
     against: UseAppendAction[tuple[Path, ...]] = ()
     """Another run to compare with and to draw over this one; may be repeated."""
     view: bool = False
-    """Open it in rerun."""
+    """Whether to open the run in rerun."""
     serve: bool = False
-    """Show it in a browser on this machine, until ^C."""
+    """Whether to show the run in a browser on this machine, until ^C."""
     rrd: Path | None = None
     """Write a rerun file that anyone can open."""
     figure: Path | None = None
@@ -38,7 +38,7 @@ class ReplayArguments:
 
 
 def main(arguments: list[str]) -> int:
-    """Replay; 0 also for a run that a fault had ended."""
+    """Run `legbench replay`; its exit status is 0 also for a run that a fault has ended."""
     chosen = parse(ReplayArguments, "replay", arguments)
     recording, *others = [_loaded(path) for path in (chosen.run, *chosen.against)]
     run, *against = [Analysis(each) for each in (recording, *others)]

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def plays_alone(experiment: Experiment) -> bool:
-    """Whether time is the computer's own to choose; drives on a wire keep their own."""
+    """Whether a plant runs in virtual time and may be paced; drives on a wire keep their own."""
     if experiment.plant.kind != "can":
         return True
     from legbench.plants import EMULATED, CanChoice
@@ -39,13 +39,13 @@ def period_of(experiment: Experiment) -> float:
 
 @dataclass(slots=True)
 class Watching:
-    """The live view of a run, if there is one."""
+    """Live view of a run, if there is one."""
 
     serve: bool
     view: "LiveView | None" = None
 
     def start(self, run: Path) -> None:
-        """Open the view; a machine that has none gets a note, the run goes on."""
+        """Open the view; where there is none, a note says so and the run goes on."""
         from legbench.viz.live.launch import start_live
 
         try:
@@ -57,13 +57,13 @@ class Watching:
             note(f"watch at {self.view.url}; `legbench replay {run} --serve` shows it again")
 
     def stop(self) -> None:
-        """Let the view show the last rows, and no more."""
+        """Let the view show the last rows, and end."""
         if self.view is not None:
             self.view.stop()
 
 
 def main(arguments: list[str]) -> int:
-    """Run a controller on a leg and record it.
+    """Run `legbench run`: a controller drives a leg, and the run is recorded.
 
     Returns:
         0 when the run came to its end or was stopped by ^C after its first row, 1 when a fault
@@ -102,7 +102,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _report(finished: "Finished", *, as_json: bool) -> int:
-    """Print how a run ended and what it is worth; its exit status."""
+    """Print how a run has ended and its figures; returns the exit status."""
     from legbench.cli.table import limited, print_summary
     from legbench.metrics import summarise
     from legbench.recording.reader import load

@@ -30,7 +30,7 @@ class CommonArguments:
     boom_radius: float | None = None
     """Length of the boom that guides the trunk in ffs [m]; by default a plane."""
     linkage: LinkageKind = LinkageKind.BARS
-    """Physical parallel bars, or the constraint they make."""
+    """Linkage of the segments: physical parallel bars, or the constraint that they make."""
     tip_radius: float = Ground().tip_radius
     """Radius of the rolling foot tip [m]."""
     plant: str = "sim"
@@ -39,9 +39,9 @@ class CommonArguments:
     limits: Path | None = None
     """Safety limits; on can by default limits.toml beside the bus file, elsewhere none."""
     setpoint: SetpointMeaning = SetpointMeaning.LINK
-    """Whether z2 is the link's equilibrium or the motor's position."""
+    """Meaning of z2: the link's equilibrium, or the motor's position."""
     convention: ModalConvention = ModalConvention.ORTHONORMAL
-    """How eq. (15) is read."""
+    """Reading of eq. (15), which scales the modal coordinates."""
     duration: float = 8.0
     """Length of the run [s]."""
     seed: int = 0
@@ -54,11 +54,11 @@ class CommonArguments:
     out: Path = Path("runs")
     """Folder of the runs."""
     real_time: bool = False
-    """Pace the simulation by the wall clock; watching does so, too."""
+    """Whether to pace the simulation by the wall clock; watching does so, too."""
     view: bool = False
-    """Watch live in rerun, from a process of its own."""
+    """Whether to watch the run live in rerun, from a process of its own."""
     serve: bool = False
-    """Watch live in a browser on this machine."""
+    """Whether to watch the run live in a browser on this machine."""
     json: bool = False
     """Print one JSON object on stdout."""
 
@@ -78,24 +78,24 @@ PLAIN = (float, int, bool, str, Path)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GuestFlag:
-    """A field of the settings of a controller, a plant or the servo as a flag."""
+    """Flag that stands for a field of the settings of a controller, a plant or the servo."""
 
     attribute: str
-    """Name in the arguments."""
+    """Name of the field in the parsed arguments."""
     key: str
-    """Place in an experiment file."""
+    """Dotted key in an experiment file."""
     name: str
-    """Flag without its dashes."""
+    """Name of the flag without its dashes."""
     hint: Any
     default: Any
-    """What the file says, else the class; MISSING where nobody says anything."""
+    """Default: the value of the file, else that of the class; MISSING where neither has one."""
     doc: str
 
 
 def guest_flags(
     place: str, kind: type[Any], taken: set[str], settings: Mapping[str, Any], folder: Path
 ) -> Iterator[GuestFlag]:
-    """Flags of some settings; one whose name is taken keeps its prefix.
+    """Flags of the fields of some settings; a field whose name is taken keeps its prefix.
 
     Args:
         place: where they stand in a file, such as `controller.settings`.
@@ -124,7 +124,7 @@ def guest_flags(
 
 
 def said(hint: Any, raw: Any, folder: Path, default: Any) -> Any:
-    """A value of a file, or the default where it says nothing that can be understood."""
+    """Value that a file has for a field, or the default where the file has none of its type."""
     if raw is None:
         return default
     value = Reader(folder=folder, specials=SPECIALS).value(hint, raw, "")
@@ -132,7 +132,7 @@ def said(hint: Any, raw: Any, folder: Path, default: Any) -> Any:
 
 
 def arguments_with(flags: list[GuestFlag], defaults: Mapping[str, Any]) -> type[Any]:
-    """The dataclass of all flags.
+    """Dataclass whose fields are all flags of the command.
 
     Args:
         flags: those of the guests.
@@ -154,7 +154,7 @@ def arguments_with(flags: list[GuestFlag], defaults: Mapping[str, Any]) -> type[
 
 
 def quick(hint: Any) -> Any:
-    """A type that tyro understands without its type checker, which is slow to import.
+    """Type that tyro understands without its type checker, which is slow to import.
 
     An enum becomes the choice of its values, `X | Y` becomes `Union[X, Y]`.
     """

@@ -1,4 +1,4 @@
-"""What `legbench run` was asked for: file, then `--set`, then flags, as one experiment."""
+"""The experiment that `legbench run` is asked for: the file, then `--set`, then flags."""
 
 from collections.abc import Sequence
 from dataclasses import MISSING, dataclass, field, fields
@@ -30,21 +30,21 @@ SCANNED = {"--setup": "setup.kind", "--linkage": "linkage.kind", "--plant": "pla
 
 
 class UsageError(ConfigError):
-    """Words of the command line that mean nothing."""
+    """Error for words of the command line that mean nothing."""
 
 
 @dataclass(slots=True, kw_only=True)
 class Scan:
-    """What the words of the command line say before any flag is understood."""
+    """Words of the command line that decide which flags there are."""
 
     subject: str | None = None
-    """Controller or experiment file."""
+    """Name of a controller, or path of an experiment file."""
     settings: list[str] = field(default_factory=list)
     """Texts behind `--set`."""
     values: dict[str, str] = field(default_factory=dict)
     """Flag -> its value, of those that must be known first."""
     rest: list[str] = field(default_factory=list)
-    """The words without the subject."""
+    """Words of the command line without the subject."""
 
 
 def scan(words: Sequence[str]) -> Scan:
@@ -71,24 +71,24 @@ class Tables:
 
     content: dict[str, Any]
     folder: Path
-    """What paths are relative to."""
+    """Folder to which paths are relative."""
     json: bool = False
 
     def put(self, key: str, value: Any) -> None:
-        """Replace one entry; raises ConfigError."""
+        """Replace the entry at a dotted key; raises ConfigError."""
         self.content = overlaid(self.content, key, value, self.folder)
 
     def here(self, path: Path) -> str:
-        """A path of the command line, which is relative to where the user is."""
+        """Path of the command line, which is relative to the present folder."""
         return str(path) if self.folder == Path() else str(path.absolute())
 
     def here_guest(self, name: str) -> str:
-        """The name of a kind of the command line; that of a file is relative to the user."""
+        """Name of a kind on the command line; that of a file is relative to the present folder."""
         place, colon, guest = name.rpartition(":")
         return f"{self.here(Path(place))}:{guest}" if colon and place.endswith(".py") else name
 
     def at(self, key: str) -> Any:
-        """The entry at a dotted key, None if there is none."""
+        """Entry at a dotted key, None if there is none."""
         entry: Any = self.content
         for name in key.split("."):
             entry = entry.get(name) if isinstance(entry, dict) else None
@@ -96,7 +96,7 @@ class Tables:
 
 
 def first_tables(words: Scan) -> Tables:
-    """The tables of the file, the run or the controller that was named, with `--set` in them.
+    """Tables of the file, the run or the controller that was named, with `--set` in them.
 
     Raises:
         LegbenchError: there is no such file or run, or a setting is none.
@@ -132,7 +132,7 @@ def first_tables(words: Scan) -> Tables:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Chosen:
-    """What the command line asks for."""
+    """Experiment and common flags that the command line asks for."""
 
     experiment: Experiment
     arguments: CommonArguments
@@ -171,7 +171,7 @@ def _command(scanned: Scan) -> str:
 
 
 def _flags(tables: Tables) -> list[GuestFlag]:
-    """The flags of the servo and of the chosen controller and plant."""
+    """Flags of the servo and of the chosen controller and plant."""
     taken = {entry.name for entry in fields(CommonArguments)}
     found: list[GuestFlag] = []
     for place, kind in (
@@ -223,7 +223,7 @@ def _field_names(kind: type[Any]) -> list[str]:
 
 
 def _said(tables: Tables) -> dict[str, Any]:
-    """What the tables say of the common flags."""
+    """Values that the tables hold for the common flags."""
     hints = get_type_hints(CommonArguments)
     found: dict[str, Any] = {}
     places = KEYS | {"setup": "setup.kind", "linkage": "linkage.kind", "plant": "plant.kind"}

@@ -1,15 +1,15 @@
-"""A run's figures for people."""
+"""Tables of figures of runs, for people."""
 
 import math
 
 from legbench.metrics import Comparison, Summary
 
 Row = tuple[str, float, str, float]
-"""Label, value, unit, factor from SI to that unit."""
+"""Row of a table: label, value, unit, and factor from SI to that unit."""
 
 
 def print_summary(summary: Summary) -> None:
-    """Print what a run showed; figures that it does not show are left out."""
+    """Print the figures of a run; those that it does not show are left out."""
     print(f"run               {summary.run}")
     ending = summary.status or "unknown"
     print(f"ended             {ending}" + (f": {summary.cause}" if summary.cause else ""))
@@ -38,7 +38,7 @@ def limited(summary: Summary) -> str:
 
 
 def print_comparison(comparison: Comparison) -> None:
-    """Print how another run differs; what one of the two does not show is left out."""
+    """Print how another run differs; figures that one of the two does not show are left out."""
     print()
     print(f"{'against':<17} {comparison.other}")
     print(f"{'':<17} {comparison.other_name} minus {comparison.run_name}")

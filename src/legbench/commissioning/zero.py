@@ -14,6 +14,7 @@ from legbench.drives.setup.encoders import Side
 from legbench.drives.setup.file_edit import Place, edit_file
 from legbench.drives.setup.units import AxisUnits
 from legbench.errors import ConfigError, RecordingError
+from legbench.writing import reason
 
 READS = 5
 """Number of reads of every encoder, which have to agree."""
@@ -103,4 +104,4 @@ def write(path: Path, zeros: Sequence[Zero], out: Path | None = None) -> Path:
     try:
         return edit_file(path, changes, out)
     except OSError as error:
-        raise RecordingError(f"cannot write offsets to {out or path}: {error.strerror}") from None
+        raise RecordingError(f"cannot write offsets to {out or path}: {reason(error)}") from None

@@ -1,4 +1,4 @@
-"""Controllers: one a file, for one leg or a batch; and the words to write one in."""
+"""Controllers, one in each file, for one leg or a batch, and the types to write another with."""
 
 from typing import TYPE_CHECKING
 

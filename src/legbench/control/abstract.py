@@ -1,4 +1,4 @@
-"""What the loop asks of a controller."""
+"""Interface of a controller, as the loop uses it."""
 
 from abc import ABC, abstractmethod
 
@@ -6,7 +6,7 @@ from legbench.signals import Command, Floats, Observation
 
 
 class AbstractController(ABC):
-    """Turns observations into commands; knows nothing of the plant behind them."""
+    """Controller that turns observations into commands; it knows nothing of the plant."""
 
     @property
     @abstractmethod
@@ -20,8 +20,8 @@ class AbstractController(ABC):
 
     @abstractmethod
     def reset(self, observation: Observation) -> None:
-        """Forget everything; `observation` is the leg at rest."""
+        """Begin anew; `observation` shows the leg at rest."""
 
     @abstractmethod
     def step(self, observation: Observation) -> Command:
-        """The command for the period that begins at `observation.time`."""
+        """Return the command for the period that begins at `observation.time`."""

@@ -14,7 +14,7 @@ from legbench.phases import ControllerDescription, Counting, PhaseInfo, Role
 from legbench.signals import Command, Floats, Ints, Observation
 
 RATED_PERIODS = 20
-"""The paper rates the first 20 periods of a sustained oscillation (Fig. 5)."""
+"""Number of periods of a sustained oscillation that the paper rates (Fig. 5)."""
 
 
 class BangBangPhase(IntEnum):
@@ -72,14 +72,14 @@ class BangBangConfig:
     delay: float = 0.1
     """Time at rest, to read the rest torque, before the first switch [s]."""
     sign: int = 1
-    """-1 inverts the law: it then brakes the mode. For demonstrations."""
+    """Sign of the law: -1 inverts it, so that it brakes the mode, for demonstrations."""
 
     def build(self, targets: LegTargets) -> AbstractController:
-        """The controller for these legs; raises ConfigError where they refuse the settings."""
+        """Make the controller for these legs; raises ConfigError where they refuse the settings."""
         return BangBang(self, targets)
 
     def describe(self) -> ControllerDescription:
-        """Its phases; the first 20 periods count."""
+        """Return its description: its phases, and that the first 20 periods count."""
         return ControllerDescription(phases=PHASES, counting=Counting(most=RATED_PERIODS))
 
 
@@ -122,7 +122,7 @@ class BangBang(AbstractController):
         return self._middle
 
     def reset(self, observation: Observation) -> None:
-        """Take the spring torque of the leg at rest as zero."""
+        """Begin anew with the spring torque of the leg at rest as zero."""
         self._rest_torque = self._targets.radial(observation.spring_torque)
         self._level = np.full(self._rest_torque.shape, BangBangPhase.STRETCHED, dtype=np.int64)
         self._going = np.zeros(self._rest_torque.shape, dtype=np.bool_)

@@ -1,4 +1,4 @@
-"""What a command must be before a plant or a recording sees it."""
+"""Check of a command before a plant or a recording sees it."""
 
 from math import isfinite
 from operator import index

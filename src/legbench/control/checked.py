@@ -1,4 +1,4 @@
-"""A guest's law held to the seam: what it says is checked, what it sees it cannot alter."""
+"""Check of a guest's law: its commands are checked, its observations cannot be altered."""
 
 from typing import final
 
@@ -14,7 +14,7 @@ LAW = {
     "reset": "reset(observation)",
     "step": "step(observation) -> Command",
 }
-"""What a law must have, and how it is written."""
+"""Members that a law must have, and how each is written."""
 CAUSE = "controller failed"
 """Cause of a run that a law has ended."""
 JOINTS = 2
@@ -47,12 +47,12 @@ class Checked(AbstractController):
 
     @property
     def start_motor_pos(self) -> Floats:
-        """The law's own, as an array (2,) [rad]."""
+        """Start posture of the law, as an array (2,) [rad]."""
         return self._start
 
     @property
     def law(self) -> AbstractController:
-        """The guest's own law."""
+        """Law of the guest, whose source a fault shows."""
         return self._law
 
     def reset(self, observation: Observation) -> None:
@@ -112,7 +112,7 @@ class Checked(AbstractController):
 
 
 def _floats(values: object, count: int, name: str) -> Floats:
-    """An array (count,), whatever sequence of numbers it was."""
+    """Return a sequence of numbers as an array (count,)."""
     try:
         array = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError):

@@ -1,4 +1,4 @@
-"""A batch of legs under laws that know one leg each."""
+"""Control of a batch of legs by laws that know one leg each."""
 
 from collections.abc import Iterator, Sequence
 from typing import final
@@ -14,13 +14,13 @@ class EachLeg(AbstractController):
     """Controller of a batch made of one law a leg; the laws may be plain floats and ifs."""
 
     def __init__(self, laws: Sequence[AbstractController]) -> None:
-        """Take the laws in the order of the legs; at least one."""
+        """Prepare for laws in the order of the legs, of which there is at least one."""
         self._laws = tuple(laws)
         self._start = np.array([law.start_motor_pos for law in self._laws])
 
     @property
     def start_motor_pos(self) -> Floats:
-        """One row a leg (n, 2) [rad]."""
+        """Start postures, one row for each leg (n, 2) [rad]."""
         return self._start
 
     def reset(self, observation: Observation) -> None:

@@ -40,7 +40,7 @@ class JumpConfig:
     release_load: float = 0.2
     """Load at which a push has lifted the leg, as a share of the load of standing [-]."""
     apex_turn: float = 0.01
-    """How far z2 must have come back from its extreme to tell an apex [rad]."""
+    """Change of z2 back from its extreme by which an apex is detected [rad]."""
     release_time: float = 0.03
     """Shortest time from release to the next flight [s]."""
     touchdown_time: float = 0.05
@@ -48,11 +48,11 @@ class JumpConfig:
     [s]."""
 
     def build(self, targets: LegTargets) -> AbstractController:
-        """The controller for these legs; raises ConfigError where they refuse the settings."""
+        """Make the controller for these legs; raises ConfigError where they refuse the settings."""
         return Jump(self, targets)
 
     def describe(self) -> ControllerDescription:
-        """Its phases; every period counts."""
+        """Return its description: its phases, and that every period counts."""
         return ControllerDescription(phases=phase_infos(self))
 
 
@@ -61,7 +61,7 @@ STANDING_ONLY = "the leg does not load its springs at rest; jumping needs setup 
 
 @final
 class Jump(AbstractController):
-    """Pumps the radial mode until the leg hops, and keeps it hopping.
+    """Controller that pumps the radial mode until the leg hops, and keeps it hopping.
 
     Raises:
         ConfigError: a set point that the leg cannot reach, thresholds out of order, a time that
@@ -84,7 +84,7 @@ class Jump(AbstractController):
         return self._folded
 
     def reset(self, observation: Observation) -> None:
-        """Take the load of the standing leg as the unit of load."""
+        """Begin anew with the load of the standing leg as the unit of load."""
         self._law.reset(observation)
 
     def step(self, observation: Observation) -> Command:
@@ -111,7 +111,7 @@ def _check(config: JumpConfig) -> None:
 
 @final
 class _OneLeg:
-    """The law of one leg in plain floats."""
+    """Law of one leg in plain floats."""
 
     def __init__(
         self, config: JumpConfig, targets: LegTargets, folded: Floats, stretched: Floats
@@ -170,7 +170,7 @@ def _fixed(motor_pos: Floats, phase: JumpPhase) -> Command:
 
 @final
 class _Batch:
-    """The law of many legs in arrays, one row a leg."""
+    """Law of many legs in arrays, one row for each leg."""
 
     def __init__(
         self, config: JumpConfig, targets: LegTargets, folded: Floats, stretched: Floats

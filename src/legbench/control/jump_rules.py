@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 class JumpPhase(IntEnum):
-    """What the jump controller is doing, as recorded."""
+    """Phases of the jump controller, as recorded."""
 
     REST = 0
     """The leg stands; its load is read."""
@@ -47,7 +47,7 @@ class PhaseExit:
     """The end of a phase: an apex, or a load that has lasted on one side of a level."""
 
     to: JumpPhase
-    """The phase after it."""
+    """Phase that follows."""
     apex: float = 0.0
     """1: largest fold (lower apex), -1: smallest fold (upper apex), 0: no apex ends it [-]."""
     sense: float = 1.0
@@ -59,7 +59,7 @@ class PhaseExit:
 
 
 def phase_exits(config: "JumpConfig") -> dict[JumpPhase, PhaseExit]:
-    """What ends each phase with these settings."""
+    """Return the end of each phase with these settings."""
     return {
         JumpPhase.REST: PhaseExit(to=JumpPhase.PUSH, dwell=config.delay),
         JumpPhase.PUSH: PhaseExit(

@@ -13,11 +13,11 @@ from legbench.phases import ControllerDescription, Counting, PhaseInfo, Role
 from legbench.signals import Command, Floats, Observation
 
 RATED_SHARE = 0.1
-"""Periods count while their amplitude exceeds this share of the deflection (Fig. 5)."""
+"""Share of the deflection that the amplitude of a period must exceed to count (Fig. 5) [-]."""
 
 
 class PositionJumpPhase(IntEnum):
-    """Whether the equilibrium has been moved, as recorded."""
+    """Phases of the position jump, as recorded: whether the equilibrium has been moved."""
 
     REST = 0
     """Equilibrium at z2 + dz2."""
@@ -41,11 +41,11 @@ class PositionJumpConfig:
     """Time at rest before the jump [s]."""
 
     def build(self, targets: LegTargets) -> AbstractController:
-        """The controller for these legs; raises ConfigError where they refuse the settings."""
+        """Make the controller for these legs; raises ConfigError where they refuse the settings."""
         return PositionJump(self, targets)
 
     def describe(self) -> ControllerDescription:
-        """Its phases; the periods count that exceed a tenth of the deflection."""
+        """Return its phases, and that periods count above a tenth of the deflection."""
         return ControllerDescription(
             phases=(
                 PhaseInfo(
@@ -64,7 +64,7 @@ class PositionJumpConfig:
 
 @final
 class PositionJump(AbstractController):
-    """Holds z2 + dz2, then z2 for good.
+    """Controller that holds z2 + dz2, then z2 until the end.
 
     Raises:
         ConfigError: a set point that the leg cannot reach, or a delay that makes no sense.
@@ -86,8 +86,8 @@ class PositionJump(AbstractController):
         return self._before
 
     def reset(self, observation: Observation) -> None:
-        """There is nothing to forget."""
+        """Begin anew, for which there is nothing to forget."""
 
     def step(self, observation: Observation) -> Command:
-        """The step comes at `delay`."""
+        """Command z2 + dz2 until `delay`, z2 afterwards."""
         return self._rest if observation.time < self._delay else self._stepped

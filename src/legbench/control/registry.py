@@ -18,4 +18,4 @@ CONTROLLERS: Final = Registry(
         "describe": "describe() -> ControllerDescription",
     },
 )
-"""Every controller that can be asked for."""
+"""Registry of every controller."""

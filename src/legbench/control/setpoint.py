@@ -16,12 +16,12 @@ from legbench.signals import Floats
 
 
 class SetpointMeaning(StrEnum):
-    """What z2 is a position of."""
+    """Meaning of the set point z2."""
 
     LINK = "link"
     """The link's equilibrium: the motor is placed so that the leg rests there under gravity."""
     MOTOR = "motor"
-    """The motor: the leg sags from it."""
+    """The motor's position, from which the leg sags."""
 
 
 def check_delay(delay: float) -> None:
@@ -48,7 +48,7 @@ class LegTargets:
     convention: ModalConvention = ModalConvention.ORTHONORMAL
 
     def each(self) -> Iterator["LegTargets"]:
-        """The targets of the single legs."""
+        """Set points of the single legs of a batch."""
         designs = [self.designs] if isinstance(self.designs, LegDesign) else self.designs
         for design in designs:
             yield replace(self, designs=design)

@@ -1,4 +1,4 @@
-"""What a controller brings to be found, built and measured, and how one leg's law serves many."""
+"""Settings of a controller, by which it is found, built and measured, for one leg or many."""
 
 from typing import ClassVar, Protocol, runtime_checkable
 
@@ -16,21 +16,21 @@ class ControllerSettings(Protocol):
     """Settings of a controller: a frozen dataclass whose fields become TOML keys and flags."""
 
     kind: ClassVar[str]
-    """Name in files and on the command line."""
+    """Name of the controller in files and on the command line."""
     usual_setup: ClassVar[SetupKind]
     """Setup in which the controller is usually run."""
 
     def build(self, targets: LegTargets) -> AbstractController:
-        """The controller for the legs of `targets`; raises ConfigError if they refuse it."""
+        """Make the controller for the legs of `targets`; raises ConfigError if they refuse it."""
         ...
 
     def describe(self) -> ControllerDescription:
-        """Its phases, its own signals, and which periods count."""
+        """Return its phases, its own signals, and which periods count."""
         ...
 
 
 def make_controller(settings: ControllerSettings, targets: LegTargets) -> AbstractController:
-    """The controller of some settings, for the legs of `targets`.
+    """Make the controller of some settings, for the legs of `targets`.
 
     Settings whose class says `batched` get all legs at once and are trusted, as the built-in ones
     are. Any other law is built once a leg, sees one leg alone, and has its commands checked.

@@ -1,4 +1,4 @@
-"""What a leg is made of: parameters, their file, and what they imply at rest."""
+"""Parameters of a leg, their file, and their consequences at rest."""
 
 from legbench.design.leg import LegDesign, Limits, Segment
 from legbench.design.toml import load_design, save_design

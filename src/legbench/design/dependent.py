@@ -33,7 +33,7 @@ MARGINS = (
     "a positive thigh inertia, condition (5)",
     "upright stability, condition (10)",
 )
-"""What has to be positive besides the bounds."""
+"""Names of the margins, which have to be positive besides the bounds."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,7 +44,7 @@ class Candidates:
     trunk_mass: float
     """[kg]"""
     stiffness: Floats
-    """k1 = k2 (...) [N m/rad]."""
+    """Stiffness of both springs, k1 = k2 (...) [N m/rad]."""
     relaxed_angle: Floats
     """Half angle at the relaxed length (...) [rad]."""
 
@@ -112,7 +112,7 @@ def margins(requirements: Requirements, candidates: Candidates) -> Floats:
 
 
 def cost(requirements: Requirements, free: Floats) -> Floats:
-    """What a search minimises (...): objective (11), or, where no leg exists, far more.
+    """Cost that a search minimises (...): objective (11), or, where no leg exists, far more [-].
 
     Legs that cannot exist are ordered by how far their margins are from positive.
     """
@@ -123,14 +123,14 @@ def cost(requirements: Requirements, free: Floats) -> Floats:
 
 
 def shortfall(margin: Floats) -> Floats:
-    """How much is missing (...) from margins (..., 5): zero where all are positive."""
+    """Sum (...) of what is missing from margins (..., 5): zero where all are positive [-]."""
     missing: Bools = ~(margin > 0.0)
     size = np.where(np.isfinite(margin), np.abs(margin), 1e3)
     return np.where(missing, size + 1e-9, 0.0).sum(axis=-1)
 
 
 def design_of(requirements: Requirements, free: Floats, name: str | None = None) -> LegDesign:
-    """The leg of one set of ratios (7,).
+    """Design of the leg with one set of ratios (7,).
 
     Raises:
         DesignError: no such leg can exist.

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from legbench.errors import DesignError
 
 LENGTH_TOLERANCE = 1e-9
-"""How far l2 may be from l1 + l3 [m]: rounding, not manufacture."""
+"""Largest difference of l2 and l1 + l3 [m]: rounding, not manufacture."""
 
 
 def _positive(what: str, value: float, unit: str) -> None:
@@ -23,13 +23,13 @@ class Segment:
     """
 
     mass: float
-    """[kg]"""
+    """Mass of the segment [kg]."""
     length: float
-    """[m]"""
+    """Length of the segment [m]."""
     com: float
     """Centre of mass, from the proximal joint towards the distal one [m]."""
     inertia: float
-    """About the centre of mass, in the plane of motion [kg m^2]."""
+    """Inertia about the centre of mass, in the plane of motion [kg m^2]."""
 
     def __post_init__(self) -> None:
         _positive("mass", self.mass, "kg")
@@ -80,14 +80,14 @@ class LegDesign:
 
     name: str
     trunk_mass: float
-    """[kg]"""
+    """Mass of the trunk [kg]."""
     thigh: Segment
     shank: Segment
     foot: Segment
     stiffness: tuple[float, float]
-    """Series springs 1 and 2, acting on q1 and q2 [N m/rad]."""
+    """Stiffness of series springs 1 and 2, acting on q1 and q2 [N m/rad]."""
     damping: tuple[float, float]
-    """Viscous, on q1 and q2 [N m s/rad]."""
+    """Viscous damping of q1 and q2 [N m s/rad]."""
     limits: Limits = field(default_factory=Limits)
 
     def __post_init__(self) -> None:
@@ -109,12 +109,12 @@ class LegDesign:
 
     @property
     def segments(self) -> tuple[Segment, Segment, Segment]:
-        """Thigh, shank, foot."""
+        """Segments in the order thigh, shank, foot."""
         return (self.thigh, self.shank, self.foot)
 
     @property
     def lengths(self) -> tuple[float, float, float]:
-        """l1, l2, l3 [m]."""
+        """Lengths l1, l2, l3 of the segments [m]."""
         return (self.thigh.length, self.shank.length, self.foot.length)
 
     @property
@@ -124,5 +124,5 @@ class LegDesign:
 
     @property
     def total_mass(self) -> float:
-        """Trunk and leg [kg]."""
+        """Mass of trunk and leg [kg]."""
         return self.trunk_mass + self.leg_mass

@@ -38,7 +38,7 @@ class Inertial:
     com: Floats
     """Distance of each centre of mass from the proximal joint (..., 3) [m]."""
     inertia: Floats
-    """About the centre of mass (..., 3) [kg m^2]."""
+    """Inertias about the centres of mass (..., 3) [kg m^2]."""
 
     @classmethod
     def of(cls, design: LegDesign) -> "Inertial":
@@ -56,7 +56,7 @@ def _split(values: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def inertia_terms(leg: Inertial) -> Floats:
-    """The terms of eq. (5), as printed (..., 11) [kg m^2]; the trunk's mass cancels."""
+    """Terms of eq. (5), as printed (..., 11) [kg m^2]; the trunk's mass cancels."""
     (m1, m2, m3), (l1, _, l3), (c1, c2, c3) = map(_split, (leg.mass, leg.length, leg.com))
     i1, i2, i3 = _split(leg.inertia)
     terms = (
@@ -76,7 +76,7 @@ def inertia_terms(leg: Inertial) -> Floats:
 
 
 def gravity_terms(leg: Inertial) -> Floats:
-    """The terms of `t1 + t3 - t2`, eq. (9) with its first sign corrected (..., 3) [kg m]."""
+    """Terms of `t1 + t3 - t2`, eq. (9) with its first sign corrected (..., 3) [kg m]."""
     (m1, m2, m3), (l1, _, l3), (c1, c2, c3) = map(_split, (leg.mass, leg.length, leg.com))
     return np.stack((-m1 * c1, m3 * (l3 - c3), -m2 * (l1 - c2)), axis=-1)
 
@@ -84,7 +84,7 @@ def gravity_terms(leg: Inertial) -> Floats:
 def upright_terms(
     leg: Inertial, trunk_mass: Floats, stiffness: Floats, half_angle: Floats
 ) -> Floats:
-    """The terms of eq. (10), d(tau - g)/dx1 of the leg standing at x1 = 0 (..., 3) [N m/rad].
+    """Terms of eq. (10), d(tau - g)/dx1 of the leg standing at x1 = 0 (..., 3) [N m/rad].
 
     Args:
         leg: the segments.
@@ -102,7 +102,7 @@ def upright_terms(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Condition:
-    """How well a leg meets one condition."""
+    """Residual by which a leg misses one condition, and its scale."""
 
     name: str
     """`inertia`, `elastic`, `gravity`, `damping` or `stability`."""
@@ -127,7 +127,7 @@ class Condition:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parameters:
-    """Everything that the conditions depend on."""
+    """Parameters on which the conditions depend."""
 
     leg: Inertial
     trunk_mass: float

@@ -1,4 +1,4 @@
-"""What would mend a condition of modal matching: one parameter, changed by how much."""
+"""Changes of one parameter each by which a condition of modal matching would be met."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -23,15 +23,15 @@ class Mend:
     """Key of the design file, such as `thigh.inertia`, with the paper's symbol."""
     unit: str
     value: float
-    """What the parameter is."""
+    """Present value of the parameter."""
     change: float
-    """What has to be added to it."""
+    """Amount to be added to the parameter."""
     moves: tuple[str, ...]
     """Other conditions that this change alters."""
 
     @property
     def share(self) -> float:
-        """The change relative to the value [-]."""
+        """Change relative to the present value [-]."""
         return self.change / self.value if self.value else float("inf")
 
 

@@ -1,4 +1,4 @@
-"""What a leg is designed for: masses, lengths and stiffness, bounds, and what is preferred."""
+"""Requirements of a leg: masses, lengths and stiffness, bounds, and preferences."""
 
 import math
 from collections.abc import Mapping
@@ -12,6 +12,7 @@ from legbench.design.leg import Limits
 from legbench.design.toml import UNITS, Table, load_tables, tables_to_toml, units_per_si
 from legbench.errors import DesignError
 from legbench.signals import Floats
+from legbench.writing import save_whole
 
 REQUIREMENT_UNITS: dict[str, dict[str, float]] = {
     "mass": UNITS["mass"],
@@ -30,7 +31,7 @@ LEG_KEYS = {
     "leg_stiffness": "leg_stiffness",
     "damping": "damping",
 }
-"""Keys of `[leg]` and their quantity."""
+"""Quantity of each key of `[leg]`."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,19 +71,19 @@ class Bounds:
     """
 
     relaxed_length: Range = field(default=Range(lower=0.6, start=0.8, upper=0.95))
-    """l_o / (l1 + l2 + l3)"""
+    """Relaxed length of the leg, l_o / (l1 + l2 + l3) [-]."""
     thigh_length: Range = field(default=Range(lower=0.1, start=0.6, upper=0.9))
-    """l1 / (l1 + l3)"""
+    """Share of the thigh in thigh and foot, l1 / (l1 + l3) [-]."""
     thigh_com: Range = field(default=Range(lower=0.15, start=0.45, upper=0.5))
-    """c1 / l1"""
+    """Centre of mass of the thigh, c1 / l1 [-]."""
     shank_com: Range = field(default=Range(lower=0.15, start=0.45, upper=0.5))
-    """c2 / l2"""
+    """Centre of mass of the shank, c2 / l2 [-]."""
     foot_com: Range = field(default=Range(lower=0.15, start=0.45, upper=0.5))
-    """c3 / l3"""
+    """Centre of mass of the foot, c3 / l3 [-]."""
     shank_inertia: Range = field(default=Range(lower=1 / 16, start=1 / 12, upper=0.5))
-    """I2 / (m2 l2^2)"""
+    """Inertia of the shank, I2 / (m2 l2^2) [-]."""
     foot_inertia: Range = field(default=Range(lower=1 / 16, start=1 / 12, upper=0.5))
-    """I3 / (m3 l3^2)"""
+    """Inertia of the foot, I3 / (m3 l3^2) [-]."""
 
     def __post_init__(self) -> None:
         for name in VARIABLES:
@@ -120,7 +121,7 @@ VARIABLES = tuple(entry.name for entry in fields(Bounds))
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Weights:
-    """What objective (11) weighs; its own values by default.
+    """Weights of objective (11); the paper's by default.
 
     Raises:
         DesignError: a negative weight, or none at all.
@@ -149,13 +150,13 @@ class Requirements:
 
     name: str = "paper"
     total_mass: float = 1.0
-    """Trunk and leg, m_sys [kg]."""
+    """Mass of trunk and leg, m_sys [kg]."""
     leg_mass: float = 0.363
-    """m_leg, printed as 0.36 [kg]: with 0.363 every entry of Table II comes out."""
+    """Mass of the leg, m_leg [kg]: printed as 0.36; 0.363 gives every entry of Table II."""
     leg_com: float = 0.068
     """Centre of mass of the stretched leg below the hip, c_leg [m]."""
     relaxed_length: float = 0.253
-    """l_o [m]"""
+    """Relaxed length of the leg, l_o [m]."""
     leg_stiffness: float = 905.0
     """Radial stiffness at the relaxed length, k_leg [N/m]."""
     damping: float = 0.0073
@@ -264,5 +265,9 @@ def load_requirements(path: Path) -> Requirements:
 
 
 def save_requirements(requirements: Requirements, path: Path) -> None:
-    """Write a requirements file in SI units; `load_requirements` gives the same back."""
-    path.write_text(tables_to_toml(requirements_to_mapping(requirements)), encoding="utf-8")
+    """Write a requirements file in SI units; `load_requirements` gives the same back.
+
+    Raises:
+        ConfigError: it cannot be written; an older file is untouched.
+    """
+    save_whole(path, tables_to_toml(requirements_to_mapping(requirements)))

@@ -14,7 +14,7 @@ from legbench.errors import DesignError
 REFERENCE_MASS = 4.0
 """Body mass for which the paper states its values [kg]."""
 LEGS = 4
-"""Each carries its share of the body (section III-B)."""
+"""Number of legs, each of which carries its share of the body (section III-B)."""
 
 LEG_MASS_EXPONENT = 1.0
 """Limb mass, 44 species: Kilbourne and Hoffman 2013, doi 10.1371/journal.pone.0078392."""

@@ -53,7 +53,7 @@ class Setup:
 
     @property
     def support(self) -> Support:
-        """What carries the weight at rest."""
+        """Support that carries the weight at rest."""
         return SUPPORTS[self.kind]
 
     @property

@@ -1,4 +1,4 @@
-"""What gravity makes of a leg at rest: torques, and which motor position holds which posture."""
+"""Statics of a leg: torques of gravity, and motor positions that hold a posture."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -10,11 +10,11 @@ from legbench.errors import DesignError
 from legbench.signals import Bools, Floats
 
 GRAVITY = 9.81
-"""[m/s^2]"""
+"""Acceleration of gravity [m/s^2]."""
 
 
 class Support(StrEnum):
-    """What carries the leg's weight."""
+    """Support that carries the leg's weight."""
 
     FOOT = "foot"
     """The foot is pinned, the trunk rests on the leg (FFS, stance)."""
@@ -32,15 +32,15 @@ class GravityLoad:
     """
 
     moment: tuple[float, float]
-    """[N m]; negative where gravity drives the segment away from straight down."""
+    """Moments of gravity [N m]; negative where it drives a segment away from straight down."""
 
     def torque(self, joint_pos: Floats) -> Floats:
-        """g(q) = dV/dq (..., 2) [N m]."""
+        """Torque of gravity, g(q) = dV/dq (..., 2) [N m]."""
         return np.asarray(self.moment) * np.sin(joint_pos)
 
 
 def gravity_load(design: LegDesign, support: Support) -> GravityLoad:
-    """Gravity's moments on q1 and q2 for a way of carrying the leg."""
+    """Load of gravity on q1 and q2 with a support."""
     thigh, shank, foot = design.segments
     if support is Support.NONE:
         return GravityLoad(moment=(0.0, 0.0))

@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 from legbench.design.leg import LegDesign, Limits, Segment
 from legbench.errors import DesignError
 from legbench.reading import UnreadableError, read_toml
+from legbench.writing import save_whole
 
 Built = TypeVar("Built")
 
@@ -29,7 +30,7 @@ SECTIONS = ("units", "trunk", "thigh", "shank", "foot", "springs", "limits")
 
 
 class Table:
-    """One table of the file: hands out numbers in SI, knows which keys were asked for."""
+    """One table of the file, which gives numbers in SI and remembers which keys were read."""
 
     def __init__(self, name: str, content: Mapping[str, Any], per_si: Mapping[str, float]) -> None:
         if not isinstance(content, Mapping):
@@ -38,7 +39,7 @@ class Table:
         self.left = set(content)
 
     def number(self, key: str, quantity: str) -> float:
-        """The number under `key`, in SI.
+        """Return the number under `key`, in SI.
 
         Raises:
             DesignError: it is missing, or no number.
@@ -49,7 +50,7 @@ class Table:
         return self._si(key, self.content[key], quantity)
 
     def pair(self, key: str, quantity: str) -> tuple[float, float]:
-        """The two numbers under `key`, in SI.
+        """Return the two numbers under `key`, in SI.
 
         Raises:
             DesignError: they are missing, or not two numbers.
@@ -58,7 +59,7 @@ class Table:
         return (low, high)
 
     def numbers(self, key: str, quantity: str, names: Sequence[str]) -> tuple[float, ...]:
-        """The numbers under `key`, in SI, one for each of `names`.
+        """Return the numbers under `key`, in SI, one for each of `names`.
 
         Raises:
             DesignError: they are missing, too few or too many, or not numbers.
@@ -79,7 +80,7 @@ class Table:
             raise DesignError(f"[{self.name}] '{key}' is too large for a number") from None
 
     def finish(self) -> None:
-        """Refuse the keys that nobody asked for.
+        """Refuse the keys that were not read.
 
         Raises:
             DesignError: there are some; the message names them.
@@ -165,7 +166,7 @@ def load_design(path: Path | str) -> LegDesign:
 
 
 def load_tables(path: Path, build: Callable[[Mapping[str, Any]], Built], hint: str) -> Built:
-    """What `build` makes of the tables of a TOML file.
+    """Return what `build` makes of the tables of a TOML file.
 
     Raises:
         DesignError: the file is missing (`hint` says what there is), is not TOML, or `build`
@@ -195,8 +196,12 @@ def design_to_mapping(design: LegDesign) -> dict[str, Any]:
 
 
 def save_design(design: LegDesign, path: Path | str) -> None:
-    """Write a design file in SI units; `load_design` gives the same design back, bit for bit."""
-    Path(path).write_text(tables_to_toml(design_to_mapping(design)), encoding="utf-8")
+    """Write a design file in SI units; `load_design` gives the same design back, bit for bit.
+
+    Raises:
+        ConfigError: it cannot be written; an older file is untouched.
+    """
+    save_whole(Path(path), tables_to_toml(design_to_mapping(design)))
 
 
 def tables_to_toml(tables: Mapping[str, Any]) -> str:

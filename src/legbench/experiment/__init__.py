@@ -1,4 +1,4 @@
-"""What is to happen as one value, its file and its name, and what running it leaves.
+"""Experiments: a run as one value, its file, its name, and its running.
 
 Names are loaded when they are asked for: describing an experiment costs no simulator.
 """

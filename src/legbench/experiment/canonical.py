@@ -1,4 +1,4 @@
-"""One text for every experiment, and its hash: the name of what is to happen."""
+"""Canonical text of an experiment, and its hash, which names the experiment."""
 
 import hashlib
 from typing import Any
@@ -10,7 +10,7 @@ from legbench.experiment.writing import flat
 
 
 def canonical_text(experiment: Experiment) -> str:
-    """Format line, then sorted `dotted.key = value` in SI: equal texts are equal experiments.
+    """Canonical text: a format line, then sorted `dotted.key = value` in SI.
 
     Defaults are written, so that a new default gives a new name and an old name its old meaning.
     None is left out: a field that is added later says by its absence what was done before it.

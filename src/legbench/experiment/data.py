@@ -19,7 +19,7 @@ from legbench.plants import PLANTS, SimChoice
 from legbench.servo import ServoConfig
 
 LARGEST_SEED: Final = (1 << 63) - 1
-"""TOML and most generators hold no larger whole number."""
+"""Largest seed: TOML and most generators hold no larger whole number."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,16 +27,16 @@ class Conventions:
     """How the paper's formulas are read."""
 
     modal: ModalConvention = ModalConvention.ORTHONORMAL
-    """Scale of the modal coordinates, eq. (15)."""
+    """Reading of eq. (15), which scales the modal coordinates."""
     setpoint: SetpointMeaning = SetpointMeaning.LINK
-    """Whether z2 is the link's equilibrium or the motor's position."""
+    """Meaning of z2: the link's equilibrium, or the motor's position."""
     rating_reference: Literal["motor", "equilibrium"] = "motor"
-    """What a deflection is measured from, q_d of eq. (14)."""
+    """Reference from which a deflection is measured, q_d of eq. (14)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Experiment:
-    """Everything that decides a run.
+    """Experiment: everything that decides a run.
 
     Raises:
         ConfigError: a duration that is shorter than a cycle, or endless; a seed that is negative;
@@ -46,21 +46,21 @@ class Experiment:
     design: LegDesign
     """Leg, as in a design file."""
     controller: ControllerSettings = field(metadata={REGISTRY: CONTROLLERS})
-    """Kind and settings of what drives the leg."""
+    """Kind and settings of the controller."""
     setup: Setup = field(default_factory=Setup)
-    """How the leg is held."""
+    """Setup in which the leg is held."""
     linkage: Linkage = field(default_factory=Linkage)
-    """What couples the segments."""
+    """Linkage that couples the segments."""
     ground: Ground = field(default_factory=Ground)
-    """What the leg stands on."""
+    """Ground that the leg stands on."""
     numerics: Numerics = field(default_factory=Numerics)
-    """How the simulation is integrated."""
+    """Numerics of the simulation."""
     servo: ServoConfig = field(default_factory=ServoConfig)
-    """What a simulated drive makes of a command."""
+    """Limits of a simulated drive."""
     conventions: Conventions = field(default_factory=Conventions)
     """How the paper's formulas are read."""
     plant: PlantSettings = field(default_factory=SimChoice, metadata={REGISTRY: PLANTS})
-    """Kind and settings of what is driven."""
+    """Kind and settings of the plant."""
     duration: float = 8.0
     """Length of the run [s]."""
     seed: int = 0
@@ -80,7 +80,7 @@ class Experiment:
 
     @property
     def options(self) -> BuildOptions:
-        """What the model is made of besides the design."""
+        """Options of the model besides the design."""
         return BuildOptions(
             setup=self.setup, linkage=self.linkage, ground=self.ground, numerics=self.numerics
         )

@@ -1,4 +1,4 @@
-"""What the docstrings under the fields of a dataclass say."""
+"""Docstrings under the fields of a dataclass."""
 
 import ast
 import inspect
@@ -13,7 +13,7 @@ _UNIT = re.compile(r"\[([^\[\]]+)\]\.?\s*$")
 
 
 def field_docs(kind: type[Any]) -> dict[str, str]:
-    """Field -> its docstring on one line; empty where the source cannot be had."""
+    """Docstring of each field on one line; empty where the source cannot be read."""
     try:
         tree = ast.parse(textwrap.dedent(inspect.getsource(kind)))
     except (OSError, TypeError, SyntaxError):
@@ -29,7 +29,7 @@ def field_docs(kind: type[Any]) -> dict[str, str]:
 
 
 def unit_comments(value: Any, tables: Mapping[str, Any], at: str = "") -> dict[str, str]:
-    """Dotted key -> unit in brackets, for the tables that were made of a dataclass."""
+    """Unit in brackets of each dotted key, for the tables that were made of a dataclass."""
     found: dict[str, str] = {}
     docs = field_docs(type(value))
     for entry in fields(value):

@@ -9,7 +9,7 @@ from legbench.experiment.data import Experiment
 from legbench.experiment.docs import unit_comments
 from legbench.experiment.tables import FORMAT, read_tables, read_toml, write_tables
 from legbench.experiment.toml_text import toml_text
-from legbench.recording.files import reason, write_whole
+from legbench.writing import save_whole
 
 HEADER = "# An experiment of legbench; units are in brackets, paths are relative to this file.\n"
 
@@ -36,10 +36,7 @@ def save_experiment(experiment: Experiment, path: Path | str) -> None:
         ConfigError: the file cannot be written, or a guest lives in no file.
     """
     path = Path(path)
-    try:
-        write_whole(path, experiment_text(experiment, path.parent).encode())
-    except OSError as error:
-        raise ConfigError(f"cannot write {path}: {reason(error)}") from None
+    save_whole(path, experiment_text(experiment, path.parent))
 
 
 def experiment_text(experiment: Experiment, folder: Path | None = None) -> str:

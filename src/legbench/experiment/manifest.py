@@ -1,4 +1,4 @@
-"""What a run says of itself in `run.json`: the experiment, its provenance, what was found."""
+"""Content of `run.json`: the experiment, its provenance, and what was found."""
 
 import hashlib
 import platform
@@ -30,14 +30,14 @@ RECORDED_PACKAGES: Final = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GuestFile:
-    """The source of a guest, of which a copy is kept in the run folder."""
+    """Source of a guest, of which a copy is kept in the run folder."""
 
     what: str
-    """`controller` or `plant`."""
+    """Role of the guest: `controller` or `plant`."""
     name: str
-    """File name in the run folder."""
+    """Name of the copy in the run folder."""
     reference: str
-    """What finds the class: its file's copy for a class from a file, else an importable name."""
+    """Text that finds the class: the copy of its file, or an importable name."""
     content: bytes
 
 
@@ -71,7 +71,7 @@ def manifest_of(
     facts: Mapping[str, Any],
     folder: Path | None,
 ) -> dict[str, Any]:
-    """What a run has to say of itself; everything that a reader needs to judge or repeat it.
+    """Return the manifest of a run: everything that a reader needs to judge or repeat it.
 
     Args:
         experiment: what is to happen.

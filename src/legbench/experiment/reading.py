@@ -18,34 +18,34 @@ TAGS: Final = ("kind", "family")
 NUMBER_TEXTS: Final = ("nan", "inf", "-inf")
 """Floats that JSON has to spell out."""
 BAD: Final = object()
-"""What stands for a value that was refused; the reason is among the problems."""
+"""Placeholder of a value that was refused; the reason is among the problems."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Special:
-    """A class whose tables have words of their own, or which may be given as a file."""
+    """Codec of a class whose tables have words of their own, or which may be given as a file."""
 
     load: Callable[[Path], Any]
-    """Reads a file that stands for the value."""
+    """Function that reads a file which stands for the value."""
     decode: Callable[[Mapping[str, Any]], Any] | None = None
-    """Reads its tables; by default they are its fields."""
+    """Function that reads its tables; by default they are its fields."""
     structure: Mapping[str, Any] | None = None
     """Example of all tables that it may have, to name misspelt keys by."""
 
 
 @dataclass(slots=True, kw_only=True)
 class Reader:
-    """Builds values and collects what is wrong with their tables."""
+    """Reader that builds values and collects what is wrong with their tables."""
 
     folder: Path
-    """What paths are relative to."""
+    """Folder to which paths are relative."""
     specials: Mapping[type, Special]
     json: bool = False
     """Whether floats may be the texts that JSON needs for those it lacks."""
     problems: list[str] = field(default_factory=list)
 
     def read(self, kind: type[Any], tables: Mapping[str, Any]) -> Any:
-        """A dataclass from its tables.
+        """Return a dataclass from its tables.
 
         Raises:
             ConfigError: something is wrong with them; all of it is told, with its dotted key.
@@ -56,12 +56,12 @@ class Reader:
         return value
 
     def refuse(self, at: str, why: str) -> Any:
-        """Remember a problem."""
+        """Add a problem to those that are told in the end."""
         self.problems.append(f"{at}: {why}" if at else why)
         return BAD
 
     def table(self, kind: type[Any], raw: object, at: str) -> Any:
-        """A dataclass from a table."""
+        """Return a dataclass from one table."""
         if not isinstance(raw, Mapping):
             return self.refuse(at, f"is {raw!r}; it must be a table")
         known = {entry.name: entry for entry in fields(kind) if entry.init}
@@ -88,7 +88,7 @@ class Reader:
         return self.value(hint, raw, at) if registry is None else self.guest(registry, raw, at)
 
     def unknown(self, raw: Mapping[str, Any], known: Iterable[str], at: str) -> None:
-        """Remember the keys that are not known, each with the nearest that is."""
+        """Add the keys that are not known to the problems, each with the nearest that is."""
         names = list(known)
         for key in raw:
             if key in names:
@@ -98,7 +98,7 @@ class Reader:
             self.refuse(joined(at, str(key)), f"unknown key; {hint}known are {', '.join(names)}")
 
     def guest(self, registry: Registry, raw: object, at: str) -> Any:
-        """Settings of a controller or plant: a table with `kind` and `settings`."""
+        """Return the settings of a controller or plant from a table with `kind` and `settings`."""
         if not isinstance(raw, Mapping):
             return self.refuse(at, f"is {raw!r}; it must be a table with kind and settings")
         self.unknown(raw, ("kind", "settings"), at)
@@ -112,7 +112,7 @@ class Reader:
         return self.table(kind, raw.get("settings", {}), f"{at}.settings")
 
     def value(self, hint: Any, raw: object, at: str) -> Any:
-        """A value of a type."""
+        """Return a value of a type."""
         origin = get_origin(hint)
         if origin in (Union, UnionType):
             return self._union(get_args(hint), raw, at)

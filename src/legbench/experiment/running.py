@@ -28,7 +28,7 @@ from legbench.verdict import answered, stopped_well
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finished:
-    """A run that has ended, one way or another."""
+    """Run that has ended, with its folder and its outcome."""
 
     path: Path
     outcome: Outcome
@@ -36,13 +36,13 @@ class Finished:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Prepared:
-    """An experiment whose plant is open and waits for its reset."""
+    """Experiment whose plant is open and waits for its reset."""
 
     experiment: Experiment
     controller: AbstractController
     start: Start
     xml: str
-    """The model."""
+    """MJCF text of the model."""
     opened: OpenPlant
 
     @property
@@ -51,7 +51,7 @@ class Prepared:
         return f"{self.experiment.controller.kind}-{self.experiment.design.name}"
 
     def manifest(self, folder: Path | None) -> dict[str, Any]:
-        """What the run has to say of itself in `folder`; raises as `manifest_of`."""
+        """Manifest of the run in `folder`; raises as `manifest_of`."""
         period = self.opened.plant.period
         return manifest_of(self.experiment, self.start, self.xml, period, self.opened.facts, folder)
 
@@ -207,7 +207,7 @@ def _end(
     onlookers: Sequence[Onlooker],
     outcome: Outcome,
 ) -> Outcome:
-    """Close the plant, then the run, with what both have to tell; how it has really ended."""
+    """Close the plant, then the run, and record what both report; returns how the run has ended."""
     outcome = answered(outcome, opened.gone())
     opened.plant.close()
     outcome = stopped_well(outcome, opened.trouble())
@@ -230,6 +230,6 @@ def _tell(
 
 
 def _add_trouble(error: BaseException, trouble: str | None) -> None:
-    """Give an exception what a person beside the plant has to know as a note, once."""
+    """Add to an exception, once, a note on what a person beside the plant has to know."""
     if trouble is not None and trouble not in getattr(error, "__notes__", ()):
         error.add_note(trouble)

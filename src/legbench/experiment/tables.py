@@ -1,4 +1,4 @@
-"""The words of an experiment's tables, from a file, a run or flags; knows no class of its own."""
+"""Tables of an experiment, from a file, a run or flags."""
 
 import tomllib
 from collections.abc import Mapping
@@ -16,9 +16,9 @@ from legbench.limits.safety import SafetyLimits
 
 Read = TypeVar("Read")
 FORMAT: Final = 1
-"""Rises when an older reader would misunderstand an experiment file."""
+"""Version of the format; it rises when an older reader would misunderstand an experiment file."""
 USUAL_PLANT: Final = "sim"
-"""Plant of an experiment that names none."""
+"""Plant of an experiment whose file names none."""
 _SEGMENT: Final = {"mass": 0, "length": 0, "com": 0, "inertia": 0}
 _DESIGN: Final = {
     "name": "",

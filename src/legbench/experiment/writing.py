@@ -14,17 +14,17 @@ from legbench.guests import Registry
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Writer:
-    """Makes tables of plain values; None is left out."""
+    """Writer that makes tables of plain values; None is left out."""
 
     tables_of: Mapping[type, Callable[[Any], dict[str, Any]]]
     """Classes whose tables have words of their own."""
     folder: Path | None = None
-    """What paths are made relative to; none: they are told as they are."""
+    """Folder that paths are made relative to; without it they are written as they are."""
     where: bool = True
     """Whether to write what says where something is, not what."""
 
     def write(self, value: Any) -> dict[str, Any]:
-        """The tables of a dataclass."""
+        """Return the tables of a dataclass."""
         kind = type(value)
         own = self.tables_of.get(kind)
         if own is not None:
@@ -43,7 +43,7 @@ class Writer:
         return self.plain(hint, value) if registry is None else self.guest(registry, value)
 
     def guest(self, registry: Registry, settings: Any) -> dict[str, Any]:
-        """Kind and settings of a controller or plant."""
+        """Return kind and settings of a controller or plant as tables."""
         kind = registry.reference(type(settings)) if self.where else str(settings.kind)
         place, colon, name = kind.rpartition(":")
         if place.endswith(".py"):
@@ -53,7 +53,7 @@ class Writer:
         return found | {"settings": content} if content else found
 
     def plain(self, hint: Any, value: Any) -> Any:
-        """A value of a type, as a file has it."""
+        """Return a value of a type, as a file has it."""
         if value is None:
             return None
         origin, inner = get_origin(hint), get_args(hint)

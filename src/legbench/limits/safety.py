@@ -26,6 +26,10 @@ START_TOLERANCE = 0.002
 """A motor that was led to the end of its range may show it so far outside [rad]."""
 
 
+OVERRUNS = "cycle overruns"
+"""Cause of a run that ends because the loop has missed too many ticks in a row."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SafetyLimits:
     """What the leg may do; a limit that is not given does not act.

@@ -76,12 +76,12 @@ class Analysis:
 
     @cached_property
     def periods(self) -> Periods:
-        """Oscillation periods that count."""
+        """Oscillation periods that count in the rating."""
         return find_periods(self.trajectory, self.first_action, self.description.counting)
 
     @cached_property
     def ratings(self) -> RunRatings:
-        """RatingLists of stances and flights in a jump, of periods in any other setup."""
+        """Ratings of stances and flights in a jump, of periods in any other setup."""
         return rate_run(self, self.gait, None if self.description.jumps else self.periods)
 
     @cached_property

@@ -20,17 +20,17 @@ class EnergyBudget:
     """
 
     gain: Floats
-    """What the leg has more of at the next lower apex: zero in a limit cycle."""
+    """Energy that the leg has gained from one lower apex to the next: zero in a limit cycle."""
     motor_work: Floats
     damper_loss: Floats
     impact_loss: Floats
-    """Unexplained in the first `MINIMUM_PHASE` after touchdown."""
+    """Unexplained energy in the first `MINIMUM_PHASE` after touchdown."""
     stop_loss: Floats
-    """Unexplained while a joint is at a stop."""
+    """Unexplained energy while a joint is at a stop."""
     contact_loss: Floats
-    """Unexplained in the rest of stance: sliding, yielding ground."""
+    """Unexplained energy in the rest of stance: sliding, yielding ground."""
     other_loss: Floats
-    """Unexplained in the rest of flight: friction, numerics."""
+    """Unexplained energy in the rest of flight: friction, numerics."""
 
 
 def energy_budget(recording: Recorded, gait: Gait, flows: Flows) -> EnergyBudget:

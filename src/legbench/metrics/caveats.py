@@ -1,4 +1,4 @@
-"""What a run does not show although its reader may look for it, in words."""
+"""Caveats of a run in words: what it does not show although its reader may look for it."""
 
 import numpy as np
 

@@ -24,11 +24,11 @@ class Flows:
     gain: Floats
     """Change of gravitational, kinetic and spring energy together."""
     motor_work: Floats
-    """U(theta_k+1, q_k) - U(theta_k, q_k): the motor moves within the interval's first instant."""
+    """Work of the motors, U(theta_k+1, q_k) - U(theta_k, q_k), in an interval's first instant."""
     damper_loss: Floats
     """Viscous loss in both joints."""
     unexplained: Floats
-    """The rest: contact, impact, stops, friction, and what the numerics make or lose."""
+    """Unexplained rest: contact, impact, stops, friction, and what the numerics make or lose."""
 
 
 def spring_energy(design: LegDesign, motor_pos: Floats, joint_pos: Floats) -> Floats:

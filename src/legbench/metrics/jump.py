@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from legbench.kinematics import joint_to_polar
+from legbench.kinematics import joint_to_polar, polar_angle
 from legbench.metrics.phases import Gait
 from legbench.metrics.source import Recorded
 from legbench.signals import Floats
@@ -24,7 +24,7 @@ class JumpFigures:
     """
 
     count: int
-    """Complete jumps in the whole run."""
+    """Number of complete jumps in the whole run."""
     first: int
     """Index of the first jump of the limit cycle, the first that begins `settle` seconds or more
     after the first control action; equal to `count` when none does."""
@@ -40,11 +40,11 @@ class JumpFigures:
     foot_travel_in_hip: float
     """Widest horizontal range of the foot tip seen from the hip [m]; known on a real leg, too."""
     hop_freq: float
-    """Jumps per time, lower apex to lower apex [Hz]."""
+    """Number of jumps per time, lower apex to lower apex [Hz]."""
     flight_time: float
-    """Mean over the jumps' flights [s]."""
+    """Mean duration of the jumps' flights [s]."""
     stance_time: float
-    """Mean over the stances that the jumps take off from [s]."""
+    """Mean duration of the stances that the jumps take off from [s]."""
     polar_max: float
     """Largest |x1| from the first to the last of these jumps [rad]."""
     apex_change: float
@@ -102,7 +102,7 @@ def _limit_cycle(recording: Recorded, gait: Gait, first: int) -> dict[str, float
         "hop_freq": 1.0 / period if period > 0.0 else np.nan,
         "flight_time": _mean(gait.flight.duration[jumps.flight[first:]]),
         "stance_time": _mean(gait.stance.duration[jumps.takeoff[first:]]),
-        "polar_max": _largest(0.5 * np.abs(joint_pos.sum(axis=-1))),
+        "polar_max": _largest(np.abs(polar_angle(joint_pos))),
         "apex_change": _largest(np.abs(np.diff(apex))),
     }
 

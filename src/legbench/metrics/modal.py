@@ -12,15 +12,15 @@ class Trajectory:
     """Polar and modal coordinates of every row, in the run's own modal convention."""
 
     time: Floats
-    """(n,) [s]"""
+    """Times of the rows (n,) [s]."""
     polar: Floats
-    """x1, x2 of eq. (2) (n, 2) [rad], [m]."""
+    """Polar coordinates x1, x2 of eq. (2) (n, 2) [rad], [m]."""
     polar_rate: Floats
-    """(n, 2) [rad/s], [m/s]."""
+    """Rates of the polar coordinates (n, 2) [rad/s], [m/s]."""
     modal: Floats
-    """z1 (polar mode), z2 (radial mode) of eq. (15) (n, 2) [rad]."""
+    """Modal coordinates z1 (polar) and z2 (radial) of eq. (15) (n, 2) [rad]."""
     modal_rate: Floats
-    """(n, 2) [rad/s]."""
+    """Rates of the modal coordinates (n, 2) [rad/s]."""
 
 
 def trajectory(run: Recorded) -> Trajectory:

@@ -24,13 +24,13 @@ class Periods:
     start: Floats
     """Turning point that begins each period, between the rows (m,) [s]."""
     end: Floats
-    """Turning point that ends it (m,) [s]."""
+    """Turning point that ends each period (m,) [s]."""
     amplitude: Floats
-    """Half of z2's range within it (m,) [rad]."""
+    """Half of z2's range within each period (m,) [rad]."""
     first: Ints
     """First row of each period (m,)."""
     stop: Ints
-    """Row after the last (m,)."""
+    """Row after the last one of each period (m,)."""
 
     def __len__(self) -> int:
         return len(self.start)

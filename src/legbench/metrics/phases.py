@@ -23,7 +23,7 @@ class Intervals:
     first: Ints
     """First row of each phase (m,)."""
     stop: Ints
-    """Row after the last (m,)."""
+    """Row after the last one of each phase (m,)."""
     start: Floats
     """Touchdown of a stance, lift-off of a flight; between the rows if there is truth (m,) [s]."""
     end: Floats
@@ -38,7 +38,7 @@ class Intervals:
 
     @property
     def duration(self) -> Floats:
-        """How long each phase lasts (m,) [s]."""
+        """Duration of each phase (m,) [s]."""
         return self.end - self.start
 
 
@@ -47,15 +47,15 @@ class Jumps:
     """Complete jumps: one flight between two complete stances, lower apex to lower apex."""
 
     takeoff: Ints
-    """Index of the stance before (m,)."""
+    """Index of the stance before each jump (m,)."""
     flight: Ints
-    """Index of the flight (m,)."""
+    """Index of the flight of each jump (m,)."""
     landing: Ints
-    """Index of the stance after (m,)."""
+    """Index of the stance after each jump (m,)."""
     start: Floats
-    """Lower apex before (m,) [s]."""
+    """Time of the lower apex before each jump (m,) [s]."""
     end: Floats
-    """Lower apex after (m,) [s]."""
+    """Time of the lower apex after each jump (m,) [s]."""
 
     def __len__(self) -> int:
         return len(self.flight)

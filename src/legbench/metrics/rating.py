@@ -3,7 +3,7 @@
 import numpy as np
 
 from legbench.design.leg import LegDesign
-from legbench.design.statics import Support, equilibrium, gravity_load
+from legbench.design.statics import Support, balance, equilibrium, gravity_load, is_stable
 from legbench.errors import DesignError
 from legbench.kinematics import MODE_RADIAL
 from legbench.metrics.changes import changes
@@ -18,6 +18,8 @@ count, far above rounding."""
 GRID = 0.01
 """Spacing of the motor positions whose equilibria are looked up [rad]; Newton's method refines
 each row from there."""
+REFINEMENTS = 4
+"""Largest number of Newton steps of a row: they begin within half a `GRID` of its motors."""
 
 
 def alignment(deflection: Floats) -> Floats:
@@ -66,14 +68,9 @@ def _refined(design: LegDesign, motor_pos: Floats, support: Support) -> Floats:
     # One key a cell, since whole rows are slow to sort: angles stay far below a million cells.
     keys = cells[:, 0] * 2.0**26 + cells[:, 1]
     _, place, cell = np.unique(keys, return_index=True, return_inverse=True)
-    joint_pos = _solve(design, GRID * cells[place], support)[cell]
-    for _ in range(4):
-        residual = stiffness * (motor_pos - joint_pos) - moment * np.sin(joint_pos)
-        slope = stiffness + moment * np.cos(joint_pos)
-        joint_pos = joint_pos + residual / np.where(slope > 0.0, slope, np.nan)
-    residual = stiffness * (motor_pos - joint_pos) - moment * np.sin(joint_pos)
-    stable = stiffness + moment * np.cos(joint_pos) > 0.0
-    held = np.all(stable & (np.abs(residual) < 1e-9), axis=-1, keepdims=True)
+    near = _solve(design, GRID * cells[place], support)[cell]
+    joint_pos = balance(stiffness, moment, motor_pos, near, REFINEMENTS)
+    held = np.all(is_stable(stiffness, moment, motor_pos, joint_pos), axis=-1, keepdims=True)
     return np.where(held, joint_pos, np.nan)
 
 

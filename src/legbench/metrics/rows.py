@@ -1,4 +1,4 @@
-"""Small tools on sampled rows: runs of equal values, and instants between the samples."""
+"""Functions of sampled rows: stretches of equal values, and instants between the samples."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -14,11 +14,11 @@ class Runs:
     """Stretches of rows over which a column keeps its value; `m` of them, all rows covered."""
 
     first: Ints
-    """First row of each (m,)."""
+    """First row of each stretch (m,)."""
     stop: Ints
-    """Row after the last (m,)."""
+    """Row after the last one of each stretch (m,)."""
     value: NDArray[Any]
-    """(m,)"""
+    """Value of each stretch (m,)."""
 
 
 def runs_of(column: NDArray[Any]) -> Runs:

@@ -15,16 +15,16 @@ class RatingLists:
     """P^r of eq. (14) [-] with one reference, one value a complete phase or period, in order."""
 
     stance: list[float]
-    """RatingLists of the stances."""
+    """Ratings of the stances."""
     flight: list[float]
-    """RatingLists of the flights."""
+    """Ratings of the flights."""
     periods: list[float]
-    """RatingLists of the oscillation periods."""
+    """Ratings of the oscillation periods."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunRatings:
-    """RatingLists of a run with the reference that it asks for, and with the equilibrium."""
+    """Ratings of a run with the reference that it asks for, and with the equilibrium."""
 
     chosen: RatingLists
     equilibrium: RatingLists

@@ -1,4 +1,4 @@
-"""What a measurement needs of a run: its rows and its description."""
+"""The part of a run that a measurement needs: its rows and its description."""
 
 from pathlib import Path
 from typing import Any, Protocol
@@ -21,7 +21,7 @@ class Recorded(Protocol):
 
     @property
     def description(self) -> RunDescription:
-        """What the run says of itself; raises FormatError where it describes no leg."""
+        """Description that the run holds; raises FormatError where it describes no leg."""
         ...
 
     @property

@@ -1,4 +1,4 @@
-"""Which rows of a hopping run are stance and which are flight."""
+"""Distinction of stance and flight in the rows of a hopping run."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""One run in numbers: what tables, reports and searches read."""
+"""Summary of a run in numbers, which tables, reports and searches read."""
 
 import math
 from dataclasses import asdict, dataclass, field
@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from legbench.kinematics import polar_angle
 from legbench.metrics.analysis import Analysis, analysed
 from legbench.metrics.caveats import warnings_of
 from legbench.metrics.energy import energy_residual, loop_gap_max
@@ -27,17 +28,17 @@ class Summary:
     setup: str
     controller: str
     status: str | None
-    """How the run ended, as it says itself."""
+    """Status with which the run ended."""
     cause: str | None
-    """Why it ended early."""
+    """Cause of an early end; none if the run came to its end."""
     limited_cycles: int
     """Cycles in which the limits changed the command."""
     limited_max: list[float]
     """Largest change of each motor's command by the limits [rad]."""
     duration: float
-    """First to last row [s]."""
+    """Time from the first row to the last [s]."""
     real_time_factor: float
-    """Duration over the wall time of all cycles [-]."""
+    """Ratio of the duration to the wall time of all cycles [-]."""
     rating_reference: str
     rating_stance: list[float]
     """P^r of each complete stance, eq. (14) [-]."""
@@ -93,7 +94,7 @@ class Summary:
     """[J]"""
 
     warnings: list[str] = field(default_factory=list)
-    """What is not measured although one might expect it, and why."""
+    """Sentences on what is not measured although one might expect it, and why."""
 
     def to_json(self) -> dict[str, Any]:
         """Fields by name for strict JSON: NaN is None, alone and in lists."""
@@ -144,8 +145,8 @@ def _jumping(run: Analysis) -> dict[str, Any]:
     values = asdict(run.jump_figures)
     values["jumps"] = values.pop("count")
     if not run.description.jumps:
-        moved = run["joint_pos"][run.first_action :].sum(axis=-1)
-        values["polar_max"] = 0.5 * float(np.max(np.abs(moved))) if len(moved) else math.nan
+        moved = polar_angle(run["joint_pos"][run.first_action :])
+        values["polar_max"] = float(np.max(np.abs(moved))) if len(moved) else math.nan
     return values
 
 

@@ -126,4 +126,5 @@ class SensorViews:
     @property
     def contact(self) -> Bools:
         """Whether the foot is held by the ground (...)."""
-        return self.found > 0.0
+        # One leg's is compared as a number: an array without dimensions costs five times as much.
+        return self.found[()] > 0.0

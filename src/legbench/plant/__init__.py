@@ -1,1 +1,1 @@
-"""Legs to control: one seam, one class a file."""
+"""Plants, which are legs to control: one interface, one class in each file."""

@@ -1,4 +1,4 @@
-"""The plant seam: everything that can be controlled looks like this.
+"""Interface of a plant, which everything that can be controlled has.
 
     with SimPlant(...) as plant:
         observation = plant.reset()
@@ -20,7 +20,7 @@ class AbstractPlant(Closing):
     """One leg, or a batch of legs in step, at a fixed control period."""
 
     period: float
-    """[s]"""
+    """Control period [s]."""
 
     @abstractmethod
     def reset(self) -> Observation:

@@ -1,4 +1,4 @@
-"""One leg in the equations of the paper, behind the same seam as the simulated one."""
+"""One leg in the equations of the paper, with the same interface as the simulated one."""
 
 import math
 from collections.abc import Callable
@@ -19,9 +19,9 @@ from legbench.servo import Servo, ServoConfig
 from legbench.signals import Command, Floats, Observation, Truth
 
 STRAIGHT_MARGIN = 0.02
-"""A knee this close to 0 or pi has gone through its stop [rad]."""
+"""Distance of a knee from 0 or pi at which it has gone through its stop [rad]."""
 HANGING_BEND = 0.6
-"""A fixed trunk is as high as that of a standing leg with this half angle [rad]."""
+"""Half angle of the standing leg whose hip is as high as a fixed trunk [rad]."""
 
 
 @final

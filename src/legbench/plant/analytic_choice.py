@@ -11,14 +11,14 @@ from legbench.plant.opening import Leg, OpenPlant
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AnalyticChoice:
-    """The paper's equations."""
+    """Settings of the analytic plant, which computes the paper's equations."""
 
     kind: ClassVar[str] = "analytic"
     limits: SafetyLimits | None = None
     """Safety limits, by default none [a limits file]."""
 
     def open(self, leg: Leg) -> OpenPlant:
-        """The leg on paper.
+        """Open the leg of the equations.
 
         Raises:
             ConfigError: the limits are looser than the design, or the setup has a boom.

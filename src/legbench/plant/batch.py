@@ -20,7 +20,7 @@ from legbench.signals import Bools, Command, Floats, Observation
 
 @final
 class BatchPlant(AbstractPlant):
-    """Legs that differ in design but share setup, linkage and servo.
+    """Batch of legs that differ in design but share setup, linkage and servo.
 
     A leg that leaves its branch does not stop the others: it is marked in `faulted` and its
     observations mean nothing from then on.
@@ -109,7 +109,7 @@ class BatchPlant(AbstractPlant):
 
 
 def _models(designs: Sequence[LegDesign], options: BuildOptions) -> list[mujoco.MjModel]:
-    """A compiled model a leg; equal designs share one."""
+    """Compiled model of each leg; equal designs share one."""
     compiled: dict[LegDesign, mujoco.MjModel] = {}
     for design in designs:
         if design not in compiled:

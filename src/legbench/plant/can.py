@@ -18,7 +18,7 @@ from legbench.signals import Command, Floats, Observation
 VELOCITY_BANDWIDTH = 200.0
 """Corner frequency of the velocity estimate [Hz]."""
 STILL_SPEED = 0.05
-"""A leg at rest moves slower than this [rad/s]."""
+"""Speed below which a leg counts as at rest [rad/s]."""
 STILL_TIME_MS = 100
 """Time for which the leg must rest before a run begins [ms]."""
 STILL_PATIENCE_MS = 5000
@@ -150,7 +150,7 @@ class CanPlant(AbstractPlant):
 
     @property
     def session(self) -> Session:
-        """The bus, closed with the plant."""
+        """Session of the bus, which is closed with the plant."""
         return self._session
 
     def _exchange(self, motor_pos: Floats) -> Sample:

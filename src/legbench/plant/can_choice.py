@@ -19,25 +19,25 @@ EMULATED: Final = "legbench"
 LIMITS_NAME: Final = "limits.toml"
 """Name of the limits file beside the bus file."""
 BUS_LOG: Final = "bus.log"
-"""Raw frames in the run folder, candump format."""
+"""Name of the file of raw frames in the run folder, in candump format."""
 _WHERE: Final[Mapping[str, bool]] = WHERE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CanChoice:
-    """Servo drives on a CAN bus, real or emulated."""
+    """Settings of the CAN plant: servo drives on a bus, real or emulated."""
 
     kind: ClassVar[str] = "can"
     bus: Path = field(default=Path("hardware/leg.toml"), metadata=_WHERE)
-    """Bus file."""
+    """Bus file, which describes the drives."""
     interface: str | None = field(default=None, metadata=_WHERE)
-    """python-can's name of the interface, legbench is an emulated leg; else the bus file's."""
+    """Name of the interface in python-can, legbench for an emulated leg; else the bus file's."""
     channel: str | None = field(default=None, metadata=_WHERE)
-    """Channel such as can0; else the bus file's."""
+    """Channel such as can0; by default the bus file's."""
     bitrate: int | None = None
-    """Bitrate of interfaces that set their own; else the bus file's [bit/s]."""
+    """Bitrate of interfaces that set their own; by default the bus file's [bit/s]."""
     read_only: bool = False
-    """Observe, change nothing in a drive; commands are recorded and go nowhere."""
+    """Whether to observe without changing a drive; commands are recorded and not sent."""
     limits: SafetyLimits | None = None
     """Safety limits, by default those of limits.toml beside the bus file [a limits file]."""
     end: End = End.REST
@@ -51,7 +51,7 @@ class CanChoice:
         return (self.interface or config.interface) == EMULATED
 
     def open(self, leg: Leg) -> OpenPlant:
-        """The leg on its bus.
+        """Open the leg on its bus.
 
         Raises:
             ConfigError: a file or a setting makes no sense, or limits are looser than the design's.

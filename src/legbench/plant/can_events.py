@@ -1,4 +1,4 @@
-"""What a run on drives has to tell in the end: stop, rest, parking, notices, frames."""
+"""Events at the end of a run on drives: stop, rest, parking, notices, frames."""
 
 from dataclasses import asdict
 from typing import Any

@@ -42,13 +42,13 @@ IDLE_POS = (-0.3, 0.3)
 
 @final
 class CanClock(AbstractClock):
-    """Never waits, because the link does; tells how late its last SYNC was."""
+    """Clock of a run on drives: the link waits, this shows how late its last SYNC was."""
 
     def __init__(self, plant: CanPlant) -> None:
         self._plant = plant
 
     def start(self) -> None:
-        """The link's grid is laid already."""
+        """Do nothing: the link has laid its grid already."""
 
     def wait(self, cycle: int) -> float:
         """Lateness of the cycle that has been seen [s]."""
@@ -124,7 +124,7 @@ def _checked(choice: CanChoice, leg: Leg) -> tuple[BusConfig, SafetyLimits]:
 def _facts(
     choice: CanChoice, config: BusConfig, limits: SafetyLimits, granted: Granted | None
 ) -> dict[str, Any]:
-    """What a run has to say of the bus."""
+    """Entries of a run's manifest about the bus."""
     return {
         "bus": {
             "file": str(choice.bus),

@@ -1,4 +1,4 @@
-"""Safety limits held against a design: what its stops leave to motors and links."""
+"""Safety limits that follow from a design: what its stops leave to motors and links."""
 
 import math
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ SINGULAR_SHARE = 0.2
 
 
 def limits_within(limits: SafetyLimits, design: LegDesign) -> SafetyLimits:
-    """Limits whose open ranges are the design's.
+    """Return limits whose open ranges are the design's.
 
     Raises:
         ConfigError: they are looser than the design.
@@ -61,7 +61,7 @@ def knee_ranges(design: LegDesign) -> tuple[Range, Range]:
 
 
 def open_limited(plant: AbstractPlant, limits: SafetyLimits | None, leg: Leg) -> OpenPlant:
-    """A plant in virtual time, under limits if there are any.
+    """Return a plant in virtual time, under limits if there are any.
 
     Raises:
         ConfigError: the limits are looser than the design.

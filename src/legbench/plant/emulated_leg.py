@@ -14,7 +14,7 @@ from legbench.signals import Command
 
 @final
 class EmulatedLeg:
-    """What hangs on the drives' shafts: a `SimPlant` whose motors are where the drives put them.
+    """Body on the drives' shafts: a `SimPlant` whose motors are where the drives put them.
 
     It rests in its start posture until the drives move. It knows nothing of time: one call is one
     period of `plant.start.PERIOD`.

@@ -5,7 +5,7 @@ from legbench.limits.upper_ends import LIMIT_ENDS
 
 
 def gone_drive(link: Link) -> str | None:
-    """Why a run that has lasted its time was none to its end; none if every drive was there.
+    """Reason why a run that has lasted its time is a fault; none if every drive was there.
 
     A waived `lost_frames` may bridge seconds; a run that is shorter would end complete though its
     drives have been gone since its beginning.

@@ -1,4 +1,4 @@
-"""How a run on drives ends: on the ground and at rest, before its power goes."""
+"""End of a run on drives: on the ground and at rest, before its power goes."""
 
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -18,7 +18,7 @@ hold cost nothing meanwhile; a leg that swings for longer is no fault."""
 
 
 class End(StrEnum):
-    """What follows when a run on drives has lasted its time."""
+    """End of a run on drives that has lasted its time."""
 
     REST = "rest"
     """The motors are led to the controller's rest posture, the leg comes to rest, power goes."""
@@ -28,18 +28,18 @@ class End(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Landing:
-    """What happened between the last row of a run and the end of its power."""
+    """Report of the way to rest, between the last row of a run and the end of its power."""
 
     motor_pos: tuple[float, ...]
     """Motor positions that the leg was led to [rad]."""
     duration: float
-    """How long it took [s]."""
+    """Duration of the way to rest [s]."""
     rested: bool
     """Whether the leg came to rest."""
     swing: float
     """Half of the range that the link that moved most went through in the last 0.5 s [rad]."""
     interrupted: bool
-    """Whether ^C ended it."""
+    """Whether ^C ended the way to rest."""
 
     @property
     def trouble(self) -> str | None:
@@ -68,7 +68,7 @@ def towards(wanted: Sequence[float], applied: Sequence[float], step: float) -> t
 
 @final
 class StillWatch:
-    """Says when links have been still for long enough, however coarse their encoders are."""
+    """Detector of links that have been still for long enough, however coarse their encoders are."""
 
     def __init__(self, period: float) -> None:
         self._needed = round(STILL_TIME / period)
@@ -77,7 +77,7 @@ class StillWatch:
         self._count = 0
 
     def see(self, link_pos: Sequence[float]) -> bool:
-        """Take the link angles of a period [rad]; whether the leg rests by now."""
+        """Take the link angles of a period [rad]; returns whether the leg rests by now."""
         self._seen.append(tuple(link_pos))
         near = len(self._around) == len(link_pos) and all(
             abs(value - middle) <= STILL_RANGE

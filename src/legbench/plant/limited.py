@@ -16,7 +16,7 @@ from legbench.signals import Command, Floats, Observation
 
 @final
 class LimitedPlant(AbstractPlant):
-    """Lets through what the limits allow and ends the run where they are exceeded.
+    """Plant that lets through what the limits allow and ends the run where they are exceeded.
 
     The same `Guard` sits in the cyclic link of the drives, so that a run shows the same slewing
     and the same faults on every plant. `command_pos` of a recording is the wish, `applied_pos`
@@ -33,7 +33,7 @@ class LimitedPlant(AbstractPlant):
         self._expected: deque[tuple[float, ...]] = deque()
 
     def reset(self) -> Observation:
-        """Begin where the motors are."""
+        """Reset the plant within; the command begins where its motors are."""
         seen = self._plant.reset()
         self._guard.start_at(seen.motor_pos.tolist())
         self._expected = deque([self._guard.applied] * self._delay)
@@ -57,12 +57,12 @@ class LimitedPlant(AbstractPlant):
         return seen
 
     def rest(self, motor_pos: Floats, interrupted: Callable[[], bool]) -> str | None:
-        """Pass it on to the plant within."""
+        """Lead the leg of the plant within to rest."""
         return self._plant.rest(motor_pos, interrupted)
 
     @property
     def shortfall(self) -> Shortfall:
-        """Which commands were let through otherwise than wished."""
+        """Counts of the commands that the limits changed."""
         return self._guard.shortfall
 
     def close(self) -> None:

@@ -15,7 +15,7 @@ CROSSED_TOLERANCE = 0.05
 """A foot or crank this far from parallel sits on the crossed branch of its loop [rad]; the bars
 of a healthy leg stay within 1e-4."""
 STRAIGHT_MARGIN = 0.02
-"""A knee this close to 0 or pi has gone through its stop [rad]."""
+"""Distance of a knee from 0 or pi at which it has gone through its stop [rad]."""
 DIVERGED = 1e3
 """All coordinates of a leg together never get this far [rad and m]."""
 
@@ -26,7 +26,7 @@ class JointLayout:
 
     hip: int
     knee: int
-    """Follows the hip at once, as the shank follows the thigh in the tree."""
+    """Place of the knee; it follows the hip at once, as the shank follows the thigh."""
     ankle: int
     crank: int | None
 
@@ -93,7 +93,7 @@ class LiveArrays:
 
 @final
 class Observer:
-    """Makes observations of the current state; nothing in them aliases simulation or command."""
+    """Maker of observations of the current state, which alias neither simulation nor command."""
 
     def __init__(
         self, model: mujoco.MjModel, arrays: LiveArrays, stiffness: Floats, servo: Servo
@@ -106,7 +106,7 @@ class Observer:
         self._arrays, self._stiffness, self._servo = arrays, stiffness, servo
 
     def look(self, time: float, applied_pos: Floats) -> Observation:
-        """What the plant shows at `time` [s], after the command `applied_pos` (..., 2) [rad]."""
+        """Return the observation at `time` [s], after the command `applied_pos` (..., 2) [rad]."""
         arrays, sensors = self._arrays, self._sensors
         joint_pos = self._servo.encode(np.add.accumulate(self._relative, axis=-1))
         motor_pos = self._servo.encode(arrays.ctrl.copy())

@@ -1,4 +1,4 @@
-"""What a plant is opened with, and what belongs to a run on it besides the plant."""
+"""Opening of a plant: its leg, its settings, and what belongs to a run on it besides the plant."""
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
@@ -34,7 +34,7 @@ class Needs:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Leg:
-    """The leg that the plant is to be."""
+    """Leg that the plant is to be."""
 
     design: LegDesign
     options: BuildOptions
@@ -45,29 +45,29 @@ class Leg:
 
 
 def _no_log(writer: "RunWriter") -> None:
-    """Most plants log nothing of their own."""
+    """Log nothing, as most plants do."""
 
 
 def _nothing() -> str | None:
-    """Most plants have nothing to tell."""
+    """Return no events, as most plants have none."""
     return None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OpenPlant:
-    """A plant that is ready to be reset, and what belongs to a run on it."""
+    """Plant that is ready to be reset, and what belongs to a run on it."""
 
     plant: AbstractPlant
     clock: AbstractClock = field(default_factory=VirtualClock)
-    """What paces it if nobody asks for another pace."""
+    """Clock that paces the plant if no other one is asked for."""
     facts: dict[str, Any] = field(default_factory=dict)
-    """What a run has to say of it."""
+    """Entries of a run's manifest about the plant."""
     notes: tuple[str, ...] = ()
     """What a person should know before anything moves, such as what does not protect the leg."""
     start_log: Callable[["RunWriter"], None] = _no_log
-    """Begin to log beside the rows of a run, such as raw frames, with `RunWriter.log`."""
+    """Function that begins a log beside the rows, such as raw frames, see `RunWriter.log`."""
     events: Callable[[], dict[str, dict[str, Any]]] = dict
-    """What a run on it has to tell in the end, by name."""
+    """Function that returns the events of the end of a run on it, by name."""
     realtime: bool = False
     """Whether the machine's clock paces it: whoever holds up its loop holds up drives."""
     gone: Callable[[], str | None] = _nothing
@@ -81,10 +81,10 @@ class PlantSettings(Protocol):
     """Settings of a plant: a frozen dataclass whose fields become TOML keys and flags."""
 
     kind: ClassVar[str]
-    """Name in files and on the command line."""
+    """Name of the plant in files and on the command line."""
 
     def open(self, leg: Leg) -> AbstractPlant | OpenPlant:
-        """The plant of this leg; nothing moves before its `reset`."""
+        """Open the plant of this leg; nothing moves before its `reset`."""
         ...
 
 

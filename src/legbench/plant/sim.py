@@ -13,6 +13,7 @@ from legbench.mjcf import BuildOptions, model_text, rest_qpos
 from legbench.plant.abstract import AbstractPlant
 from legbench.plant.observe import LiveArrays, Observer, branch_fault
 from legbench.plant.start import PERIOD, Start
+from legbench.plant.stepping import PeriodSteps
 from legbench.servo import Servo, ServoConfig
 from legbench.signals import Command, Floats, Observation
 
@@ -38,7 +39,8 @@ class SimPlant(AbstractPlant):
         self.xml = model_text(design, options)
         self.model = mujoco.MjModel.from_xml_string(self.xml)
         self.data = mujoco.MjData(self.model)
-        self._substeps = round(PERIOD / self.model.opt.timestep)
+        substeps = round(PERIOD / self.model.opt.timestep)
+        self._steps = PeriodSteps(self.model, self.data, substeps)
         self._start_qpos = rest_qpos(self.model, design, start.joint_pos)
         self._start = start
         self._servo = Servo(servo or ServoConfig(), PERIOD)
@@ -78,8 +80,7 @@ class SimPlant(AbstractPlant):
             )
         self._arrays.ctrl[:] = self._servo.follow(command.motor_pos)
         try:
-            mujoco.mj_step(self.model, self.data, self._substeps)
-            mujoco.mj_step1(self.model, self.data)
+            self._steps.advance()
         except mujoco.FatalError as error:
             raise PlantFault("simulation failed", str(error)) from error
         self._cycle += 1

@@ -11,13 +11,13 @@ from legbench.plant.opening import Leg, OpenPlant
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimChoice:
-    """MuJoCo."""
+    """Settings of the simulated plant, in MuJoCo."""
 
     kind: ClassVar[str] = "sim"
     limits: SafetyLimits | None = None
     """Safety limits, by default none [a limits file]."""
 
     def open(self, leg: Leg) -> OpenPlant:
-        """The leg in MuJoCo; raises ConfigError if the limits are looser than the design."""
+        """Open the leg in MuJoCo; raises ConfigError if the limits are looser than the design."""
         plant = load_text("legbench.plant.sim:SimPlant")
         return open_limited(plant(leg.design, leg.options, leg.start, leg.servo), self.limits, leg)

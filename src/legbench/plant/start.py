@@ -10,9 +10,9 @@ PERIOD = 0.001
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Start:
-    """A leg at rest; in a batch, one row a leg."""
+    """State of a leg at rest; in a batch, one row for each leg."""
 
     joint_pos: Floats
-    """(..., 2) [rad]"""
+    """Link angles of the leg (..., 2) [rad]."""
     motor_pos: Floats
-    """(..., 2) [rad]"""
+    """Motor positions of the leg (..., 2) [rad]."""

@@ -11,7 +11,7 @@ from legbench.signals import Floats
 
 @final
 class VelocityEstimate:
-    """Differences of positions over the time between two readings, behind a first-order low-pass.
+    """Estimate of velocities: differences of positions over time, behind a first-order low-pass.
 
     The gain follows the interval: `1 - exp(-2 pi bandwidth dt)`, the exact response to an input
     that is constant over `dt`. An axis without a fresh reading keeps its velocity; its next

@@ -1,4 +1,4 @@
-"""What a run leaves behind: written so that a crash costs at most a tenth of a second of rows.
+"""Recordings of runs, written so that a crash costs at most 50 rows.
 
 `writer.RunWriter` writes a run folder, `reader.load` reads it, `repair.recover` makes whole what
 a crash tore. A run folder holds

@@ -1,4 +1,4 @@
-"""What a `RunWriter` hands its rows to."""
+"""The destination of a `RunWriter`'s rows."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -8,12 +8,12 @@ from legbench.recording.files import Appender
 from legbench.recording.rows import BATCH_ROWS, Block
 
 MAX_WAITING = 60_000 // BATCH_ROWS
-"""Blocks that may wait for the disk: 60 s at 1 kHz, 14 MB."""
+"""Largest number of blocks that may wait for the disk: 60 s at 1 kHz, 14 MB."""
 
 
 @dataclass(slots=True)
 class Kept:
-    """What the operating system has of a run, as far as is known."""
+    """Part of a run that has reached the operating system, as far as is known."""
 
     rows: int = 0
     first: float = 0.0
@@ -40,7 +40,7 @@ class AbstractLog(Closing):
 
     @abstractmethod
     def write(self, line: bytes) -> None:
-        """Take one whole line; never waits, never raises."""
+        """Take one whole line; never raises."""
 
     @abstractmethod
     def close(self) -> None:
@@ -48,7 +48,7 @@ class AbstractLog(Closing):
 
 
 class AbstractDisk(ABC):
-    """Takes blocks and events of one run, and writes them beside the control loop.
+    """Destination of the blocks and events of one run.
 
     Attributes:
         kept: what has been written.
@@ -59,15 +59,15 @@ class AbstractDisk(ABC):
     @property
     @abstractmethod
     def lagging(self) -> bool:
-        """Whether more rows wait than a run may have in memory, or nobody writes any more."""
+        """Whether more rows wait than a run may have in memory."""
 
     @abstractmethod
-    def swap(self, block: Block) -> Block:
-        """Take a block to write and give an empty one; never waits."""
+    def take(self, block: Block) -> None:
+        """Take the rows of a block and empty it; raises nothing, an error is in `kept`."""
 
     @abstractmethod
     def event(self, line: bytes) -> None:
-        """Take one whole line for the events; never waits."""
+        """Take one whole line for the events; raises nothing, an error is in `kept`."""
 
     @abstractmethod
     def log(self, file: Appender) -> AbstractLog:

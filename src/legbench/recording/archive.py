@@ -9,9 +9,9 @@ import pyarrow as pa
 from pyarrow import parquet
 
 from legbench.errors import RecordingError
-from legbench.recording.files import put_in_place, reason
 from legbench.recording.layout import ARCHIVE
 from legbench.recording.stream import WholeBatches, carrying, schema_for
+from legbench.writing import put_in_place, reason
 
 GROUP_ROWS: Final = 65_536
 """Rows compressed together: 65 s at 1 kHz, 15 MB of memory."""

@@ -1,4 +1,4 @@
-"""The table `controller` of `run.json`: what the controller of a run said of itself."""
+"""Table `controller` of `run.json`, which holds the description of the controller of a run."""
 
 from collections.abc import Mapping
 from dataclasses import asdict

@@ -1,4 +1,4 @@
-"""What a run says of itself: `run.json` parsed once, for everybody who measures or draws it."""
+"""Description of a run: `run.json`, parsed once for everybody who measures or draws the run."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ IDEAL_LINKAGE: Final = frozenset({"analytic"})
 
 
 class Reference(StrEnum):
-    """What `q_d` of eq. (14) is."""
+    """Reference from which eq. (14) measures a deflection, `q_d`."""
 
     MOTOR = "motor"
     """The measured motor position, as printed; gravity's sag counts as deflection."""
@@ -51,7 +51,7 @@ class InitialState:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunDescription:
-    """What ran, on what, how it is to be measured, and how it ended."""
+    """Description of a run: its parts, how it is to be measured, and how it ended."""
 
     id: str
     """Name of the run: that of its folder when it was written."""
@@ -84,7 +84,7 @@ class RunDescription:
     status: str | None
     """How the run ended: complete, interrupted, fault, recovered, or running."""
     cause: str | None
-    """Why it ended early."""
+    """Cause of an early end; none if the run came to its end."""
     rows: int | None
     """Number of rows that were recorded."""
     duration: float | None

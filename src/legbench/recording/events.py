@@ -6,9 +6,9 @@ from typing import Any
 
 from legbench.errors import RecordingError
 from legbench.reading import LARGEST_EVENTS, UnreadableError, parse_json, read_file
-from legbench.recording.files import write_whole
 from legbench.recording.layout import EVENTS, TORN
 from legbench.recording.manifest import plain
+from legbench.writing import write_whole
 
 Event = dict[str, Any]
 

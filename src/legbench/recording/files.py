@@ -1,4 +1,4 @@
-"""Files that are whole or not there: appending whole records, replacing, locking."""
+"""Files of a run: appending whole records, locking."""
 
 import errno
 import fcntl
@@ -9,13 +9,6 @@ from pathlib import Path
 from typing import final
 
 from legbench.errors import RecordingError
-
-
-def reason(error: Exception) -> str:
-    """Say why `error` happened, with the name of its errno if it has one."""
-    if isinstance(error, OSError) and error.errno is not None:
-        return f"{os.strerror(error.errno)} [{errno.errorcode.get(error.errno, error.errno)}]"
-    return str(error)
 
 
 @final
@@ -60,37 +53,6 @@ def append_to(path: Path) -> Appender:
     """Create `path`, which must not exist, for appending; raises OSError."""
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND
     return Appender(os.open(path, flags, 0o644))
-
-
-def put_in_place(draft: Path, path: Path) -> None:
-    """Make the finished file `draft` be `path`, at once and surviving a power cut.
-
-    Raises:
-        OSError: the draft could not be synced or renamed; `path` is what it was before.
-    """
-    for target in (draft, draft.parent):
-        fd = os.open(target, os.O_RDONLY)
-        try:
-            os.fsync(fd)
-        finally:
-            os.close(fd)
-        if target == draft:
-            draft.replace(path)
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Write `content` as the file `path`, or leave `path` untouched; raises OSError."""
-    draft = path.with_name(f".{path.name}.draft")
-    try:
-        # Made anew: whatever lies there, such as a link, is not written through.
-        draft.unlink(missing_ok=True)
-        with draft.open("xb") as file:
-            file.write(content)
-        put_in_place(draft, path)
-    except BaseException:
-        with suppress(OSError):
-            draft.unlink()
-        raise
 
 
 def lock(fd: int, run: Path, *, patience: float = 0.0) -> None:

@@ -1,11 +1,11 @@
-"""The names inside a run folder."""
+"""Names inside a run folder."""
 
 import re
 from datetime import UTC, datetime
 from typing import Final
 
 FORMAT: Final = 2
-"""Rises when an older reader would misread a run; a new column alone does not raise it."""
+"""Version of the format; it rises when an older reader would misread a run."""
 
 RUN: Final = "run.json"
 STREAM: Final = "samples.arrows"

@@ -1,4 +1,4 @@
-"""The file of a log where it is written: by the recording thread, or the recording process."""
+"""The file of a log where it is written: by the loop, or by the recording process."""
 
 import errno
 from typing import final

@@ -1,17 +1,15 @@
 """Logs as the control loop sees them: it puts lines and goes on."""
 
 import os
-import threading
 from collections.abc import Callable
-from functools import partial
 from typing import Final, final
 
 from legbench.recording.abstract_disk import AbstractLog
 from legbench.recording.log_file import LogFile
 from legbench.recording.ring import RING_BYTES, Ring
 
-THREAD_LINES: Final = 500
-"""Number of lines that go to the recording thread at once."""
+LINES_AT_ONCE: Final = 500
+"""Number of lines that a loop in virtual time writes at once."""
 TOO_SLOW: Final = f"the disk is too slow, {RING_BYTES >> 20} MiB of lines wait for it"
 ENDED_EARLY: Final = "the recording ended before the log"
 
@@ -60,67 +58,35 @@ class RingLog(AbstractLog):
 
 
 @final
-class ThreadLog(AbstractLog):
-    """A log whose lines go to the recording thread."""
+class LoopLog(AbstractLog):
+    """A log of a loop in virtual time, which writes the lines itself, many at once."""
 
-    def __init__(
-        self, file: LogFile, hand: Callable[[Callable[[], None]], None], worker: threading.Thread
-    ) -> None:
-        """Begin.
-
-        Args:
-            file: the file.
-            hand: has a call made in the thread, after those before it.
-            worker: the thread.
-        """
-        self._file, self._hand, self._worker = file, hand, worker
+    def __init__(self, file: LogFile) -> None:
+        """Begin a log in a file."""
+        self._file = file
         self._lines: list[bytes] = []
-        self._handed = self._written = 0
-        self._late = self._lost = self._closed = False
+        self._closed = False
 
     @property
     def error(self) -> str | None:
         """Why the log ended before its run, None if it did not; final after `close`."""
-        if self._file.failed:
-            return os.strerror(self._file.failed)
-        if self._late:
-            return TOO_SLOW
-        return ENDED_EARLY if self._lost else None
+        return os.strerror(self._file.failed) if self._file.failed else None
 
     def write(self, line: bytes) -> None:
-        """Take one whole line; never waits, never raises."""
+        """Take one whole line; never raises."""
         if self._closed:
             return
         self._lines.append(line)
-        if len(self._lines) >= THREAD_LINES:
-            self._hand_over()
+        if len(self._lines) >= LINES_AT_ONCE:
+            self._flush()
 
     def close(self) -> None:
-        """Wait until every line is written or lost; may be called twice, never raises."""
-        if self._closed:
-            return
-        self._closed = True
-        self._hand_over()
-        done = threading.Event()
-        self._hand(partial(self._end, done))
-        while not done.wait(0.1) and self._worker.is_alive():
-            continue
-        if not done.is_set():
-            self._lost = self._handed > self._written
-            self._end(done)
+        """Write every line that is left and close the file; may be called twice, never raises."""
+        if not self._closed:
+            self._closed = True
+            self._flush()
+            self._file.close()
 
-    def _hand_over(self) -> None:
-        lines = b"".join(self._lines)
+    def _flush(self) -> None:
+        self._file.append(b"".join(self._lines))
         self._lines.clear()
-        self._late = self._late or self._handed + len(lines) - self._written > RING_BYTES
-        if not self._late:
-            self._handed += len(lines)
-            self._hand(partial(self._append, lines))
-
-    def _append(self, lines: bytes) -> None:
-        self._file.append(lines)
-        self._written += len(lines)
-
-    def _end(self, done: threading.Event) -> None:
-        self._file.close()
-        done.set()

@@ -14,8 +14,8 @@ from legbench.errors import ConfigError, FormatError, RecordingError
 from legbench.guests import load_text
 from legbench.reading import LARGEST_JSON, UnreadableError, parse_json, read_file
 from legbench.recording.description import layout_of
-from legbench.recording.files import write_whole
 from legbench.recording.layout import FORMAT, RUN, RUNNING
+from legbench.writing import write_whole
 
 Manifest = dict[str, Any]
 

@@ -1,9 +1,10 @@
 """The process between a control loop in real time and the disk, as the loop sees it.
 
-A thread would hold the interpreter's lock when the loop wants it, and lose the processor while
-it does. Blocks go as packets over a socket whose queue is the kernel's: handing one over is one
-system call, and what is in the queue is written even if the loop's process is killed. Lines of a
-log, which come five a cycle, go through memory that both share.
+The disk must not make the loop wait. A thread would hold the interpreter's lock when the loop
+wants it, and lose the processor while it does. Blocks go as packets over a socket whose queue is
+the kernel's: handing one over is one system call, and what is in the queue is written even if the
+loop's process is killed. Lines of a log, which come five a cycle, go through memory that both
+share.
 """
 
 import os
@@ -23,7 +24,7 @@ from legbench.recording.abstract_disk import MAX_WAITING, AbstractDisk, Abstract
 from legbench.recording.files import Appender
 from legbench.recording.logs import RingLog
 from legbench.recording.ring import Ring
-from legbench.recording.rows import BATCH_ROWS, ONE_LEG_ROWS, Block, RowLayout
+from legbench.recording.rows import BATCH_ROWS, Block
 from legbench.recording.stream import encode_schema
 
 ROWS, EVENT, END = b"R", b"E", b"F"
@@ -47,11 +48,8 @@ class ProcessDisk(AbstractDisk):
     this process has, by whatever end.
     """
 
-    def __init__(
-        self, samples: Appender, events: Appender, schema: pa.Schema, rows: RowLayout = ONE_LEG_ROWS
-    ) -> None:
+    def __init__(self, samples: Appender, events: Appender, schema: pa.Schema) -> None:
         """Write the opening of the stream and start the process; raises OSError."""
-        del rows  # Blocks come in their layout; what is sent is in the order of the schema.
         self._longest = longest_packet(schema)
         self.kept = Kept()
         self._samples, self._events = samples, events
@@ -75,13 +73,12 @@ class ProcessDisk(AbstractDisk):
         """Whether more waits in this process than a run may have in memory."""
         return len(self._waiting) > MAX_WAITING
 
-    def swap(self, block: Block) -> Block:
-        """Send a block and give it back empty; keeps a copy where the kernel's queue is full."""
+    def take(self, block: Block) -> None:
+        """Send the rows of a block, which wait here where the kernel's queue is full."""
         packet = ROWS + block.columns().tobytes()
         block.count = 0
         self._send(packet)
         self._listen()
-        return block
 
     def event(self, line: bytes) -> None:
         """Send one whole line for the events."""

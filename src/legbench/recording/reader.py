@@ -15,11 +15,11 @@ from legbench.recording.columns import ONE_LEG, Layout
 from legbench.recording.description import RunDescription, describe
 from legbench.recording.events import Event, read_events
 from legbench.recording.export import Rows, arrow_table, as_html, as_text, pandas_frame
-from legbench.recording.files import reason
 from legbench.recording.layout import ARCHIVE, COMPLETE, EVENTS, RUN, STREAM, TIME
 from legbench.recording.manifest import Manifest, read_manifest
 from legbench.recording.stream import WholeBatches, carried_manifest, schema_for
 from legbench.signals import Floats
+from legbench.writing import reason
 
 
 class UnknownSignalError(LegbenchError, KeyError):

@@ -10,11 +10,12 @@ import pyarrow as pa
 from legbench.errors import RecordingError
 from legbench.recording.archive import count_rows, read_schema, write_archive
 from legbench.recording.events import drop_torn_events, read_events
-from legbench.recording.files import lock, reason
+from legbench.recording.files import lock
 from legbench.recording.layout import ARCHIVE, COMPLETE, RECOVERED, RUNNING, STREAM, TIME, TORN
 from legbench.recording.manifest import Manifest, read_manifest, write_manifest
 from legbench.recording.reader import run_folder
 from legbench.recording.stream import WholeBatches, carried_manifest
+from legbench.writing import reason
 
 HANDED_OVER = 2.0
 """Longest wait for a recording process that writes what its killed master handed over [s]."""

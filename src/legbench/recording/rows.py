@@ -1,4 +1,4 @@
-"""Rows in memory: what the control loop pays for remembering one cycle."""
+"""Rows in memory, into which the control loop copies each cycle."""
 
 from typing import Final, final
 
@@ -77,7 +77,7 @@ ONE_LEG_ROWS: Final = RowLayout(ONE_LEG)
 
 @final
 class Block:
-    """Fifty rows that the loop fills and the disk thread empties.
+    """Fifty rows that the loop fills and the disk empties.
 
     Attributes:
         values: the rows (BATCH_ROWS, size), laid out as its `RowLayout` says.

@@ -19,7 +19,7 @@ SYNC_EVERY: Final = 1.0
 
 @final
 class Store:
-    """Appends to the samples and events of a run; used by one thread or process alone.
+    """Appends to the samples and events of a run; used by one thread of one process alone.
 
     Attributes:
         kept: what has been written, and what has failed.

@@ -63,8 +63,8 @@ def encode_schema(schema: pa.Schema) -> memoryview:
 class BatchEncoder:
     """Makes messages of batches that are alike: as many rows, nulls in the same places.
 
-    A batch of Arrow's is built once, over memory that is filled anew for each message. Built from
-    buffers, since `pa.array` looks for pandas first.
+    Arrow encodes one message and says where in it each column lies; every batch then puts its
+    numbers there. To encode each anew takes four times as long in the middle of a control loop.
     """
 
     def __init__(self, like: Floats, schema: pa.Schema) -> None:
@@ -73,38 +73,58 @@ class BatchEncoder:
         Columns are (fields of the schema, rows), time first in seconds; NaN is null in an int8
         column.
         """
-        self._wide = [n for n, field in enumerate(schema) if field.type == pa.float64()]
-        self._narrow = [n for n, field in enumerate(schema) if field.type == pa.int8()]
-        self._time = np.empty(like.shape[1], dtype=np.int64)
-        self._floats = np.empty_like(like[self._wide])
-        self._known = ~np.isnan(like[self._narrow])
-        self._small = np.empty(self._known.shape, dtype=np.int8)
-        arrays = {0: _array(pa.int64(), self._time)}
-        for place, values in zip(self._wide, self._floats, strict=True):
-            arrays[place] = _array(pa.float64(), values)
-        for place, values, known in zip(self._narrow, self._small, self._known, strict=True):
-            arrays[place] = _array(pa.int8(), values, None if known.all() else known)
-        ordered = [arrays[place] for place in range(len(schema))]
-        self._batch = pa.RecordBatch.from_arrays(ordered, schema=schema)
+        kinds = [field.type for field in schema]
+        self._narrow = [n for n, kind in enumerate(kinds) if kind == pa.int8()]
+        unknown = np.isnan(like[self._narrow])
+        self._rows, self._unknown = like.shape[1], unknown.tobytes()
+        valid = dict(zip(self._narrow, ~unknown, strict=True))
+        arrays = [_zeros(kind, self._rows, valid.get(n)) for n, kind in enumerate(kinds)]
+        batch = pa.RecordBatch.from_arrays(arrays, schema=schema)
+        self._message = bytearray(memoryview(batch.serialize()))
+        places = _places(self._message, schema)
+        self._time = places[0]
+        self._wide = [(places[n], n) for n, kind in enumerate(kinds) if kind == pa.float64()]
+        self._small = [(places[n], n) for n in self._narrow]
 
     def fits(self, columns: Floats) -> bool:
         """Whether columns are like those that it was prepared for."""
-        return columns.shape[1] == len(self._time) and np.array_equal(
-            ~np.isnan(columns[self._narrow]), self._known
+        return (
+            columns.shape[1] == self._rows
+            and np.isnan(columns[self._narrow]).tobytes() == self._unknown
         )
 
     def encode(self, columns: Floats) -> memoryview:
-        """Return the message of a batch that fits."""
+        """Return the message of a batch that fits; the next one is made in the same memory."""
         np.rint(columns[0] * 1e9, out=self._time, casting="unsafe")
-        self._floats[:] = columns[self._wide]
-        small = np.where(self._known, columns[self._narrow], -1.0)
-        np.copyto(self._small, small, casting="unsafe")
-        return memoryview(self._batch.serialize())
+        for place, column in self._wide:
+            place[:] = columns[column]
+        for place, column in self._small:
+            values = columns[column]
+            place[:] = np.where(np.isnan(values), -1.0, values)
+        return memoryview(self._message)
 
 
-def _array(kind: pa.DataType, values: np.ndarray, known: np.ndarray | None = None) -> pa.Array:
-    valid = None if known is None else pa.py_buffer(np.packbits(known, bitorder="little"))
-    return pa.Array.from_buffers(kind, len(values), [valid, pa.py_buffer(values)])
+def _zeros(kind: pa.DataType, rows: int, valid: np.ndarray | None) -> pa.Array:
+    """Zeros of a kind, null where they are not valid; from buffers: `pa.array` imports pandas."""
+    known = None
+    if valid is not None and not valid.all():
+        known = pa.py_buffer(np.packbits(valid, bitorder="little"))
+    return pa.Array.from_buffers(kind, rows, [known, pa.py_buffer(bytes(8 * rows))])
+
+
+def _places(message: bytearray, schema: pa.Schema) -> list[np.ndarray]:
+    """Writable arrays of the columns inside an encoded batch, as Arrow's own reader finds them."""
+    whole = pa.py_buffer(message)
+    batch = ipc.read_record_batch(whole, schema)
+    return [
+        np.frombuffer(
+            message,
+            dtype=column.type.to_pandas_dtype(),
+            count=batch.num_rows,
+            offset=column.buffers()[1].address - whole.address,
+        )
+        for column in batch.columns
+    ]
 
 
 @final

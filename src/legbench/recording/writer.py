@@ -16,7 +16,7 @@ from legbench.recording.archive import write_archive
 from legbench.recording.description import layout_of
 from legbench.recording.disk import Disk
 from legbench.recording.events import encode_event
-from legbench.recording.files import append_to, lock, reason
+from legbench.recording.files import append_to, lock
 from legbench.recording.layout import (
     CLOSING,
     COMPLETE,
@@ -31,16 +31,16 @@ from legbench.recording.process_disk import ProcessDisk
 from legbench.recording.rows import BATCH_ROWS, Block, RowLayout
 from legbench.recording.stream import WholeBatches, schema_for
 from legbench.signals import Command, Observation
+from legbench.writing import reason
 
 
 @final
 class RunWriter:
     """Writes one run folder; call it from one thread, close it or use it in a `with`.
 
-    Rows go to the operating system in batches of 50 from a thread or, for a loop in real time, from
-    a process of their own. A process that dies loses at most 100 rows (at 1 kHz: 100 ms) while
-    the disk keeps up, or 50 with a process for them; the loop never waits for the disk. A power
-    cut costs about one second.
+    Rows go to the operating system in batches of 50, from the loop itself or, for a loop in real
+    time, which must not wait for the disk, from a process of their own. A process that dies loses
+    at most 50 rows (at 1 kHz: 50 ms), a power cut costs about one second.
 
     Attributes:
         path: the run folder.
@@ -73,8 +73,8 @@ class RunWriter:
             manifest: what ran on what; `manifest.OWN_KEYS` are filled in here.
             name: a hint in the folder's name, such as the controller and the plant.
             created: the moment of the start, now by default.
-            realtime: write from a process, not a thread, so that a loop in real time never waits
-                for the interpreter's lock; on Linux alone.
+            realtime: write from a process of its own, so that a loop in real time never waits
+                for the disk; on Linux alone.
 
         Raises:
             RecordingError: the folder cannot be written.
@@ -203,7 +203,7 @@ class RunWriter:
 
     def _hand_over(self) -> None:
         self._handed += self._block.count
-        self._block = self._disk.swap(self._block)
+        self._disk.take(self._block)
 
     def _refusal(self) -> RecordingError:
         """Return why no row can be added; from then on the caller knows."""
@@ -291,7 +291,6 @@ def _open(run: Path, manifest: Manifest, *, realtime: bool) -> AbstractDisk:
         undo.callback(events.close)
         write_manifest(run, manifest)
         kind = ProcessDisk if realtime and sys.platform == "linux" else Disk
-        rows = RowLayout(layout_of(manifest))
-        disk = kind(samples, events, schema_for(manifest), rows)
+        disk = kind(samples, events, schema_for(manifest))
         undo.pop_all()
     return disk

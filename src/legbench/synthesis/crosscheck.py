@@ -9,7 +9,7 @@ from legbench.synthesis.search import Cost, Found
 
 GENERATIONS = 600
 POPULATION = 10
-"""Candidates a generation and decision variable."""
+"""Number of candidates for each generation and decision variable."""
 
 
 def evolve(bounds: Bounds, cost: Cost, seed: int) -> Found:

@@ -1,4 +1,4 @@
-"""What a person needs to build a leg, and what to add to a part that came out wrong."""
+"""Table from which a leg is built, and weights for a part that came out wrong."""
 
 import math
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ SEGMENTS = ("thigh", "shank", "foot")
 LENGTH_APART = 0.05
 """Relative difference of lengths above which a measured segment is another one [-]."""
 SMALLEST_WEIGHT = 1e-5
-"""A difference of mass that nobody would add or file off [kg]."""
+"""Largest difference of mass that is left as it is [kg]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,7 +33,7 @@ class Row:
 
 
 def manufacture_table(design: LegDesign) -> tuple[Row, ...]:
-    """Every number that the leg is built by, in the units of a workshop."""
+    """Every number from which the leg is built, in the units of a workshop."""
     rows = [_row("trunk", "mass", "m_t", design.trunk_mass, "kg")]
     for index, (name, segment) in enumerate(zip(SEGMENTS, design.segments, strict=True), start=1):
         rows += [
@@ -60,7 +60,7 @@ WORKSHOP = {
 }
 """SI unit -> units of a workshop and how many of them make one; the last for large numbers."""
 LARGE = 1e4
-"""Value from which on the larger unit is used."""
+"""Smallest value that is shown in the larger unit."""
 
 
 def shown(value: float, unit: str) -> str:
@@ -99,9 +99,9 @@ class Adjustment:
     inertia_after: float
     """[kg m^2]"""
     inertia_missing: float
-    """Target less what is reached [kg m^2]; negative: a weight cannot take inertia away."""
+    """Inertia that is still missing [kg m^2]; negative: a weight cannot take inertia away."""
     note: str
-    """What to mind; empty if the weight fits on the segment."""
+    """Remark for the workshop; empty if the weight fits on the segment."""
 
 
 def adjust(name: str, measured: Segment, target: Segment) -> Adjustment:

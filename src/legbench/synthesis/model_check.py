@@ -18,7 +18,7 @@ from legbench.signals import Floats
 from legbench.synthesis.reduced_model import SWING, WINDUP, Forces, Reduced
 
 POSTURES = 60
-"""Leg lengths x2 that are looked at, spread evenly in the half angle."""
+"""Number of leg lengths x2 that are checked, spread evenly in the half angle."""
 TILT = 1e-4
 """Polar angle by which the leg is tilted to measure stability [rad]."""
 AGREES = 1e-9
@@ -47,7 +47,7 @@ class ModelCheck:
 
     rows: tuple[Projection, ...]
     shortest: float
-    """Range of leg lengths that was looked at [m]."""
+    """Range of leg lengths that was checked [m]."""
     longest: float
 
     @property
@@ -66,7 +66,7 @@ class ModelCheck:
 
     @property
     def agrees(self) -> bool:
-        """Whether generator and algebra say the same."""
+        """Whether generator and algebra agree."""
         return self.disagreement <= 1.0
 
 

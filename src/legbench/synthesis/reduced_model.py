@@ -7,6 +7,7 @@ import numpy as np
 
 from legbench.design import LegDesign
 from legbench.design.setup import Setup, SetupKind
+from legbench.kinematics import half_angle
 from legbench.mjcf import BuildOptions, Linkage, LinkageKind, build_spec, rest_qpos, to_xml
 from legbench.signals import Floats
 
@@ -52,7 +53,7 @@ class Reduced:
         """All forces at a posture (2,) [rad]."""
         model, data = self.model, self.data
         rate = SWING * np.array([-1.0, 1.0])
-        half = 0.5 * float(joint_pos[1] - joint_pos[0])
+        half = float(half_angle(joint_pos))
         # x2 = 2 l2 cos(half) moves evenly: d2(half)/dt2 = -rate^2 cot(half)
         bend = -(SWING**2) / np.tan(half) * np.array([-1.0, 1.0])
         self._place(joint_pos, np.zeros(2))

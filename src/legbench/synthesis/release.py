@@ -1,4 +1,4 @@
-"""How much of the radial mode many legs keep: each is released from a deflected posture.
+"""Rating of many legs that are released from a deflected posture.
 
 All of them move at once, with the motor positions that were computed for the design: nobody knows
 a leg's errors.
@@ -22,7 +22,7 @@ from legbench.plant.start import PERIOD, Start
 from legbench.signals import Bools, Floats
 
 KEPT = 0.95
-"""P^r that a leg has to keep [-]."""
+"""Rating P^r that a leg has to keep [-]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,15 +35,15 @@ class Release:
     dz2: float = 0.3
     """Deflection before it [rad]."""
     duration: float = 1.0
-    """How long the motion is rated [s]."""
+    """Duration over which the motion is rated [s]."""
     reference: Reference = Reference.EQUILIBRIUM
-    """What eq. (14) measures deflection from: gravity's sag, which flatters, is left out."""
+    """Reference of the deflection in eq. (14), without gravity's sag, which would flatter."""
     timestep: float = 0.001
     """Time step of the simulation [s]; P^r is then within 5e-5 of that at 0.25 ms."""
 
     @property
     def options(self) -> BuildOptions:
-        """The model: `reduced`, so that nothing but the scatter is in the way."""
+        """Options of the model; it is `reduced`, so that the scatter alone acts."""
         return BuildOptions(
             setup=Setup(kind=self.setup),
             linkage=Linkage(kind=LinkageKind.REDUCED),
@@ -53,20 +53,20 @@ class Release:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ratings:
-    """P^r of many legs."""
+    """Ratings P^r of many legs."""
 
     values: Floats
-    """(n,) [-]; zero for a leg that left its branch."""
+    """Rating P^r of each leg (n,) [-]; zero for a leg that left its branch."""
     faulted: Bools
 
     @property
     def kept(self) -> int:
-        """How many legs keep P^r above `KEPT`."""
+        """Number of legs that keep P^r above `KEPT`."""
         return int((self.values > KEPT).sum())
 
     @property
     def share(self) -> float:
-        """The yield [-]."""
+        """Yield: share of the legs that keep P^r above `KEPT` [-]."""
         return self.kept / len(self.values)
 
 
@@ -79,7 +79,7 @@ def rate_legs(
     release: Release,
     progress: Advance | None = None,
 ) -> Ratings:
-    """P^r of `legs`, each commanded as its `nominal` design asks for.
+    """Rate `legs` by P^r, each commanded as its `nominal` design asks for.
 
     Raises:
         ConfigError: a design that cannot be released there.

@@ -1,4 +1,4 @@
-"""What design and check have to say, as lines of text."""
+"""Reports of design and check, as lines of text."""
 
 import math
 from collections.abc import Sequence
@@ -16,13 +16,13 @@ from legbench.synthesis.yields import Yield
 EXACT = 1e-9
 """Ratio below which nothing is left to mend [-]."""
 MENDS = 3
-"""Ways out that are shown for each condition."""
+"""Number of changes that are shown for each condition."""
 
 
 def condition_lines(
     design: LegDesign, conditions: Sequence[Condition], half_angle: float, tolerance: float
 ) -> list[str]:
-    """A verdict a condition, and below it what would mend it."""
+    """Return a verdict for each condition, and below it the changes that would mend it."""
     lines = []
     for condition in conditions:
         verdict = "met" if condition.is_met(tolerance) else "VIOLATED"
@@ -39,7 +39,7 @@ def condition_lines(
 
 
 def mend_words(mend: Mend) -> str:
-    """One way out."""
+    """Return one change in words."""
     moves = f"; moves {', '.join(mend.moves)}" if mend.moves else ""
     return (
         f"{mend.parameter}: {mend.change:+.4g} {mend.unit} ({100.0 * mend.share:+.2g} %) "

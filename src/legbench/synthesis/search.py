@@ -1,4 +1,4 @@
-"""CMA-ES over the seven ratios (section IV); the one door to pycma."""
+"""Search by CMA-ES over the seven ratios (section IV); the only module that imports pycma."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
@@ -25,7 +25,7 @@ Progress = Callable[[int, float], None]
 
 
 class Stop(Protocol):
-    """Asked between generations."""
+    """Request to end a search, which is read between generations."""
 
     @property
     def is_set(self) -> bool:
@@ -35,7 +35,7 @@ class Stop(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SearchSettings:
-    """How to search.
+    """Settings of a search.
 
     Raises:
         ConfigError: a setting with which there is nothing to search.
@@ -43,11 +43,11 @@ class SearchSettings:
 
     seed: int = 0
     population: int = 20
-    """Candidates a generation."""
+    """Number of candidates in a generation."""
     restarts: int = 0
-    """Further searches, each with twice the population of the one before; the best counts."""
+    """Number of further searches, each with twice the population; the best counts."""
     evaluations: int = 20_000
-    """Limit of all searches together."""
+    """Largest number of evaluations of all searches together."""
 
     def __post_init__(self) -> None:
         for name, least in (("seed", 0), ("population", 4), ("restarts", 0), ("evaluations", 1)):
@@ -58,7 +58,7 @@ class SearchSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Found:
-    """End of a search."""
+    """Result of a search."""
 
     free: Floats
     """The best ratios (7,)."""
@@ -74,7 +74,7 @@ class Found:
 
 
 def identity_of(problem: Mapping[str, Any], settings: SearchSettings) -> dict[str, Any]:
-    """What decides a search, for the first line of its trace."""
+    """Everything that decides a search, for the first line of its trace."""
     searched = {key: value for key, value in asdict(settings).items() if key != "evaluations"}
     return {"problem": dict(problem), "settings": searched, "pycma": cma.__version__}
 

@@ -1,4 +1,4 @@
-"""Which bounds hold the optimum back, and what each costs.
+"""Bounds that hold the optimum back, and the price of each.
 
 At a constrained optimum the objective's gradient is balanced by the active bounds and by the
 margins that have become zero. Those forces are the multipliers: the objective that is gained per
@@ -17,15 +17,15 @@ from legbench.errors import DesignError
 from legbench.signals import Floats
 
 AT_BOUND = 1e-6
-"""How near to a bound a variable counts as held by it, of the bounds' width."""
+"""Distance from a bound within which it holds a variable, as a share of the bounds' width [-]."""
 AT_MARGIN = 1e-5
-"""How near to zero a margin counts as holding the optimum [-]."""
+"""Value of a margin below which it holds the optimum [-]."""
 MARGIN_KEPT = 1e-7
-"""What the local search keeps of every margin, so that its result is a leg [-]."""
+"""Value that the local search keeps of every margin, so that its result is a leg [-]."""
 STEP = 1e-3
 """Share of the bounds' width by which a bound is moved to check its multiplier [-]."""
 IMAGINARY = 1e-30
-"""Complex step: a derivative without cancellation."""
+"""Length of the complex step, by which a derivative has no cancellation [-]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""Requirements in, a finished leg out, with everything that says how good it is."""
+"""Solution of requirements: a finished leg, and everything that tells how good it is."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
@@ -33,16 +33,16 @@ MARGIN_UNITS = ("m1/m_leg", "m2/m_leg", "m3/m_leg", "I1/(m_leg l2^2)", "margin/(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Solution:
-    """A leg and what the search has to say of it."""
+    """Leg that a search has found, with the figures of the search."""
 
     requirements: Requirements
     design: LegDesign
     free: Floats
     """The seven ratios (7,)."""
     objective: float
-    """(11) [-]"""
+    """Value of objective (11) [-]."""
     cost: float
-    """What was minimised: (11), and, where asked for, what scatter costs [-]."""
+    """Cost that was minimised: objective (11), and, where asked for, the price of scatter [-]."""
     conditions: tuple[Condition, ...]
     active: tuple[ActiveBound, ...]
     evaluations: int
@@ -50,10 +50,10 @@ class Solution:
     """Whether the search converged; else this is the best so far."""
     seed: int
     check: Found | None
-    """What differential evolution found, if it was asked."""
+    """Result of differential evolution, if it was asked for."""
 
     def to_json(self) -> dict[str, Any]:
-        """Everything as one JSON object."""
+        """Return everything as one JSON object."""
         checked = None
         if self.check is not None:
             checked = {
@@ -184,7 +184,7 @@ def _total_cost(
 
 
 def explain(requirements: Requirements, free: Floats) -> str:
-    """Which condition keeps the nearest leg (7,) from existing."""
+    """Name the condition that keeps the nearest leg (7,) from existing."""
     margin = margins(requirements, solve_dependent(requirements, free))
     lacking = [
         f"{name} ({unit} = {value:.3g})"

@@ -11,7 +11,7 @@ from legbench.design.toml import UNITS, Table, load_tables, units_per_si
 from legbench.errors import DesignError
 
 FARTHEST = 3.0
-"""Parts further off than this are sorted out in manufacture [standard deviations]."""
+"""Error beyond which a part is sorted out in manufacture [standard deviations]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,7 +56,7 @@ class Tolerances:
 TOLERANCES = tuple(entry.name for entry in fields(Tolerances))
 """Names of the tolerances."""
 ABSOLUTE = ("com", "length")
-"""Those in metres; the others are relative."""
+"""Names of the tolerances in metres; the others are relative."""
 
 
 def tolerances_from_mapping(content: Mapping[str, Any]) -> Tolerances:

@@ -1,4 +1,4 @@
-"""What a search tried: kept in memory, and as a file from which the search goes on.
+"""Trace of a search: its evaluations in memory, and as a file from which the search goes on.
 
 The file has one JSON object a line: first the problem, then one line a generation. A search is
 reproducible from its seed, so a resumed one takes the costs that stand in the file instead of
@@ -14,8 +14,8 @@ import numpy as np
 
 from legbench.errors import ConfigError
 from legbench.reading import UnreadableError, parse_json
-from legbench.recording.files import write_whole
 from legbench.signals import Floats, Ints
+from legbench.writing import write_whole
 
 LINE = {"points", "costs"}
 """Keys of a generation's line."""
@@ -61,7 +61,7 @@ class Trace:
         return sum(len(costs) for costs in self._costs)
 
     def best(self) -> tuple[Floats, float]:
-        """The cheapest ratios so far (7,), and their cost."""
+        """Cheapest ratios so far (7,), and their cost."""
         costs = self.costs
         index = int(np.argmin(costs))
         return self.points[index], float(costs[index])
@@ -83,7 +83,7 @@ class Trace:
         return np.array(known["costs"], dtype=np.float64)
 
     def append(self, points: Floats, costs: Floats, *, recalled: bool) -> None:
-        """Keep a generation; written out at once unless it came from the file."""
+        """Add a generation; it is written out at once unless it came from the file."""
         self._points.append(points)
         self._costs.append(costs)
         if self._file is not None and not recalled:
@@ -125,7 +125,7 @@ def _rewrite(path: Path, entries: list[Any]) -> None:
 
 
 def _whole(lines: list[str]) -> list[Any]:
-    """The lines up to the first that a crash cut short."""
+    """Return the lines up to the first that a crash has cut short."""
     entries: list[Any] = []
     for line in lines:
         try:

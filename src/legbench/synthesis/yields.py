@@ -1,4 +1,4 @@
-"""What manufacture leaves of a design: the yield, what hurts it, and what a search pays for it."""
+"""Yield of a design under the scatter of manufacture, and its price in a search."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -15,19 +15,19 @@ from legbench.synthesis.tolerance import TOLERANCES, Tolerances
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Yield:
-    """What scatter does to a design, and which tolerance does it."""
+    """Yield of a design, with all tolerances and with each alone."""
 
     tolerances: Tolerances
     release: Release
     legs: int
     kept: int
-    """Legs of `legs` that keep P^r above `KEPT`."""
+    """Number of the `legs` that keep P^r above `KEPT`."""
     nominal: float
-    """P^r of the design itself [-]."""
+    """Rating P^r of the design itself [-]."""
     mean: float
-    """P^r of the scattered legs [-]."""
+    """Ratings P^r of the scattered legs [-]."""
     tenth: float
-    """P^r that nine legs of ten keep [-]."""
+    """Rating P^r that nine legs of ten keep [-]."""
     causes: dict[str, tuple[float, float]]
     """Tolerance -> share of legs kept and mean P^r, when it scatters alone; the worst first."""
 
@@ -76,13 +76,13 @@ def measure_yield(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ScatterCost:
-    """What candidates pay for the rating that scatter takes from them."""
+    """Cost of the rating that scatter takes from a candidate of a search."""
 
     tolerances: Tolerances
     legs: int = 12
-    """Made of every candidate, with the same errors [-]."""
+    """Number of legs that are made of every candidate, with the same errors."""
     weight: float = 1.0
-    """Objective per unit of P^r lost [-]."""
+    """Price in the objective of a unit of P^r lost [-]."""
     seed: int = 0
     release: Release = field(default_factory=lambda: Release(duration=0.5))
 

@@ -45,7 +45,7 @@ def colouring_of(recording: Recorded) -> Colouring:
         first, stop = np.searchsorted(run.time, [begin, end])
         return Colouring(
             stretches=_by_stance(run, int(first), int(stop)),
-            ratings=_jump_ratings(ratings.stance, ratings.flight),
+            ratings=_jump_ratings(ratings.stance, ratings.flight, len(jumps)),
         )
     periods = run.periods
     count = len(periods)
@@ -75,13 +75,16 @@ def _by_stance(run: Analysis, first: int, stop: int) -> tuple[ColouredRows, ...]
     )
 
 
-def _jump_ratings(stance: list[float], flight: list[float]) -> str:
+def _jump_ratings(stance: list[float], flight: list[float], jumps: int) -> str:
+    """Means over the highlighted jumps, and how many these are of those of the run."""
+    shown = min(jumps, LAST_JUMPS)
     parts = [
-        f"$P^r_{{{name}}}$ = {np.nanmean(values[-LAST_JUMPS:]):.3f}"
+        f"$P^r_{{{name}}}$ = {np.nanmean(values[-shown:]):.3f}"
         for name, values in (("st", stance), ("fl", flight))
-        if _any_finite(values)
+        if _any_finite(values[-shown:])
     ]
-    return ", ".join(parts) + f" (last {LAST_JUMPS} jumps)" if parts else ""
+    number = f"{'last ' if shown < jumps else ''}{shown} jump{'' if shown == 1 else 's'}"
+    return f"{', '.join(parts)} ({number})" if parts else ""
 
 
 def _period_ratings(values: list[float]) -> str:

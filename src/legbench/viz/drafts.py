@@ -8,30 +8,33 @@ import numpy as np
 
 from legbench.errors import RecordingError
 from legbench.metrics.source import Recorded
-from legbench.recording.files import put_in_place
+from legbench.writing import put_in_place, reason
 
 
 @contextmanager
 def draft_of(path: Path) -> Iterator[Path]:
     """Yield a draft file with `path`'s suffix, which replaces `path` if no exception is raised.
 
+    The folder is made if need be.
+
     Raises:
         RecordingError: nothing can be written there.
     """
     draft = path.with_name(f".{path.stem}.draft{path.suffix}")
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         # The draft is made anew: whatever lies there, such as a link, is not written through.
         draft.unlink(missing_ok=True)
         draft.touch(exist_ok=False)
     except OSError as error:
-        raise RecordingError(f"cannot write {path}: {error.strerror}") from error
+        raise RecordingError(f"cannot write {path}: {reason(error)}") from error
     try:
         yield draft
         put_in_place(draft, path)
     except RecordingError:
         raise
     except OSError as error:
-        raise RecordingError(f"cannot write {path}: {error.strerror or error}") from error
+        raise RecordingError(f"cannot write {path}: {reason(error)}") from error
     finally:
         draft.unlink(missing_ok=True)
 

@@ -33,6 +33,9 @@ TRUNK: Rgb = (52, 104, 172)
 BAR_GREEN: Rgb = (67, 160, 88)
 BAR_BLACK: Rgb = (96, 98, 104)
 
+COMPONENTS: tuple[Rgb, ...] = (FIRST, SECOND, ACCENT, MODE_1, MODE_2, GREY)
+"""Colours of the components of a controller's own signal, in turn."""
+
 PHASES: dict[Role, tuple[Rgb, ...]] = {
     Role.REST: ((120, 120, 128), (150, 150, 158), (92, 92, 100), (170, 164, 150)),
     Role.ACTING: ((214, 130, 40), (142, 108, 190), (158, 158, 120), (0, 150, 136)),

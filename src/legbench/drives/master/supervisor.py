@@ -9,7 +9,7 @@ from legbench.drives.protocol.cia402 import Way, describe_statusword
 from legbench.drives.setup.config import BusConfig
 from legbench.drives.transport.timebase import Timebase
 from legbench.errors import PlantFault
-from legbench.limits.safety import SafetyLimits
+from legbench.limits.safety import OVERRUNS, SafetyLimits
 
 MISSING_TEMPERATURES = 3
 """Number of unanswered temperature requests in a row that end a run with such a limit."""
@@ -41,7 +41,7 @@ class Supervisor:
             )
         if self._overruns >= self._limits.overrun_cycles:
             raise PlantFault(
-                "cycle overruns",
+                OVERRUNS,
                 f"{self._overruns} ticks of {self._config.period_us} us missed in a row, the limit "
                 f"is {self._limits.overrun_cycles}; free the processor",
             )

@@ -10,7 +10,7 @@ from tomlkit.exceptions import TOMLKitError
 
 from legbench.errors import ConfigError
 from legbench.reading import LARGEST_TOML, UnreadableError, read_file
-from legbench.recording.files import write_whole
+from legbench.writing import write_whole
 
 Place = tuple[str | int, ...]
 """Way to a value: names of tables and keys, and indices into lists of tables."""

@@ -81,7 +81,6 @@ HEIGHTS = Line(
 
 OWN = "/series/own"
 """Parent of the signals that the controller declared."""
-OWN_COLOURS = (*COMPONENTS, style.ACCENT, style.MODE_1, style.MODE_2, style.GREY)
 
 
 def own_line(signal: Signal) -> Line:
@@ -91,7 +90,7 @@ def own_line(signal: Signal) -> Line:
         signal=signal.name,
         path=f"{OWN}/{signal.name}",
         names=signal.components or (signal.name,),
-        colours=tuple(OWN_COLOURS[place % len(OWN_COLOURS)] for place in range(count)),
+        colours=tuple(style.COMPONENTS[place % len(style.COMPONENTS)] for place in range(count)),
     )
 
 

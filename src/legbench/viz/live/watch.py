@@ -77,7 +77,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with open(os.devnull, "w", encoding="utf-8") as nowhere:
             watch(options, ending, nowhere)
     except LegbenchError as error:
-        (options.run / LOG).write_text(f"{error}\n", encoding="utf-8")
+        with suppress(OSError):  # The run's folder is gone: nobody is left to be told.
+            (options.run / LOG).write_text(f"{error}\n", encoding="utf-8")
         return 1
     return 0
 

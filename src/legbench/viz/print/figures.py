@@ -1,4 +1,4 @@
-"""Print figures: the three planes of Figs. 4 and 6."""
+"""Print figures: the three planes of Figs. 4 and 6, and the controller's own signals below."""
 
 from collections.abc import Sequence
 
@@ -25,9 +25,9 @@ from legbench.viz.print.overlay import (
     draw_other,
     planes_of,
 )
+from legbench.viz.print.own_signals import draw_own_signals, own_signals_of
+from legbench.viz.print.panels import panels_of, size_of
 
-SIZE, TALL = (10.0, 3.7), (10.0, 6.4)
-"""Figure sizes with one and with two rows of panels [inch]."""
 WIDTH, WIDE = 1.3, 2.4
 """Widths of the coloured lines alone, and under the lines of another run [pt]."""
 PLANES = (
@@ -42,7 +42,8 @@ def phase_figure(recording: Recorded, against: Sequence[Recorded] = ()) -> Figur
     """Foot tip in polar coordinates, joint space with w1 and w2, modal phase, side by side.
 
     A jump shows its last three jumps in the colours of stance and flight, earlier rows faintly;
-    any other run is coloured by oscillation period.
+    any other run is coloured by oscillation period. The signals that the controller declared have
+    panels of their own below.
 
     Args:
         recording: the run.
@@ -57,11 +58,12 @@ def phase_figure(recording: Recorded, against: Sequence[Recorded] = ()) -> Figur
     for each in (run, *others):
         require_rows(each)
     facts, colouring = facts_of(run.description), colouring_of(run)
-    points = planes_of(run, facts.run.convention)
+    points, own = planes_of(run, facts.run.convention), len(own_signals_of(run))
     with styled():
-        figure = Figure(figsize=TALL if against else SIZE, layout="constrained")
+        figure = Figure(figsize=size_of(bool(against), own), layout="constrained")
         FigureCanvasAgg(figure)
-        panels, below = _panels(figure, bool(against))
+        rows = panels_of(figure, bool(against), own)
+        panels = rows.planes
         for panel, letter, (title, x, y), plane in zip(panels, "abc", PLANES, points, strict=True):
             panel.set_title(f"({letter}) {title}", loc="left")
             panel.set_xlabel(x.math)
@@ -72,22 +74,14 @@ def phase_figure(recording: Recorded, against: Sequence[Recorded] = ()) -> Figur
         for place, other in enumerate(others):
             draw_other(panels, other, facts.run.convention, place)
         if others:
-            draw_differences(below, run, others)
+            draw_differences(rows.differences, run, others)
+        draw_own_signals(rows.own, len(panels) + len(rows.differences), run, others)
         _at_least(panels[0], style.POLAR_LEAST)
         _draw_modes(panels[1], facts, run["joint_pos"])
         explain(figure, panels, colouring, names_of([run, *others]) if others else [])
         title = " — ".join(filter(None, [facts.headline, colouring.ratings]))
         figure.suptitle(title, fontsize=10.5)
     return figure
-
-
-def _panels(figure: Figure, two_rows: bool) -> tuple[list[Axes], list[Axes]]:
-    """The three panels of the planes, and the two below them."""
-    if not two_rows:
-        return [figure.add_subplot(1, 3, place) for place in (1, 2, 3)], []
-    grid = figure.add_gridspec(2, 6, height_ratios=(1.5, 1.0))
-    above = [figure.add_subplot(grid[0, column : column + 2]) for column in (0, 2, 4)]
-    return above, [figure.add_subplot(grid[1, column : column + 3]) for column in (0, 3)]
 
 
 def _draw(panel: Axes, points: Floats, colouring: Colouring, width: float) -> None:

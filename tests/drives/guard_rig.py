@@ -1,0 +1,43 @@
+"""A guard at rest, and what its acts end in; numbers are exact in binary."""
+
+from typing import Any
+
+from legbench.errors import PlantFault
+from legbench.limits.guard import Guard
+from legbench.limits.plausibility import Bounds
+from legbench.limits.safety import SafetyLimits
+
+PERIOD = 0.25
+"""So long that steps, ranges and speeds are exact binary numbers [s]."""
+REST = (-0.5, 0.5)
+BOUNDS = Bounds(
+    period=1e-3,
+    following_error=0.03,
+    following_cycles=5,
+    servo_bandwidth=15.0,
+    joint_speed=60.0,
+    standing=0.02,
+    sway=0.05,
+)
+"""Bounds of motors and links at 1 kHz."""
+
+
+def started(limits: SafetyLimits, place: tuple[float, float] = REST) -> Guard:
+    """A guard whose command stands at a place [rad]."""
+    guard = Guard(limits, PERIOD)
+    guard.start_at(place)
+    return guard
+
+
+def pair(axis: int, value: float, other: float) -> tuple[float, float]:
+    """A value for one axis, and one for the other."""
+    return (value, other) if axis == 0 else (other, value)
+
+
+def fault(act: Any, *args: Any, **kwargs: Any) -> str | None:
+    """Cause and text of the fault that is raised, if one is."""
+    try:
+        act(*args, **kwargs)
+    except PlantFault as error:
+        return f"{error.cause}: {error}"
+    return None
