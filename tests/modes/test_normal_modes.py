@@ -10,10 +10,11 @@ from legbench.design import LegDesign, load_design
 from legbench.design.setup import SetupKind
 from legbench.errors import ConfigError
 from legbench.modes.brake import at_energy, floquet, follow
+from legbench.modes.curve import curve_through
 from legbench.modes.flow import flow, orbit
 from legbench.modes.linear import linear_modes
 from legbench.modes.scene import Scene, make_scene
-from legbench.modes.strict import check, curve_through, radial_line
+from legbench.modes.strict import check, radial_line
 
 MODELS = Path(__file__).parents[2] / "models"
 EXACT = exact_design()

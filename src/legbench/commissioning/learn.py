@@ -23,7 +23,7 @@ from legbench.drives.sheet.predict import predict
 from legbench.drives.sheet.propose import Proposal, propose
 from legbench.errors import ConfigError
 from legbench.reading import LARGEST_TOML, UnreadableError, parse_toml, read_file
-from legbench.recording.files import write_whole
+from legbench.writing import save_whole
 
 USUAL_NODES = (1, 2)
 """Node ids of a leg's drives, if nobody says otherwise."""
@@ -115,11 +115,7 @@ def write_bus(learned: Learned, out: Path) -> None:
     """
     if out.exists() or out.is_symlink():
         raise ConfigError(f"{out} is there already, and is left as it is; give another --out")
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(out, learned.text.encode())
-    except OSError as error:
-        raise ConfigError(f"{out} cannot be written: {error}") from error
+    save_whole(out, learned.text)
 
 
 def check(bus: Path, eds: Path | None = None) -> Learned:

@@ -10,11 +10,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import root_scalar
 
 from legbench.errors import ConfigError
 from legbench.modes.flow import flow, orbit
 from legbench.modes.linear import LinearMode, linear_modes
+from legbench.modes.roots import bracketed
 from legbench.modes.scene import Scene
 from legbench.signals import Floats
 
@@ -182,11 +182,9 @@ def at_energy(scene: Scene, family: Family, energy: float) -> BrakeOrbit:
                     raise ConfigError(f"the {name} mode is lost near {energy:.4g} J")
                 return solved
 
-            share = root_scalar(
-                lambda s: float(scene.potential(corrected(s)[0][:2])) - energy,
-                bracket=(0.0, 1.0),
-                xtol=1e-13,
-            ).root
+            share = bracketed(
+                lambda s: float(scene.potential(corrected(s)[0][:2])) - energy, 0.0, 1.0, 1e-13
+            )
             unknown, end = corrected(float(share))
             return _describe(scene, unknown, end, unit, name)
     raise ConfigError(

@@ -8,7 +8,6 @@ an acceleration by M^-1, is tangent to it, so that nothing pushes the leg off.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from legbench.analytic.matrices import pair_coriolis
 from legbench.modes.flow import orbit
@@ -59,15 +58,6 @@ def radial_line(scene: Scene, reach: float) -> Curve:
     points = np.asarray(scene.rest) + along * RADIAL
     tangent = np.broadcast_to(RADIAL, points.shape)
     return Curve(points=points, tangent=tangent, bend=np.zeros(points.shape))
-
-
-def curve_through(points: Floats) -> Curve:
-    """A smooth curve through points (n, 2) in order, no two the same."""
-    steps = np.linalg.norm(np.diff(points, axis=0), axis=-1)
-    at = np.concatenate([[0.0], np.cumsum(steps)])
-    spline = CubicSpline(at, points)
-    knots = np.linspace(0.0, at[-1], KNOTS)
-    return Curve(points=spline(knots), tangent=spline(knots, 1), bend=spline(knots, 2))
 
 
 def check(scene: Scene, curve: Curve, seconds: float) -> Strictness:

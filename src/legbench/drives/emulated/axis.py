@@ -159,7 +159,8 @@ class Axis:
         target = asked + values[0x60B0, 0] if fresh and units.show(asked) == asked else None
         if target is not None:
             # The object wraps; the motor takes the short way round.
-            target = units.nearest(self.motion.sign * target, round(self.motion.demand))
+            near = round(self.motion.demand)
+            target = units.nearest(self.motion.sign * target, near)
         self.motion.latch(target, now_ns)
         if self.motion.missing > self._behaviour.missing_limit:
             self.fault(SETPOINTS_MISSING)

@@ -102,6 +102,15 @@ class NodeConfig:
         return (STATUSWORD, self.motor_object, *found)
 
     @property
+    def link_units(self) -> AxisUnits:
+        """Units of the second encoder; raises ConfigError on a drive that has one encoder."""
+        if self.link is None:
+            raise ConfigError(
+                f"node '{self.name}' has no second encoder, which [node.link] describes"
+            )
+        return self.link
+
+    @property
     def knows(self) -> frozenset[str]:
         """Names of the signals that the drive tells of its joint, see `known_signals`."""
         second, torque = self.link is not None, self.torque_object is not None
