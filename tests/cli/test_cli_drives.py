@@ -91,8 +91,8 @@ def test_zero_writes_offsets_and_keeps_the_comments(
     before = load_bus(BUS).nodes
     motor = before[0].motor.to_counts(IDLE_POS[0])
     assert abs(nodes[0].motor.to_rad(motor) + 0.4) < nodes[0].motor.resolution
-    link = before[1].link.to_counts(IDLE_POS[1])
-    assert abs(nodes[1].link.to_rad(link) - 0.4) < nodes[1].link.resolution
+    link = before[1].link_units.to_counts(IDLE_POS[1])
+    assert abs(nodes[1].link_units.to_rad(link) - 0.4) < nodes[1].link_units.resolution
     assert path.read_text().count("#") == BUS.read_text().count("#")
 
 

@@ -44,7 +44,7 @@ def wide() -> object:
         nodes.append(
             replace(
                 usual,
-                link=replace(usual.link, bits=32, counts_per_rev=1 << 24),
+                link=replace(usual.link_units, bits=32, counts_per_rev=1 << 24),
                 link_object=LINK_POSITION,
                 tpdos=(
                     PdoConfig(number=1, objects=(STATUSWORD, POSITION_ACTUAL)),

@@ -244,7 +244,7 @@ def test_a_frame_of_a_wrong_length_changes_nothing() -> None:
 @pytest.mark.parametrize("turns", [-2000, -1, 0, 1, 2000])
 def test_a_link_is_found_within_half_a_turn_of_its_motor_and_then_followed(turns: int) -> None:
     axis = AxisLink(node(1))
-    motor, link = axis.node.motor, axis.node.link
+    motor, link = axis.node.motor, axis.node.link_units
     motor_counts, link_counts = 0, 0
     for step in range(40):
         angle = 2.0 * math.pi * turns + 0.3 * step

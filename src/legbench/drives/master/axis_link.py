@@ -54,7 +54,8 @@ class AxisLink:
         self.motor_counts = 0
         self.link_counts = 0
         units, link = node.motor, node.link
-        self._motor_rad, self._show = units.to_rad, units.show
+        self._motor_rad = units.to_rad
+        self._lowest, self._modulus = units.lowest, units.modulus
         self._link_rad = None if link is None else link.to_rad
         self.motor_pos = self._motor_rad(0)
         self.link_pos = math.nan if link is None else link.to_rad(0)
@@ -186,7 +187,9 @@ class AxisLink:
     def frames(self, controlword: int) -> list[tuple[int, bytes]]:
         """RPDOs of this cycle: COB-ID and data."""
         self.sent_counts = self.target_counts
-        target = self._show(self.target_counts)
+        # As `AxisUnits.show`, without its calls.
+        lowest = self._lowest
+        target = lowest + (self.target_counts - lowest) % self._modulus
         if self._plain:
             cob_id, layout = self._rpdos[0]
             return [(cob_id, layout.pack((controlword, target)))]

@@ -29,7 +29,8 @@ from legbench.drives.master.port import Listener, Port
 from legbench.drives.master.sample import Sample
 from legbench.drives.master.stop_report import Lead, StopReport
 from legbench.drives.master.ticks import Ticks
-from legbench.drives.setup.config import BusConfig, check_start_speed
+from legbench.drives.setup.bus_numbers import check_start_speed
+from legbench.drives.setup.config import BusConfig
 from legbench.drives.setup.exchange import check_budget
 from legbench.drives.transport.lock import ChannelLock
 from legbench.drives.transport.open_bus import timebase_of

@@ -31,6 +31,8 @@ WORD = (1 << 16) - 1
 """Highest value of an object of 16 bits."""
 LONG = (1 << 32) - 1
 """Highest value of an object of 32 bits."""
+FASTEST_START = 5.0
+"""Highest speed of the move to the start posture, before a run begins [rad/s]."""
 
 
 def check_bus_numbers(numbers: Mapping[str, int], waived: Sequence[str]) -> None:
@@ -52,4 +54,12 @@ def check_bus_numbers(numbers: Mapping[str, int], waived: Sequence[str]) -> None
         raise ConfigError(
             f"heartbeat_ms is {beat} ms; it must be positive and at most {end} ms: a drive counts "
             f"as lost after three{way}"
+        )
+
+
+def check_start_speed(speed: float) -> None:
+    """Refuse a start speed [rad/s] that is not above 0 or is too fast; raises ConfigError."""
+    if not 0.0 < speed <= FASTEST_START:
+        raise ConfigError(
+            f"start_speed is {speed:g} rad/s; it must be above 0 and at most {FASTEST_START:g}"
         )

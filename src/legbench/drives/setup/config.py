@@ -6,7 +6,7 @@ from pathlib import Path
 
 from legbench.drives.protocol.frame import LAST_NODE, RPDO_BASES, TPDO_BASES
 from legbench.drives.protocol.pdo import Mapped
-from legbench.drives.setup.bus_numbers import BUS_NUMBERS, check_bus_numbers
+from legbench.drives.setup.bus_numbers import BUS_NUMBERS, check_bus_numbers, check_start_speed
 from legbench.drives.setup.cob_ids import check_distinct
 from legbench.drives.setup.encoders import Side, check_encoder, check_sides, known_signals
 from legbench.drives.setup.homed import HomedCondition
@@ -102,6 +102,15 @@ class NodeConfig:
         return (STATUSWORD, self.motor_object, *found)
 
     @property
+    def link_units(self) -> AxisUnits:
+        """Units of the second encoder; raises ConfigError on a drive that has one encoder."""
+        if self.link is None:
+            raise ConfigError(
+                f"node '{self.name}' has no second encoder, which [node.link] describes"
+            )
+        return self.link
+
+    @property
     def knows(self) -> frozenset[str]:
         """Names of the signals that the drive tells of its joint, see `known_signals`."""
         second, torque = self.link is not None, self.torque_object is not None
@@ -150,16 +159,6 @@ USUAL_DEADLINE = 0.7
 """Share of the period that drives have for their answers [-]."""
 NOT_IN_FILES = "not in files"
 """Metadata of a field that is no key of a bus file."""
-FASTEST_START = 5.0
-"""Highest speed of the move to the start posture, before a run begins [rad/s]."""
-
-
-def check_start_speed(speed: float) -> None:
-    """Refuse a start speed [rad/s] that is not above 0 or is too fast; raises ConfigError."""
-    if not 0.0 < speed <= FASTEST_START:
-        raise ConfigError(
-            f"start_speed is {speed:g} rad/s; it must be above 0 and at most {FASTEST_START:g}"
-        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
