@@ -1,9 +1,10 @@
-"""Joint stops on the compiled leg: which joint is beyond its limit, and whether its stop pushes.
+"""Joint stops of the compiled leg: which joint is beyond its limit, and whether its stop pushes.
 
-The law (`analytic.stops`) compares: a stop acts beyond the limit, and only while it would push. The
-compiled equations switch instead, so both comparisons are events, and between events the switches
-are known. A switch is set by the law whenever something jumps, and by its own event otherwise,
-never by the sign of a number that is zero up to rounding. So no stop can pull.
+By the law (`analytic.stops`) a stop acts beyond the limit, and only while it would push. The
+compiled equations have switches in the place of these two comparisons. Each comparison is an event,
+so the switches are constant between events. A switch is set by the law whenever something jumps,
+and by its own event otherwise, never by the sign of a number that is zero up to rounding. So no
+stop can pull.
 """
 
 from typing import final
@@ -16,14 +17,16 @@ from legbench.analytic.terms import PairTerms
 from legbench.analytic.watch import OFF, Watch
 
 AT_LIMIT = 1e-12
-"""Depth that may be rounding: the speed then says whether the stop is touched [rad]."""
+"""Largest depth that may be rounding; the speed then says whether the stop is touched [rad]."""
 FIRST = int(Event.KNEE_LOW)
-"""Place of the first of the four events of meeting or leaving a limit."""
+"""Number of the first of the four events in which a joint meets or leaves a limit."""
 
 
 @final
 class Bumpers:
-    """The stops of knee and hip, lower and upper end each; none of a leg that has no stops.
+    """State of the joint stops of one leg, at the lower and upper ends of knee and hip.
+
+    A leg without stops is never touched.
 
     Attributes:
         touched: whether a joint is beyond a limit.
@@ -34,11 +37,11 @@ class Bumpers:
         self._touched = [False] * len(model.stops)
         self._pushing, self._free = [False, False], [False, False]
         self._acting: list[Stop | None] = [None, None]
-        """The stop that each joint is beyond."""
+        """Stop that acts on each joint, or none within the limits."""
         self.touched, self._version = False, 0
 
     def find(self, q: Pair, v: Pair) -> None:
-        """Tell by the law which limits a leg is beyond that is put somewhere."""
+        """Determine by the law which limits a joint is beyond, for a leg set to a new state."""
         found = []
         for stop in self._stops:
             depth = stop.depth(q)
@@ -48,7 +51,7 @@ class Bumpers:
             self._changed()
 
     def lay(self, watch: Watch) -> None:
-        """Watch the four events: to go beyond a limit, or to come back."""
+        """Set the four events of the limits: to go beyond each, or to come back from beyond it."""
         if watch.version == self._version:
             return
         watch.version = self._version
@@ -58,7 +61,7 @@ class Bumpers:
                 watch.lay(FIRST + index, gain, gain * stop.limit)
 
     def cross(self, event: int) -> None:
-        """A joint has gone beyond a limit, or has come back."""
+        """Note that a joint has gone beyond a limit, or has come back."""
         self._touched[event - FIRST] ^= True
         self._changed()
 
@@ -71,7 +74,7 @@ class Bumpers:
         self._version += 1
 
     def decide(self, watch: Watch, terms: PairTerms, motor: Pair, q: Pair, v: Pair) -> None:
-        """Let those stops push of which the law asks it, after something has jumped."""
+        """Set the switches of the pushes by the law, after something has jumped."""
         if not self.touched:
             if watch.pushed:
                 self._silence(watch)
@@ -85,7 +88,7 @@ class Bumpers:
         self._switch(watch)
 
     def flip(self, watch: Watch, event: int) -> None:
-        """A stop begins or ends to push, or would if the foot were let go."""
+        """Note that a stop begins or ends to push, or would if the foot were released."""
         if event >= Event.KNEE_FREE:
             self._free[event - Event.KNEE_FREE] ^= True
         else:
@@ -93,7 +96,7 @@ class Bumpers:
         self._switch(watch)
 
     def guard(self, watch: Watch, terms: PairTerms, motor: Pair, q: Pair, v: Pair) -> None:
-        """Watch the pushes of the joints that are beyond a limit."""
+        """Set and guard the events of the pushes, for the joints that are beyond a limit."""
         found = [(Event.KNEE_PUSH, terms, self._pushing)]
         if watch.held:
             found.append((Event.KNEE_FREE, self._model.falling, self._free))
@@ -108,7 +111,7 @@ class Bumpers:
                 watch.guard(first + joint, stop.sign * asked[joint])
 
     def _silence(self, watch: Watch) -> None:
-        """Let no stop act, and watch no push, as no joint is beyond a limit."""
+        """Switch all pushes and their events off, as no joint is beyond a limit."""
         watch.pushed = False
         watch.pars[PUSHES : PUSHES + 4 : 2] = 0.0
         for event in (Event.KNEE_PUSH, Event.HIP_PUSH):
@@ -130,20 +133,20 @@ class Bumpers:
     def turns(
         self, ops: Ops, terms: PairTerms, torque: Pair, q: Pair, v: Pair, *, free: bool = False
     ) -> tuple[list[Term], Pair]:
-        """What the law asks of each joint's stop, in the reading of the events; accelerations.
+        """Readings of the events of each joint's stop, and the accelerations of the angles.
 
-        Those stops act that are switched on, those of the leg in the air if `free`.
+        The stops act that are switched on; if `free`, those switched on for the leg in the air.
+        A reading is the acceleration by which the law turns the joint back, times the square of
+        the stop's time constant [rad]. Accelerations are in rad/s^2.
         """
         return self._turns(ops, terms, torque, q, v, self._free if free else self._pushing)
 
     def released(self, terms: PairTerms, torque: Pair, q: Pair, v: Pair) -> Pair:
-        """Accelerations where those stops act, of the limits a joint is known to be beyond, that
-        would push.
-        """
+        """Accelerations of the angles where every touched stop acts that would push [rad/s^2]."""
         return self._turns(SCALAR, terms, torque, q, v, None)[1]
 
     def _asked(self, terms: PairTerms, motor: Pair, q: Pair, v: Pair) -> list[float]:
-        """What the law asks of each joint's stop, where those act that would push."""
+        """Readings of the events of each joint's stop where every stop acts that would push."""
         torque = self._model.torque(motor, q, v)
         return self._turns(SCALAR, terms, torque, q, v, None)[0]
 
@@ -170,6 +173,6 @@ class Bumpers:
         return found, a
 
     def sign(self, joint: int) -> float:
-        """1 for a joint beyond its lower limit, -1 beyond its upper one, else 0."""
+        """Direction in which a joint's stop pushes: 1 at the lower limit, -1 at the upper, or 0."""
         stop = self._acting[joint]
         return 0.0 if stop is None else stop.sign

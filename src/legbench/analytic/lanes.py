@@ -1,13 +1,13 @@
-"""Many legs side by side: each its own parameters, all through the same instructions.
+"""Batch of legs, each with parameters of its own, that are integrated by the same instructions.
 
     lanes = Lanes(models, Regime.PINNED, derivatives=True)
     lanes.start(states)                  # (n, 4)
-    lanes.go(0.001, motors)              # sampled and held, as often as the control asks for
+    lanes.go(0.001, motors)              # one period of a sampled controller
     lanes.states, lanes.slopes           # (n, 4), (n, 4, 9)
-    path = lanes.path(times, motors)     # or in one go, (n, len(times), 4)
+    path = lanes.path(times, motors)     # or many times in one call, (n, len(times), 4)
 
-For legs that are held, by trunk or foot, and stay within their joints: there are no events here,
-and no stops. `outside` names those that were seen beyond a limit.
+The legs are held by trunk or foot and stay within their joints' limits: a batch has neither events
+nor joint stops. `outside` says which legs were seen beyond a limit.
 """
 
 from collections.abc import Callable, Sequence
@@ -30,9 +30,9 @@ from legbench.errors import ConfigError, PlantFault
 from legbench.signals import Floats
 
 STATES = 4
-"""Two angles and their rates [-]."""
+"""Number of states of a leg, two angles and their rates [-]."""
 LAST = SHARPNESS + 1
-"""Length of a leg's parameters here."""
+"""Number of parameters of a leg in a batch [-]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,9 +44,9 @@ class Friction:
     """
 
     torque: tuple[float, float]
-    """[N m]"""
+    """Coulomb friction torque of each joint [N m]."""
     width: float = 0.05
-    """Rate at which three quarters of it act [rad/s]."""
+    """Rate at which three quarters of the torque act [rad/s]."""
 
     def __post_init__(self) -> None:
         if not min(self.torque) >= 0.0:
@@ -57,10 +57,10 @@ class Friction:
 
 @final
 class Lanes:
-    """Legs under way in step, blind to stops and events.
+    """Batch of held legs that move in step, without joint stops and events.
 
     Attributes:
-        time: where all of them are [s].
+        time: present time of all legs [s].
         outside: legs that were seen beyond a joint limit (n,).
 
     Raises:
@@ -105,7 +105,7 @@ class Lanes:
         self.start(np.zeros((self._count, STATES)))
 
     def start(self, states: Floats) -> None:
-        """Put the legs somewhere at time zero, (n, 4) [rad, rad/s]; derivatives begin there."""
+        """Set the states at time zero, (n, 4) [rad, rad/s]; derivatives are zero there."""
         self.time = 0.0
         self.outside[:] = False
         for block, part in zip(self._blocks, self._parts(states), strict=True):
@@ -154,7 +154,7 @@ class Lanes:
         return whole.T[: self._count].reshape(self._count, STATES, self._seeds)
 
     def _look(self, states: Floats) -> None:
-        """Note who is beyond a limit, of states (n, t, 4)."""
+        """Note which legs are beyond a limit in states (n, t, 4)."""
         q = (states[..., 0], states[..., 1])
         for index, model in enumerate(self._models):
             for stop in model.stops:
@@ -167,13 +167,17 @@ class Lanes:
             block.pars[:] = part.T[: len(block.pars)]
 
     def _parts(self, rows: Floats) -> list[Floats]:
-        """Rows of the legs, a block's at a time; the last leg fills the last block up."""
+        """Rows of the legs, split by block; the last leg is repeated to fill the last block."""
         missing = len(self._blocks) * self._width - self._count
         filled = np.concatenate([rows, np.repeat(rows[-1:], missing, axis=0)])
         return np.split(filled, len(self._blocks))
 
     def _each(self, act: Callable[[Any], Any]) -> list[Any]:
-        """What each block answers, on as many threads as there are workers."""
+        """Results of `act` for every block, on as many threads as there are workers.
+
+        Raises:
+            PlantFault: a leg runs away.
+        """
         if self._workers > 1 and len(self._blocks) > 1:
             with ThreadPoolExecutor(self._workers) as pool:
                 answers = list(pool.map(act, self._blocks))

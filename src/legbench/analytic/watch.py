@@ -1,12 +1,12 @@
-"""One compiled regime of one leg, and the guard of its events against the zeros they start on.
+"""One compiled regime of one leg, whose events are kept from starting on a zero.
 
 An integrator looks for zeros of an event function's polynomial inside a step. A function that is
-zero where the step begins, because the event has just happened or because a level was laid where
-the leg stands, has no sign there, and its next zero in the same step would be lost. So each event
-has a side that it is known to be on, in two ways. An angle's level lies `2 NUDGE` lower for who
-falls than for who rises, so whoever has just crossed it is on the far side for the way back. And
-what is laid where the leg stands, or has been on the wrong side of zero by the error of the step
-before, is moved until it is `NUDGE` on its own side; the event then happens that much later.
+zero where the step begins, because the event has just happened or because its level is the present
+reading, has no sign there, and its next zero in the same step would be lost. So the sign at the
+start of a step is made certain, in two ways. The level of an angle is `2 NUDGE` lower for falling
+than for rising, so that an angle which has just crossed it is on the far side for the way back. A
+level that is the present reading, or has been passed by the error of the step before, is moved
+until the function is `NUDGE` below zero; the event then happens that much later.
 """
 
 from typing import final
@@ -16,9 +16,9 @@ from legbench.analytic.places import GAIN, LEVEL, Event, Kind
 from legbench.signals import Floats
 
 NUDGE = 1e-13
-"""Distance from zero that tells a side from rounding, in units of the events' readings."""
+"""Distance from zero beyond which a sign is no rounding error, in units of the readings."""
 BACK = 2.0 * NUDGE
-"""How much further an angle or rate falls than it rises until a level is crossed."""
+"""Distance by which the level of a falling angle is below that of a rising one [rad]."""
 OFF = (0.0, 1.0)
 """Gain and level of an event that is not watched."""
 
@@ -28,17 +28,17 @@ class Watch:
     """A compiled regime with the parameters of one leg.
 
     Attributes:
-        kind: which equations and events.
-        held: whether the ground pulls on a foot that would go down if it were let go.
-        flies: whether nothing touches the ground.
+        kind: set of equations and events.
+        held: whether the ground pulls on a foot that would go down if it were released.
+        flies: whether the leg is in the air.
         pushed: whether a joint is beyond a limit.
-        integrator: heyoka's, for (q1, q2, v1, v2).
+        integrator: heyoka's integrator of (q1, q2, v1, v2).
         state: view of its state (4,).
         pars: view of its parameters (n,).
         gain: gain of each event.
         level: level of each event, before the guard moves it.
         moved: events whose levels the guard has moved.
-        version: of the limits that are watched.
+        version: version of the joint limits whose events are set here.
     """
 
     def __init__(self, kind: Kind, values: list[float], tolerance: float) -> None:
@@ -55,27 +55,30 @@ class Watch:
         self.version = -1
 
     def lay(self, event: int, gain: float, level: float) -> None:
-        """Watch `gain * reading` rise through a level."""
+        """Set an event to the rise of `gain * reading` through a level."""
         self.gain[event], self.level[event] = gain, level
         self.pars[GAIN + event] = gain
         back = BACK if gain < 0.0 and event <= Event.HIP_HIGH else 0.0
         self.pars[LEVEL + event] = level + back
 
     def lay_bounds(self, fall: int, rise: int, lower: float, upper: float, never: float) -> None:
-        """Watch a reading fall through a lower and rise through an upper level, unless `never`."""
+        """Set two events: a reading falls through `lower`, and rises through `upper`.
+
+        An event whose level is as far from zero as `never` is switched off.
+        """
         if upper != self.level[rise] or self.gain[rise] == 0.0:
             self.lay(rise, *((1.0, upper) if upper < never else OFF))
         if -lower != self.level[fall] or self.gain[fall] == 0.0:
             self.lay(fall, *((-1.0, -lower) if lower > -never else OFF))
 
     def restore(self) -> None:
-        """Put the levels back that the guard has moved."""
+        """Restore the levels that the guard has moved."""
         for event in self.moved:
             self.lay(event, self.gain[event], self.level[event])
         self.moved.clear()
 
     def guard(self, event: int, reading: float) -> bool:
-        """Put an event on its own side of zero; whether it was beyond by more than rounding."""
+        """Make an event's function negative; true if it was positive by more than rounding."""
         ahead = self.gain[event] * reading - self.level[event]
         if ahead <= -NUDGE:
             return False
