@@ -1,4 +1,4 @@
-"""One compiled leg under way: from event to event, in order, each once.
+"""Integration of one compiled leg from event to event, each in its order and once.
 
     course = Course(model, probe=(-0.7, 0.7))
     course.start(state)
@@ -7,9 +7,9 @@
     if what is Watched.CONTACT:
         course.switch()
 
-A condition that holds already when a piece begins, because something has jumped, is an event at
-that instant. A model on dual numbers (`ops=DUAL`) makes time, angles and rates dual, too: the
-variational equations then go the same way piece by piece (`variation`).
+A piece runs from one event to the next. A condition that holds already when a piece begins, because
+something has jumped, is an event at that instant. On a model of dual numbers (`ops=DUAL`) time,
+angles and rates are dual: the variational equations then follow piece by piece (`variation`).
 """
 
 from typing import final
@@ -61,24 +61,24 @@ EVENTS = len(Event)
 
 @final
 class Course:
-    """A leg that is followed through its regimes.
+    """Leg that is integrated through its regimes.
 
     Attributes:
         model: the leg.
         plain: the leg without derivatives, on which decisions are made; so are `plain_q`, `plain_v`
             and `plain_motor`.
-        time: where it is [s].
-        regime: which equations hold.
+        time: present time [s].
+        regime: regime whose equations hold.
         q: angles [rad].
         v: rates [rad/s].
         motor: motor positions [rad].
         since: time at which the regime began [s].
-        point: the steady point when the present integration began (forward, up) [m].
+        point: steady point of the angles at the beginning of the piece (forward, up) [m].
         drift: velocity of the steady point then [m/s].
         watch: the compiled regime.
         bumpers: the joint stops.
-        lookout: what is watched.
-        told: the state that was last told of, while the leg is still there.
+        lookout: the events that are watched.
+        told: the state that `state` last returned; None once the leg has moved on.
     """
 
     def __init__(
@@ -102,7 +102,7 @@ class Course:
         self.told: LegState | None = None
 
     def start(self, state: LegState) -> None:
-        """Put the leg somewhere."""
+        """Set the state of the leg."""
         ops, along = self.model.ops, steady_point(self.model, state.regime)
         x, z = sweep(ops, state.q, along)
         height = 0.0 if state.regime.stands else state.trunk_pos[1] + z
@@ -114,7 +114,7 @@ class Course:
         self._put(state.regime, state.q, state.v, point, drift)
 
     def fly(self, q: Pair, v: Pair, centre: Pair, velocity: Pair, lean: float = NEVER) -> None:
-        """Put the leg into the air at time zero, by its centre of mass.
+        """Begin a flight at time zero, from the place and velocity of the centre of mass.
 
         `lean` is the largest |q1 + q2|, twice the polar angle, of a leg that has not fallen [rad].
         """
@@ -122,7 +122,7 @@ class Course:
         self._put(Regime.FLIGHT, q, v, centre, velocity, lean)
 
     def state(self) -> LegState:
-        """The leg as a state."""
+        """State of the leg at the present time."""
         ops, along = self.model.ops, steady_point(self.model, self.regime)
         (x, z), (dx, dz) = self.centre() if self.watch.flies else (self.point, self.drift)
         inner, inner_vel = sweep(ops, self.q, along), sweep_rate(ops, self.q, self.v, along)
@@ -153,7 +153,7 @@ class Course:
         return sweep(self.model.ops, q, self._arm)
 
     def hold(self, motor: Pair) -> None:
-        """Put the motors somewhere [rad]."""
+        """Set the motor positions, which are held until the next call [rad]."""
         if motor != self.motor:
             self.motor, self.plain_motor = motor, floats(motor)
             self.watch.pars[MOTOR : MOTOR + 2] = motor
@@ -163,12 +163,12 @@ class Course:
                 )
 
     def switch(self) -> None:
-        """Go over to the other side of a touchdown or lift-off."""
+        """Apply a touchdown or lift-off: change the regime, and the rates by eq. (12)."""
         ops, model = self.model.ops, self.model
         arm, arm_vel = sweep(ops, self.q, self._arm), sweep_rate(ops, self.q, self.v, self._arm)
         if self.watch.flies:
             (x, _), (dx, dz) = self.centre()
-            # The ground is where it is, also for a foot that was not looked at on its way through.
+            # The height is zero by definition, also if the foot went below it while unwatched.
             self.point, self.drift = (x + arm[0], 0.0), (0.0, 0.0)
             foot_vel = dx + arm_vel[0], dz + arm_vel[1]
             self.v = touchdown_rates(ops, model.stance, model.floating, self.q, self.v, foot_vel)
@@ -181,7 +181,7 @@ class Course:
         self._enter(regime)
 
     def go(self, until: float, levels: Levels = SILENT) -> Watched | None:
-        """Go on to `until` or to the first thing watched, just before it takes effect.
+        """Integrate to `until`, or to the first watched event, which is not yet applied.
 
         Raises:
             PlantFault: the integration failed.
@@ -205,11 +205,11 @@ class Course:
         raise PlantFault("integration failed", why)
 
     def watches(self) -> list[Watch]:
-        """Compiled regimes that the leg has been in so far."""
+        """Compiled regimes in which the leg has been so far."""
         return list(self._watches.values())
 
     def march(self, step: float, count: int) -> None:
-        """Take steps of one length whatever the error, blind to events."""
+        """Take `count` steps of a fixed length, without error control and without events."""
         for _ in range(count):
             self.watch.integrator.step(step)
         self.time = self.began + count * step
@@ -220,7 +220,7 @@ class Course:
     def _piece(self, until: float) -> int | None:
         """Integrate to `until` or to the next event."""
         integrator = self.watch.integrator
-        # max_steps by its place: by name it costs a fifth of a short call.
+        # max_steps is passed by position: a keyword costs a fifth of a short call.
         outcome = int(integrator.propagate_until(float(until - self.began), MAX_STEPS)[0])
         event = None if outcome == TIME_LIMIT else -outcome - 1
         if event is not None and not 0 <= event < EVENTS:
@@ -233,12 +233,12 @@ class Course:
             self._variation.carry(self, self.plain_q, self.plain_v, until, event)
             return event
         self.q, self.v = self.plain_q, self.plain_v
-        # The end to the last bit, or whoever waits for it waits for ever.
+        # Exactly `until`, since a time that is short of it by rounding would never be reached.
         self.time = until if event is None else self.began + float(integrator.time)
         return event
 
     def _meaning(self, event: int) -> Watched | None:
-        """What an event says to the outside; those of the stops are dealt with here."""
+        """Event as the caller sees it; those of stops and held feet are handled here, for None."""
         watch = self.watch
         if event in SEEN:
             return SEEN[event]
@@ -270,14 +270,14 @@ class Course:
         self._enter(regime)
 
     def _enter(self, regime: Regime) -> None:
-        """Begin a regime here and now."""
+        """Begin a regime at the present time."""
         self.regime, self.told = regime, None
         self.terms = terms_of(self.plain, regime)
         self.lookout.enter(regime, self.since)
         self._load(held=False)
 
     def _load(self, *, held: bool) -> None:
-        """Put where the leg is into the integrator of its regime."""
+        """Load the present state into the integrator of the regime."""
         watch = self.watch = self._watch_of(held=held)
         self.plain_q, self.plain_v = floats(self.q), floats(self.v)
         self.plain_motor = floats(self.motor)

@@ -1,8 +1,8 @@
-"""What a course looks out for: levels, turns, limits and the ground, each guarded.
+"""Events that a course watches: levels of the probe, its turning points, limits and the ground.
 
-A piece of a course begins where something has happened. Before it goes on, every event that could
-be near its zero there is put on its own side (`watch`), and a condition that holds already is told:
-it has come about by a jump, of a motor, of a regime or of the levels themselves.
+A piece of a course begins where something has happened. Before the integration goes on, the sign of
+every event function that could be near zero there is made certain (`watch`). A condition that
+holds already, because a motor, the regime or a level has jumped, is an event at once.
 """
 
 from typing import TYPE_CHECKING, NamedTuple, final
@@ -29,22 +29,22 @@ if TYPE_CHECKING:
 NEVER = 1e6
 """Level that is never reached [rad]."""
 TIE = 1e-7
-"""Acceleration over gravity below which the released foot counts as rising: on the radial mode it
-vanishes together with the force [-]."""
+"""Tolerance of acceleration over gravity and of force over weight when the foot is released [-]: on
+the radial mode both vanish together, and rounding decides their signs."""
 RISE, FALL, FELL, FELL_BACK, TURN, CONTACT = map(
     int, (Event.RISE, Event.FALL, Event.FELL, Event.FELL_BACK, Event.TURN, Event.CONTACT)
 )
 ANGLES = (RISE, FALL, FELL, FELL_BACK, *range(Event.KNEE_LOW, Event.HIP_HIGH + 1))
-"""Events that look at angles: two at the probe, two at q1 + q2, two at the knee, two at q1."""
+"""Events whose readings are angles: two of the probe, of q1 + q2, of the knee, and of q1 each."""
 SEEN = {
     RISE: Watched.RISE,
     FALL: Watched.FALL,
     FELL: Watched.FELL,
     FELL_BACK: Watched.FELL,
 }
-"""Conditions on angles, which may hold already when a piece begins."""
+"""Events of angles that the caller sees, whose condition may hold already when a piece begins."""
 KINDS = {Regime.FLIGHT: Kind.FLIGHT, Regime.STANCE: Kind.STANCE}
-"""The compiled equations that a regime begins with; the fixed ones for all others."""
+"""Compiled equations with which a regime begins; regimes that are not listed take `Kind.FIXED`."""
 
 
 class Levels(NamedTuple):
@@ -53,10 +53,11 @@ class Levels(NamedTuple):
     upper: float = NEVER
     lower: float = -NEVER
     turns: bool = False
-    """Whether the probe's turns stop it, too."""
+    """Whether turning points of the probe stop it, too."""
 
 
 SILENT = Levels()
+"""Levels that are never reached, so that no value of the probe stops an integration."""
 
 
 @final
@@ -64,9 +65,9 @@ class Lookout:
     """The events that one course watches.
 
     Attributes:
-        levels: those of the probe.
+        levels: levels of the probe.
         lean: largest |q1 + q2| of a leg that has not fallen [rad].
-        blind: time until which the ground is not looked at [s].
+        blind: time until which touchdown and lift-off are not watched [s].
     """
 
     def __init__(self, course: "Course", model: LegModel, min_phase: float) -> None:
@@ -77,12 +78,12 @@ class Lookout:
         self._turn, self._free = 0.0, False
 
     def enter(self, regime: Regime, since: float) -> None:
-        """Begin a regime: the ground is not looked at for the shortest phase, turns start anew."""
+        """Begin a regime, in which contact is not watched for the shortest phase at first."""
         self._free, self._turn = regime in KINDS, 0.0
         self.blind = since + self._min_phase if self._free else since
 
     def move_to(self, watch: Watch) -> None:
-        """Lay all levels in another integrator."""
+        """Set all levels in another integrator."""
         course, self._watch = self._course, watch
         watch.restore()
         watch.lay_bounds(FELL, FELL_BACK, -self.lean, self.lean, NEVER)
@@ -90,7 +91,7 @@ class Lookout:
         self.lay(self.levels)
 
     def lay(self, levels: Levels) -> None:
-        """Watch other levels."""
+        """Replace the levels of the probe."""
         self.levels, watch = levels, self._watch
         watch.lay_bounds(FALL, RISE, levels.lower, levels.upper, NEVER)
         if not levels.turns:
@@ -99,12 +100,12 @@ class Lookout:
                 watch.lay(TURN, *OFF)
 
     def turned(self) -> None:
-        """Watch the probe's next turn, which is the other kind."""
+        """Watch the probe's next turning point: a minimum after a maximum, or the reverse."""
         self._turn = -self._turn
         self._watch.lay(TURN, self._turn, 0.0)
 
     def due(self) -> int | None:
-        """Guard every event against the zero it starts on; one whose condition holds already."""
+        """Guard every event, and return one whose condition holds already, if there is one."""
         course, watch = self._course, self._watch
         if watch.moved:
             watch.restore()
@@ -121,7 +122,7 @@ class Lookout:
         return due
 
     def _near(self) -> int | None:
-        """Guard the events of angles; one whose condition holds already."""
+        """Guard the events of angles, and return one whose condition holds already, or None."""
         course, watch = self._course, self._watch
         (p1, p2), (q1, q2), gain, level = course.probe, course.plain_q, watch.gain, watch.level
         reading, lean, knee = p1 * q1 + p2 * q2, q1 + q2, q2 - q1
@@ -136,7 +137,7 @@ class Lookout:
         return due
 
     def _contact(self) -> int | None:
-        """Guard touchdown or lift-off; the event if the leg cannot stay in its regime."""
+        """Guard touchdown or lift-off; return the event if the leg cannot stay in its regime."""
         course, watch = self._course, self._watch
         if course.time < self.blind:
             if watch.gain[CONTACT] != 0.0:
@@ -159,7 +160,7 @@ class Lookout:
         return None
 
     def _touchdown(self) -> int | None:
-        """Guard touchdown; the event if the foot is through the ground and sinking."""
+        """Guard touchdown, and return it if the foot is below the ground and sinking."""
         course, watch = self._course, self._watch
         elapsed = float(watch.integrator.time)
         z, dz = float(course.point[1]), float(course.drift[1])
@@ -172,26 +173,26 @@ class Lookout:
         arm_vel = sweep_rate(self._plain.ops, course.plain_q, course.plain_v, self._arm)
         if dz - fallen + arm_vel[1] < 0.0:
             return CONTACT
-        self.blind = course.time + self._min_phase  # under the ground and rising: look later
+        self.blind = course.time + self._min_phase  # below the ground and rising: no touchdown yet
         watch.lay(CONTACT, *OFF)
         return None
 
     def _expect(self, reading: float) -> None:
-        """Watch height or force fall to zero."""
+        """Watch the height or the contact force fall to zero."""
         if self._watch.gain[CONTACT] != -1.0:
             self._watch.lay(CONTACT, -1.0, 0.0)
         if reading < NUDGE:
             self._watch.guard(CONTACT, reading)
 
     def _force(self) -> float:
-        """Vertical force on the standing foot, over the weight."""
+        """Vertical contact force on the standing foot over the weight [-]."""
         course, plain = self._course, self._plain
         q, v = course.plain_q, course.plain_v
         a = self._accelerations()
         return contact_force(plain.ops, plain.floating, q, v, a)[1] / self._weight
 
     def released(self) -> float:
-        """Acceleration that the standing foot would have if it were let go, over gravity."""
+        """Upward acceleration that the standing foot would have if released, over gravity [-]."""
         course, plain = self._course, self._plain
         q, v = course.plain_q, course.plain_v
         torque = plain.torque(course.plain_motor, q, v)
@@ -199,7 +200,7 @@ class Lookout:
         return free_foot_acceleration(plain.ops, plain.floating, q, v, a)[1] / GRAVITY
 
     def _accelerations(self) -> Pair:
-        """Accelerations of the angles, where those stops act that are known to."""
+        """Accelerations of the angles, with the stops that are switched on [rad/s^2]."""
         course, plain = self._course, self._plain
         q, v = course.plain_q, course.plain_v
         torque = plain.torque(course.plain_motor, q, v)
@@ -208,7 +209,7 @@ class Lookout:
         return pair_acceleration(plain.ops, course.terms, q, v, torque)
 
     def _guard_turn(self) -> None:
-        """Watch the probe's next turn, which is the other kind after one that has just been."""
+        """Watch the probe's next turning point, the kind of which follows from its present rate."""
         course = self._course
         (p1, p2), (v1, v2) = course.probe, course.plain_v
         rate = p1 * v1 + p2 * v2

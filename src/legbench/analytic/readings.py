@@ -1,4 +1,4 @@
-"""What events look at, on dual numbers: the compiled readings once more, to differentiate them."""
+"""Readings of the events on dual numbers: the compiled event functions with their derivatives."""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -25,7 +25,7 @@ def read(
         event: one of `places.Event`.
         state: angles and rates (4,) [rad, rad/s].
         elapsed: time since the piece began [s].
-        plain: take everything else without its derivatives.
+        plain: take everything but `state` and `elapsed` without derivatives.
     """
     q1, q2, v1, v2 = state
     match event:
@@ -55,7 +55,7 @@ def _height(course: "Course", state: "Sequence[Term]", elapsed: Term, *, plain: 
 
 
 def _pressed(course: "Course", event: int, state: "Sequence[Term]", *, plain: bool) -> Term:
-    """What the law asks of a stop, the force on the ground, or the rise of the released foot."""
+    """Push of a stop by its law, contact force, or acceleration of the released foot."""
     model = replace(course.plain, ops=DUAL) if plain else course.model
     motor = course.plain_motor if plain else course.motor
     q, v = (state[0], state[1]), (state[2], state[3])
