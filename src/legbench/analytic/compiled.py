@@ -1,10 +1,10 @@
-"""The compiled equations: one integrator a regime for every leg, with the leg as parameters.
+"""Compiled equations: one integrator for each regime, with all numbers of a leg as parameters.
 
 The state is (q1, q2, v1, v2) in every regime: the leg turns about a point that does not depend on
 its angles, the centre of mass on its parabola in flight, the foot in stance, the held trunk. So
 one set of equations serves all, and regimes differ in their parameters and events.
 
-Each integrator is compiled once a machine (`store`) and copied for each leg that uses it.
+Each integrator is compiled once on a machine (`store`) and copied for each leg that uses it.
 """
 
 import copy
@@ -43,19 +43,19 @@ from legbench.analytic.terms import PairTerms
 TOLERANCE = 1e-15
 """Error of a step over the largest of state and events [-]."""
 COOLDOWN = 1e-8
-"""Time within which an event does not repeat itself; long against rounding, short against the
-leg's motion [s]."""
+"""Time within which an event cannot occur again; long against rounding, short against the leg's
+motion [s]."""
 PARAMETERS = LEVEL + len(Event)
 """Length of the array of parameters of a leg."""
 
 
 def event_integrator(kind: Kind, tolerance: float = TOLERANCE) -> Any:
-    """A fresh integrator of one regime with its events, whose parameters are to be filled."""
+    """New integrator of one regime with its events; its parameters have still to be set."""
     return copy.deepcopy(_events(kind, tolerance))
 
 
 def varied_integrator(tolerance: float = TOLERANCE) -> Any:
-    """A fresh integrator of the equations with stops and their derivatives, blind to events.
+    """New integrator of the equations with stops and of their derivatives, without events.
 
     The derivatives are those by the four states and the `SMOOTH` parameters of the motion, in this
     order, one row a state.
@@ -64,7 +64,7 @@ def varied_integrator(tolerance: float = TOLERANCE) -> Any:
 
 
 def smooth_integrator(tolerance: float, *, varied: bool, friction: bool) -> Any:
-    """A fresh integrator of several legs side by side without stops and events.
+    """New integrator of a batch of legs, without stops and events.
 
     `varied` adds the derivatives by the nine parameters of a leg, and by its friction if any.
     """
@@ -83,7 +83,7 @@ def _events(kind: Kind, tolerance: float) -> Any:
             [0.0] * len(system),
             t_events=[hy.t_event(one, direction=rising, cooldown=COOLDOWN) for one in watched],
             tol=tolerance,
-            fast_math=True,  # a third faster, and no digit of the result the worse
+            fast_math=True,  # a third faster, without loss of accuracy
         )
 
     return kept(f"events {tolerance!r} {COOLDOWN!r} {system} {watched}", build)
@@ -125,12 +125,12 @@ def _smooth(tolerance: float, lanes: int, varied: bool, friction: bool) -> Any:
 
 
 def smooth_seeds(*, friction: bool) -> list[int]:
-    """Places of the parameters by which legs side by side are differentiated."""
+    """Indices of the parameters by which a batch of legs is differentiated."""
     return [*range(MOTOR), *(range(FRICTION, SHARPNESS) if friction else ())]
 
 
 def terms_of(model: LegModel, regime: Regime) -> PairTerms:
-    """How the angles turn about the steady point."""
+    """Constants of the motion of the angles about the steady point of a regime."""
     match regime:
         case Regime.FLIGHT:
             return model.falling
@@ -141,7 +141,7 @@ def terms_of(model: LegModel, regime: Regime) -> PairTerms:
 
 
 def steady_point(model: LegModel, regime: Regime) -> Pair:
-    """The point that moves steadily, seen from the hip, per direction of the angles [m]."""
+    """Steady point seen from the hip, as its components along dir(q1) and dir(q2) [m]."""
     floating = model.floating
     match regime:
         case Regime.FLIGHT:
@@ -153,7 +153,7 @@ def steady_point(model: LegModel, regime: Regime) -> Pair:
 
 
 def foot_from_centre(model: LegModel) -> Pair:
-    """Foot tip seen from the centre of mass, per direction of the angles [m]."""
+    """Foot tip seen from the centre of mass, as its components along dir(q1) and dir(q2) [m]."""
     floating = model.floating
     first_1, first_2 = floating.first
     return floating.reach - first_1 / floating.mass, floating.reach - first_2 / floating.mass

@@ -1,4 +1,4 @@
-"""Contact with the ground on plain numbers: impact, lift-off, and who cannot stay in its regime."""
+"""Contact with the ground on plain numbers: impact, lift-off, and overdue changes of regime."""
 
 from legbench.analytic.equations import Pair, touchdown_rates
 from legbench.analytic.model import LegModel
@@ -10,13 +10,13 @@ sign of a zero is decided by rounding."""
 
 
 def hold(model: LegModel, motor: Pair, q: Pair, v: Pair) -> float:
-    """Negative once the ground would have to pull and the released foot would rise [N]."""
+    """Event function of lift-off [N]: negative if the ground pulls and the released foot rises."""
     force = model.stance_force(motor, q, v)[1]
     return max(force, -model.floating.mass * model.released_rise(motor, q, v))
 
 
 def overdue(model: LegModel, state: LegState, motor: Pair) -> bool:
-    """Whether a leg cannot stay in its regime: a new command, or an event nobody looked for."""
+    """Whether a leg has to change its regime at once, by a new command or an unwatched event."""
     q, v = state.q, state.v
     if state.regime is Regime.STANCE:
         return model.stance_force(motor, q, v)[1] < 0.0 < model.released_rise(motor, q, v)
@@ -26,14 +26,14 @@ def overdue(model: LegModel, state: LegState, motor: Pair) -> bool:
 
 
 def switch(model: LegModel, state: LegState) -> LegState:
-    """The leg on the other side of its event."""
+    """State of the leg after the touchdown or lift-off that ends its regime."""
     if state.regime is Regime.STANCE:
         return state._replace(regime=Regime.FLIGHT, since=state.time)
     return land(model, state)
 
 
 def land(model: LegModel, state: LegState) -> LegState:
-    """Touchdown: the foot stops, the joints and the trunk take what eq. (12) gives them."""
+    """State after a touchdown: the foot is at rest, joints and trunk move as eq. (12) says."""
     q, v = state.q, state.v
     relative = model.foot_vel_from_hip(q, v)
     foot_vel = state.trunk_vel[0] + relative[0], state.trunk_vel[1] + relative[1]

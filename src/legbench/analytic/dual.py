@@ -1,8 +1,8 @@
-"""Numbers that carry their derivative along.
+"""Dual numbers for exact derivatives (forward automatic differentiation).
 
-A `Dual` is a float with a gradient. Whatever is computed from it by sums, products, quotients and
-`DUAL`'s functions carries the gradient of the result; comparisons see the value alone. So a
-control law or an equation differentiates itself.
+A `Dual` is a float with a gradient. Sums, products, quotients and the functions of `DUAL` give
+dual numbers with the gradient of the result; comparisons use the value alone. So control laws and
+equations can be differentiated without a change.
 """
 
 import math
@@ -67,7 +67,7 @@ def gradient(value: float) -> Floats:
 
 
 def seeds(values: Floats) -> list[Dual]:
-    """Numbers (n,) with respect to which everything is differentiated."""
+    """Dual numbers of `values` (n,), by which results are then differentiated."""
     return [
         Dual(value, row) for value, row in zip(values.tolist(), np.eye(len(values)), strict=True)
     ]
@@ -90,7 +90,7 @@ DUAL = Ops(sin=_sin, cos=_cos, sqrt=_sqrt)
 
 
 def without_gradients(value: Any) -> Any:
-    """Constants as plain floats, computing with plain functions.
+    """Copy of constants in which every dual number is a plain float, with plain functions.
 
     Args:
         value: a number, or tuples and frozen dataclasses of numbers.
@@ -108,5 +108,5 @@ def without_gradients(value: Any) -> Any:
 
 
 def floats(pair: Pair) -> Pair:
-    """A pair without gradients."""
+    """Values of a pair, without gradients."""
     return float(pair[0]), float(pair[1])

@@ -1,12 +1,12 @@
-"""The equations of motion, typed once, for numbers, arrays and symbols alike.
+"""Equations of motion in one form for numbers, arrays and symbols.
 
 Every function takes its elementary functions from `ops` and its angles one by one, so that the same
 lines run on floats (`SCALAR`), on batches of any shape (`ARRAY`), on complex numbers for exact
 derivatives (`COMPLEX`), and on the expressions from which `taylor` compiles its integrators.
 A pair is `(component 1, component 2)` or `(forward, up)`.
 
-Constants stand outside the products of what moves: `h (s a)`, not `h s a`. The compiler then sees
-that several equations share a product, and products are what a Taylor series costs.
+Constants stand outside the products of variables: `h (s a)`, not `h s a`. The compiler then finds
+the products that several equations share, and the cost of a Taylor series is that of its products.
 """
 
 import cmath
@@ -26,7 +26,7 @@ Pair = tuple[Term, Term]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ops:
-    """The functions that differ from one kind of number to another."""
+    """Elementary functions of one kind of number."""
 
     sin: Callable[[Term], Term]
     cos: Callable[[Term], Term]

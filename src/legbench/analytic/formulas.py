@@ -45,7 +45,7 @@ STATE = hy.make_vars("q1", "q2", "v1", "v2")
 
 
 def pair_at(place: int) -> Pair:
-    """Two parameters side by side."""
+    """Pair of consecutive parameters."""
     return hy.par[place], hy.par[place + 1]
 
 
@@ -67,7 +67,7 @@ def smooth_system(*, friction: bool) -> list[tuple[Any, Any]]:
 
 
 def stopped_system() -> tuple[list[tuple[Any, Any]], list[Any]]:
-    """The equations of motion with the stops that push, and what each stop's law asks for."""
+    """Equations of motion with the stops that push, and the reading of each stop's event."""
     q, v = STATE[:2], STATE[2:]
     a = pair_acceleration(SYMBOLS, _terms(), q, v, _torque(q, v))
     a, pushes = _pushed(_terms(), q, v, a, (PUSHES, PUSHES + 2))
@@ -75,7 +75,7 @@ def stopped_system() -> tuple[list[tuple[Any, Any]], list[Any]]:
 
 
 def events(kind: Kind, a: Pair, pushes: list[Any]) -> dict[Event, Any]:
-    """Event functions of a regime whose angles accelerate by `a`; each counts when it rises."""
+    """Event functions of a regime whose angles accelerate by `a`; events are their rising zeros."""
     q, v = STATE[:2], STATE[2:]
     probe = pair_at(PROBE)
     reading, rate = (probe[0] * x[0] + probe[1] * x[1] for x in (q, v))
@@ -121,7 +121,7 @@ def _pushed(
 ) -> tuple[Pair, list[Any]]:
     """`analytic.stops.pushes`, switched by parameters instead of comparisons.
 
-    Of a joint's two stops one acts at most, and the sign of its law cancels in what it adds.
+    At most one of a joint's two stops acts, and the sign of its law cancels in what it adds.
     """
     found = []
     for on, place, limit in zip((KNEE, HIP), switches, (PUSHES + 1, PUSHES + 3), strict=True):

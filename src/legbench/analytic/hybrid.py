@@ -1,13 +1,13 @@
-"""Stance and flight in turn: touchdown by eq. (12), lift-off when the ground would have to pull.
+"""Hybrid motion of stance and flight: touchdown by eq. (12), lift-off when the ground would pull.
 
-An event is a zero that an event function crosses falling: the height of the foot in flight, the
-vertical contact force in stance. (A leg that also swings is held by a horizontal force, and
-letting go of both can send its foot down at that instant: it is held until the foot would rise,
-which on the radial mode is the same moment.) Each integration step is searched on its
-interpolant, at eight points and then by Brent's method; steps that cannot hold a zero are passed
-by. For `min_phase` after an event nothing is looked for. Whoever is through the ground and
-sinking when that time is over has touched down, and a force that pulls by then has let go,
-without search; so has a force that pulls because the motors were told to jump.
+An event is a falling zero of an event function: the height of the foot in flight, the vertical
+contact force in stance. (A leg that also swings is held by a horizontal force, too; if both vanish
+at once, its foot can move down. It is then held until the foot would rise, which on the radial
+mode is the same instant.) Each integration step is searched on its interpolant, at eight points
+and then by Brent's method; steps that cannot contain a zero are skipped. For `min_phase` after an
+event none is sought. A foot that is below the ground and sinking when that time is over has touched
+down, and a force that pulls by then ends the stance, without a search; so does a force that pulls
+because the motors have jumped.
 """
 
 from collections.abc import Callable
@@ -26,9 +26,9 @@ from legbench.analytic.state import LegState, Regime, Transition
 from legbench.signals import Floats
 
 EVENT_TIME = 1e-13
-"""How closely Brent's method brackets an event [s]."""
+"""Width of the bracket to which Brent's method narrows an event [s]."""
 SEARCHED = 8
-"""Parts of a step that are looked at one by one."""
+"""Number of parts of a step that are searched one by one [-]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +39,7 @@ class _Leg:
     pack: list[float]
     unpack: Callable[[float, list[float]], LegState]
     event: Callable[[list[float]], float] | None
-    """Falls through zero at the event; none where nothing can happen."""
+    """Event function, which falls through zero at the event; None if there is no event."""
     near: Callable[[list[float], list[float], float], bool]
     """Whether a step between two states of that length may hold an event."""
 
@@ -55,7 +55,7 @@ class HybridLeg:
     def advance(
         self, state: LegState, until: float, motor: Pair
     ) -> tuple[LegState, list[Transition]]:
-        """The leg at `until`, motors held at `motor`, and what happened until then.
+        """State of the leg at `until`, motors held at `motor`, and the transitions on the way.
 
         Raises:
             PlantFault: the integration failed.

@@ -1,6 +1,6 @@
-"""Many legs at once: the equations of two angles on arrays, integrated in step by Runge-Kutta.
+"""Batch of legs as arrays: the equations of two angles, integrated in step by Runge-Kutta.
 
-Every leg has its own constants; its numbers do not depend on which others are computed with it.
+Every leg has its own constants; its results do not depend on the others of the batch.
 """
 
 from collections.abc import Iterator, Sequence
@@ -82,7 +82,7 @@ def motion(
     """Angles and rates (n, 2) after each of `count` steps of `step` [s], from rest at `joint_pos`.
 
     Classical Runge-Kutta of order 4, motors held at `motor_pos` (n, 2) [rad]. A leg that runs away
-    becomes infinite or NaN, and no other leg notices.
+    becomes infinite or NaN, without effect on the others.
     """
     motor = (motor_pos[:, 0], motor_pos[:, 1])
     q, v = joint_pos.T.copy(), np.zeros_like(joint_pos.T)

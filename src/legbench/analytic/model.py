@@ -1,4 +1,4 @@
-"""A design as the equations see it, under the conditions of a setup."""
+"""Constants of the equations of motion for a design, and the quantities computed from them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -34,21 +34,21 @@ from legbench.design.statics import GRAVITY
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LegModel:
-    """Constants of one leg: what turns, what pulls, what stops it."""
+    """Constants of one leg: inertias and gravity, springs and dampers, joint stops."""
 
     floating: FloatingTerms
     stance: PairTerms
-    """Foot pinned."""
+    """Inertia and gravity of the angles while the foot is pinned."""
     hanging: PairTerms
-    """Trunk fixed."""
+    """Inertia and gravity of the angles while the trunk is fixed."""
     falling: PairTerms
-    """Seen from the centre of mass in flight."""
+    """Inertia of the angles about the falling centre of mass."""
     stiffness: tuple[float, float]
     """[N m/rad]"""
     damping: tuple[float, float]
     """[N m s/rad]"""
     stops: tuple[Stop, ...]
-    """Empty: joints turn freely, through the straight leg too."""
+    """Joint stops; if there are none, joints turn freely, through the straight leg, too."""
     ops: Ops = SCALAR
     """The kind of numbers that the methods work on."""
 
@@ -75,7 +75,7 @@ class LegModel:
         )
 
     def torque(self, motor: Pair, q: Pair, v: Pair) -> Pair:
-        """Springs and dampers on q1 and q2 [N m]."""
+        """Torque of springs and dampers on q1 and q2 [N m]."""
         return damped(spring_torque(self.stiffness, motor, q), self.damping, v)
 
     def acceleration(self, terms: PairTerms, motor: Pair, q: Pair, v: Pair) -> Pair:
@@ -88,7 +88,7 @@ class LegModel:
     def pushed(
         self, terms: PairTerms, motor: Pair, q: Pair, v: Pair, beyond: Sequence[bool]
     ) -> tuple[list[float], Pair]:
-        """Torque of each stop [N m], of those that are touched, and the accelerations it leaves."""
+        """Torque of each touched stop [N m], and the accelerations that result [rad/s^2]."""
         a = pair_acceleration(self.ops, terms, q, v, self.torque(motor, q, v))
         return pushes(self.ops, terms, self.stops, beyond, q, v, a)
 
@@ -106,12 +106,12 @@ class LegModel:
         return trunk_acceleration(self.ops, self.floating, q, v, a), a
 
     def stance_force(self, motor: Pair, q: Pair, v: Pair) -> Pair:
-        """Ground on foot (forward, up) while the foot stands [N]."""
+        """Contact force on the standing foot (forward, up) [N]."""
         a = self.stance_acceleration(motor, q, v)
         return contact_force(self.ops, self.floating, q, v, a)
 
     def released_rise(self, motor: Pair, q: Pair, v: Pair) -> float:
-        """Upward acceleration that the standing foot would have if it were let go [m/s^2]."""
+        """Upward acceleration that the standing foot would have if it were released [m/s^2]."""
         a = self.acceleration(self.falling, motor, q, v)
         return free_foot_acceleration(self.ops, self.floating, q, v, a)[1]
 
@@ -134,7 +134,7 @@ class LegModel:
         return moved[0] / self.floating.mass, moved[1] / self.floating.mass
 
     def spring_energy(self, motor: Pair, q: Pair) -> Term:
-        """Stored in the series springs [J]."""
+        """Energy stored in the series springs [J]."""
         return spring_energy(self.stiffness, motor, q)
 
     def pair_energy(self, terms: PairTerms, q: Pair, v: Pair) -> Pair:
