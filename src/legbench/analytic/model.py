@@ -44,9 +44,9 @@ class LegModel:
     falling: PairTerms
     """Inertia of the angles about the falling centre of mass."""
     stiffness: tuple[float, float]
-    """[N m/rad]"""
+    """Stiffness of the springs on q1 and q2 [N m/rad]."""
     damping: tuple[float, float]
-    """[N m s/rad]"""
+    """Viscous damping of q1 and q2 [N m s/rad]."""
     stops: tuple[Stop, ...]
     """Joint stops; if there are none, joints turn freely, through the straight leg, too."""
     ops: Ops = SCALAR

@@ -15,7 +15,7 @@ Rates = Callable[[float, Floats], list[float]]
 
 
 class Method(StrEnum):
-    """Which pair."""
+    """Embedded Runge-Kutta pair."""
 
     DOP853 = "dop853"
     """Order 8 (Dormand and Prince); the default."""
@@ -24,13 +24,13 @@ class Method(StrEnum):
 
     @property
     def solver(self) -> Callable[..., OdeSolver]:
-        """What makes the stepper."""
+        """Class of scipy that integrates by this pair."""
         return DOP853 if self is Method.DOP853 else RK45
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Accuracy:
-    """How exact a run is.
+    """Tolerances and step sizes of an integration.
 
     Raises:
         ConfigError: a tolerance or a time that is not positive.
@@ -42,11 +42,11 @@ class Accuracy:
     atol: float = 1e-11
     """Absolute error per step [rad, rad/s, m, m/s]."""
     max_step: float = 0.005
-    """Longest step: an event function crosses zero at most once in an eighth of it [s]."""
+    """Longest step, in an eighth of which an event function crosses zero at most once [s]."""
     min_phase: float = MIN_PHASE
-    """Stance and flight last at least this long after an event, so that none repeats [s]."""
+    """Shortest stance or flight, so that an event is not repeated by rounding [s]."""
     fixed_step: float | None = None
-    """Take steps of this length whatever the error; for measuring the order [s]."""
+    """Length of steps without error control, for measuring the order; None: variable steps [s]."""
 
     def __post_init__(self) -> None:
         for name in ("rtol", "atol", "max_step", "min_phase", "fixed_step"):

@@ -1,4 +1,4 @@
-"""State of a leg: posture, contact regime, and the transitions on the way."""
+"""State of a leg: posture, velocities, contact regime; and the transitions between regimes."""
 
 import math
 from enum import StrEnum
@@ -10,10 +10,10 @@ from legbench.errors import ConfigError
 
 
 class Regime(StrEnum):
-    """Which equations hold."""
+    """Contact regime, which decides the equations that hold."""
 
     FLIGHT = "flight"
-    """Nothing touches the ground."""
+    """The leg is in the air."""
     STANCE = "stance"
     """The foot stands still on the ground."""
     PINNED = "pinned"
@@ -28,22 +28,22 @@ class Regime(StrEnum):
 
 
 class LegState(NamedTuple):
-    """One leg at one instant; pairs are (1, 2) or (forward, up).
+    """State of one leg at one instant; pairs are (1, 2) or (forward, up).
 
-    A tuple and not a dataclass, because the fast path makes one every ten microseconds.
+    It is a tuple and not a dataclass, because the fast path makes one every ten microseconds.
     """
 
     time: float
-    """[s]"""
+    """Time [s]."""
     regime: Regime
     q: Pair
-    """[rad]"""
+    """Angles q1, q2 [rad]."""
     v: Pair
-    """[rad/s]"""
+    """Rates of q1, q2 [rad/s]."""
     trunk_pos: Pair
     """Hip in the world, ground at height 0 [m]."""
     trunk_vel: Pair
-    """[m/s]"""
+    """Velocity of the hip (forward, up) [m/s]."""
     since: float = -math.inf
     """Time at which the regime began [s]; minus infinity for a start."""
 
@@ -52,20 +52,20 @@ class Transition(NamedTuple):
     """A touchdown or a lift-off."""
 
     time: float
-    """[s]"""
+    """Time [s]."""
     before: LegState
     after: LegState
 
     @property
     def touchdown(self) -> bool:
-        """Otherwise a lift-off."""
+        """Whether the transition is a touchdown; otherwise it is a lift-off."""
         return self.after.regime is Regime.STANCE
 
 
 def standing(
     model: LegModel, q: Pair, v: Pair = (0.0, 0.0), *, time: float = 0.0, pinned: bool = False
 ) -> LegState:
-    """A leg whose foot stands at the origin."""
+    """State of a leg whose foot stands at the origin."""
     foot, foot_vel = model.foot_from_hip(q), model.foot_vel_from_hip(q, v)
     return LegState(
         time=time,
@@ -80,7 +80,7 @@ def standing(
 def flying(
     model: LegModel, q: Pair, v: Pair, trunk_pos: Pair, trunk_vel: Pair, *, time: float = 0.0
 ) -> LegState:
-    """A leg in the air.
+    """State of a leg in the air.
 
     Raises:
         ConfigError: the foot would be below the ground, or lower than the leg can ever be.
@@ -97,7 +97,10 @@ def flying(
 
 
 def energy(model: LegModel, state: LegState, motor: Pair) -> float:
-    """Gravity, motion and springs [J]; constant while nothing is damped, hit or commanded."""
+    """Energy of gravity, motion and springs [J].
+
+    It is constant while no damper, impact, joint stop or command acts.
+    """
     spring = model.spring_energy(motor, state.q)
     if state.regime is Regime.HANGING:
         potential, kinetic = model.pair_energy(model.hanging, state.q, state.v)

@@ -1,12 +1,13 @@
-"""Joint stops: soft rubber that pushes back, never pulls, by the law of the simulation.
+"""Joint stops of soft rubber, which push and never pull, by the law of the simulation.
 
 A joint that is `p` beyond its limit and would turn back at the acceleration `a0` if nothing
 stopped it, turns back at `a1 = (1 - d) a0 + d (b dp/dt + k p)`, if that takes a push. With
 `b = 2 / (d T)` and `k = 1 / (d T^2)` the joint returns critically damped with the time constant T
 (MuJoCo's manual, "Solver parameters": solref (T, 1), solimp of one impedance d).
 
-The push begins and ends with a jump, so whoever integrates has to find both ends. Stops that are
-touched together act one after the other, each on the acceleration that the one before has left.
+The push begins and ends with a jump, so an integrator has to locate both ends. Stops that are
+touched at the same time act one after the other, each on the acceleration that the one before has
+left.
 """
 
 from collections.abc import Sequence
@@ -17,26 +18,26 @@ from legbench.analytic.terms import PairTerms
 from legbench.design import Limits
 
 TIME_CONSTANT = 0.01
-"""[s]"""
+"""Time constant T of a stop [s]."""
 IMPEDANCE = 0.95
-"""Share of the acceleration that is the stop's, not the leg's own [-]."""
+"""Impedance d: share of the acceleration that the stop decides, not the leg itself [-]."""
 
 KNEE: Pair = (-1.0, 1.0)
-"""How the knee's angle is made of q1 and q2."""
+"""Factors of q1 and q2 in the knee's angle [-]."""
 HIP: Pair = (1.0, 0.0)
-"""How the hip's angle is made of q1 and q2."""
+"""Factors of q1 and q2 in the hip's angle [-]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stop:
-    """One end of a joint's range; depth is `sign (limit - angle)`."""
+    """Stop at one end of a joint's range; its depth is `sign (limit - angle)`."""
 
     sign: float
     """1 for the lower end, -1 for the upper one."""
     limit: float
-    """[rad]"""
+    """Angle at which the range ends [rad]."""
     on: Pair
-    """How the joint's angle is made of q1 and q2."""
+    """Factors of q1 and q2 in the joint's angle [-]."""
 
     @property
     def normal(self) -> Pair:
@@ -44,7 +45,7 @@ class Stop:
         return self.sign * self.on[0], self.sign * self.on[1]
 
     def depth(self, q: Pair) -> Term:
-        """How far beyond the limit [rad]; negative within the range."""
+        """Depth of a posture beyond the limit [rad]; negative within the range."""
         return self.sign * (self.limit - self.on[0] * q[0] - self.on[1] * q[1])
 
     def speed(self, v: Pair) -> Term:
@@ -66,7 +67,7 @@ class Stop:
         return back - IMPEDANCE * (n1 * a[0] + n2 * a[1])
 
     def push(self, q: Pair, v: Pair, a: Pair, answer: Pair) -> Term:
-        """Torque that the law asks for, of a joint beyond its limit; below zero there is none.
+        """Torque on a joint beyond its limit by the law [N m]; below zero the stop does not act.
 
         `answer` is `M^-1 normal`, what a unit push adds to the accelerations [rad/s^2 / N m].
         """
@@ -75,7 +76,7 @@ class Stop:
 
 
 def make_stops(limits: Limits) -> tuple[Stop, ...]:
-    """Stops of knee and hip, lower and upper end each."""
+    """Make the stops of knee and hip, at the lower and upper end of each."""
     joints: tuple[tuple[Pair, tuple[float, float]], ...] = (
         (KNEE, limits.knee),
         (HIP, limits.hip),
@@ -96,10 +97,10 @@ def pushes(
     v: Pair,
     a: Pair,
 ) -> tuple[list[float], Pair]:
-    """Torque of each stop, zero if it does not act [N m]; the accelerations they leave [rad/s^2].
+    """Torque of each stop, zero if it does not act [N m], and the final accelerations [rad/s^2].
 
-    Of one leg whose angles accelerate by `a` without stops, and of those that its joints are
-    `beyond`.
+    The angles of the leg accelerate by `a` without stops, and its joints are `beyond` the limits
+    of these stops.
     """
     found = []
     for stop, past in zip(stops, beyond, strict=True):

@@ -1,9 +1,9 @@
-"""Compiled integrators kept on disk between processes.
+"""Store on disk for compiled integrators, shared by all processes of a user.
 
 A file holds one pickled integrator under a name made of everything that decides it: the formulas,
-the versions of heyoka and Python, and the processor it was compiled for. Files are whole or not
-there, begin with the digest of their content, and are rebuilt when it does not fit. A folder
-that cannot be written is no obstacle: the integrator is then compiled anew in each process.
+the versions of heyoka and Python, and the processor it was compiled for. Files are written whole or
+not at all, begin with the digest of their content, and are rebuilt if the digest does not match. If
+the folder cannot be written, the integrator is compiled anew in each process.
 """
 
 import hashlib
@@ -22,7 +22,7 @@ from legbench.writing import write_whole
 
 DIGEST = hashlib.sha256().digest_size
 ENVIRONMENT = "LEGBENCH_CACHE"
-"""Environment variable that names the folder; empty: nothing is kept."""
+"""Environment variable that names the folder; if it is empty, nothing is kept."""
 
 PROCESSOR = ("model name", "flags", "Features", "CPU implementer", "CPU part")
 """Lines of Linux's `/proc/cpuinfo` that say what code a processor runs."""
@@ -30,7 +30,7 @@ UNREADABLE = (
     *(pickle.UnpicklingError, EOFError, ImportError, AttributeError),
     *(ValueError, TypeError, RuntimeError),
 )
-"""What unpickling raises of a file that another build has written."""
+"""Exceptions that unpickling raises for a file that another build has written."""
 OTHERS_WRITE = 0o022
 """Permission of group or others to write."""
 
@@ -45,7 +45,7 @@ def cache_folder() -> Path | None:
 
 
 def kept(recipe: str, build: Callable[[], Any]) -> Any:
-    """What `build` makes, from disk if this machine has built it before.
+    """Result of `build`, read from disk if this machine has built it before.
 
     Args:
         recipe: text that is different for every different result of `build`.
@@ -75,7 +75,7 @@ def machine() -> str:
 
 
 def _read(path: Path) -> Any:
-    """The object of an intact file that nobody else can have written, else None."""
+    """Object of an intact file that no other user can have written, else None."""
     try:
         if path.parent.stat().st_mode & OTHERS_WRITE:  # unpickling runs what the file says
             return None
@@ -92,7 +92,7 @@ def _read(path: Path) -> Any:
 
 
 def _write(path: Path, content: Any) -> None:
-    """Keep an object, whole or not at all."""
+    """Write an object to disk, whole or not at all."""
     body = pickle.dumps(content)
     with suppress(OSError):
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -101,7 +101,7 @@ def _write(path: Path, content: Any) -> None:
 
 @contextmanager
 def _own_store_only() -> Iterator[None]:
-    """Compile past heyoka's own store, which does not know processors apart."""
+    """Bypass heyoka's own store while compiling, since it does not distinguish processors."""
     state = hy.llvm_state
     was = state.get_diskcache_enabled()
     state.set_diskcache_enabled(False)

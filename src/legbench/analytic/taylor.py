@@ -1,8 +1,8 @@
-"""The fast path: the same equations, compiled into Taylor integrators with event detection.
+"""Fast integration of a leg by compiled Taylor integrators with event detection.
 
-Nothing of a leg is compiled in (`places`), so a leg or a setup that is new costs nothing, and the
-compiled code is kept on disk (`store`). `TaylorLeg` follows states from event to event; who follows
-one leg for long asks for its `course`. `varied` is the same leg on dual numbers.
+No parameter of a leg is compiled in (`places`), so a new leg or setup needs no compilation, and the
+compiled code is kept on disk (`store`). `TaylorLeg` goes from state to state; its `course` is
+faster if the states at events are not needed. `varied` is the same leg on dual numbers.
 """
 
 from dataclasses import replace
@@ -22,18 +22,19 @@ from legbench.errors import ConfigError
 __all__ = ["MAP_TOLERANCE", "SILENT", "Levels", "TaylorLeg", "Watched"]
 
 MAP_TOLERANCE = 1e-9
-"""Tolerance for maps of many hops: a hop then errs by about 1e-8 and costs two thirds."""
+"""Tolerance for maps of many hops [-]: a hop then has an error of about 1e-8, at two thirds of the
+cost."""
 
 
 @final
 class TaylorLeg:
-    """Integrates one leg from event to event; `advance` is that of `HybridLeg`.
+    """Compiled leg that is integrated from event to event, with the `advance` of `HybridLeg`.
 
     A probe `p1 q1 + p2 q2` can be watched on the way, for controllers that act on angles.
 
     Attributes:
         model: the leg.
-        course: what `watch` and `advance` follow; faster for who needs no states on the way.
+        course: the integration behind `watch` and `advance`, which makes no states on the way.
 
     Raises:
         ConfigError: a tolerance that is not positive.
@@ -56,9 +57,9 @@ class TaylorLeg:
 
     @property
     def varied(self) -> "TaylorLeg":
-        """This leg on dual numbers: what it returns carries derivatives (see `variation`).
+        """This leg on dual numbers, whose results carry derivatives (see `variation`).
 
-        Given are the times and the state to start from, levels and motors.
+        The derivatives are those by the seeds in times, start, levels and motors.
         """
         if self._varied is None:
             self._varied = TaylorLeg(
@@ -72,7 +73,7 @@ class TaylorLeg:
     def advance(
         self, state: LegState, until: float, motor: Pair
     ) -> tuple[LegState, list[Transition]]:
-        """The leg at `until`, motors held at `motor`, and what happened until then.
+        """State of the leg at `until`, motors held at `motor`, and the transitions on the way.
 
         Raises:
             PlantFault: the integration failed.
@@ -90,7 +91,7 @@ class TaylorLeg:
     def watch(
         self, state: LegState, until: float, motor: Pair, levels: Levels
     ) -> tuple[LegState, Watched | None]:
-        """Go on until `until` or to the first thing watched, just before it takes effect.
+        """Integrate to `until`, or to the first watched event, which is not yet applied.
 
         Raises:
             PlantFault: the integration failed.
@@ -108,7 +109,7 @@ class TaylorLeg:
         return int(event_integrator(kind, self._tolerance).order)
 
     def fixed_steps(self, state: LegState, step: float, count: int, motor: Pair) -> LegState:
-        """Take steps of one length whatever the error, blind to events; to measure the order."""
+        """Take steps of one length without error control and events, to measure the order."""
         self.course.start(state)
         self.course.hold(motor)
         self.course.march(step, count)

@@ -1,7 +1,7 @@
-"""The constants of the equations of motion: what is left of a design when only angles move.
+"""Constants of the equations of motion, summed over the bodies of a design.
 
 Every body of the leg stays parallel to the thigh or to the shank, so its centre of mass is
-`hip + along_1 dir(q1) + along_2 dir(q2)`, and five sums over the bodies say everything.
+`hip + along_1 dir(q1) + along_2 dir(q2)`, and five sums over the bodies suffice.
 """
 
 from dataclasses import dataclass
@@ -33,23 +33,23 @@ class Bars:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PairTerms:
-    """Two absolute angles around a fixed point.
+    """Constants of two absolute angles that turn about a fixed point.
 
     `M = [[inertia_1, coupling c], [coupling c, inertia_2]]` with `c = cos(q1 - q2)` and
     `g_i = moment_i sin(q_i)`: the form of Appendix I, of the fixed trunk and of free fall.
     """
 
     inertia: tuple[float, float]
-    """[kg m^2]"""
+    """Inertias about the fixed point, of q1 and q2 [kg m^2]."""
     coupling: float
-    """[kg m^2]"""
+    """Coupling of the two inertias [kg m^2]."""
     moment: tuple[float, float]
     """Moments of gravity about q1 and q2 at sin(q) = 1 [N m]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FloatingTerms:
-    """The leg with a free trunk, `[x_t, z_t, q1, q2]` (section IV-A)."""
+    """Constants of the leg with a free trunk, `[x_t, z_t, q1, q2]` (section IV-A)."""
 
     mass: float
     """Mass of the whole system [kg]."""
@@ -60,15 +60,15 @@ class FloatingTerms:
     coupling: float
     """`sum m along_1 along_2` [kg m^2]."""
     reach: float
-    """l1 + l3 = l2: how far the foot tip lies along either direction [m]."""
+    """Distance of the foot tip along either direction, l1 + l3 = l2 [m]."""
     gravity: float
-    """[m/s^2]"""
+    """Acceleration of gravity [m/s^2]."""
 
     def about(self, along: tuple[float, float], moment_mass: float = 0.0) -> PairTerms:
-        """The angles alone, seen from `hip + along_1 dir(q1) + along_2 dir(q2)`.
+        """Constants of the angles about the point `hip + along_1 dir(q1) + along_2 dir(q2)`.
 
-        `moment_mass` is the mass that gravity pulls on when that point is held [kg]; none in
-        free fall.
+        `moment_mass` is the mass on which gravity acts when that point is held [kg]; it is zero
+        in free fall.
         """
         (s1, s2), (a1, a2) = self.first, along
         shifted_1, shifted_2 = s1 - self.mass * a1, s2 - self.mass * a2
@@ -83,15 +83,15 @@ class FloatingTerms:
         )
 
     def hanging(self) -> PairTerms:
-        """The trunk held still (vFTS; hFTS when `gravity` is zero)."""
+        """Constants with the trunk held (vFTS; hFTS when `gravity` is zero)."""
         return self.about((0.0, 0.0), self.mass)
 
     def pinned(self) -> PairTerms:
-        """The foot held still: Appendix I by another way, and with bars if there are any."""
+        """Constants with the foot held: Appendix I by another way, and with bars if there are."""
         return self.about((self.reach, self.reach), self.mass)
 
     def falling(self) -> PairTerms:
-        """Seen from the centre of mass, which falls as it likes (flight)."""
+        """Constants of the angles in flight, about the falling centre of mass."""
         return self.about((self.first[0] / self.mass, self.first[1] / self.mass))
 
     @property
@@ -128,7 +128,7 @@ def floating_terms(
 
 
 def _rods(bars: Bars, l1: float, l2: float) -> list[tuple[float, float, float, float, float]]:
-    """Crank (turns with q2), bar along the thigh (q1), bar along the shank (q2)."""
+    """Rods of the linkage: crank (turning with q2), bars along thigh (q1) and along shank (q2)."""
     arm = bars.crank_length
 
     def rod(length: float) -> tuple[float, float]:
@@ -143,7 +143,7 @@ def _rods(bars: Bars, l1: float, l2: float) -> list[tuple[float, float, float, f
 
 
 def stance_terms(design: LegDesign, gravity: float = GRAVITY) -> PairTerms:
-    """Appendix I, line by line: the foot pinned, bars without mass."""
+    """Constants of Appendix I, line by line: the foot pinned, bars without mass."""
     m_t = design.trunk_mass
     m1, m2, m3 = (segment.mass for segment in design.segments)
     c1, c2, c3 = (segment.com for segment in design.segments)

@@ -1,10 +1,9 @@
-"""How the end of a piece moves with its beginning: heyoka's variational equations.
+"""Derivatives of the end of a piece by its beginning, from heyoka's variational equations.
 
-Along the way an integrator of its own carries the derivative of the state by the state at the
-start and by the parameters of the leg. At the end comes what a shift of the end's time adds: an
-event happens where its function vanishes, and the function, run on dual numbers, says by how much
-the event shifts (`Course`). Chained over events this is the product of transition and saltation
-matrices.
+An integrator of its own carries the derivative of the state by the state at the start and by the
+parameters of the leg through the piece. At the end a term is added for the shift of the end's time:
+an event occurs at a zero of its function, which on dual numbers gives the shift (`Course`). Chained
+over events this is the product of transition and saltation matrices.
 """
 
 from typing import TYPE_CHECKING, final
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
     from legbench.analytic.course import Course
 
 STATES = 4
-"""Two angles and their rates [-]."""
+"""Number of states, two angles and their rates [-]."""
 
 
 @final
@@ -72,7 +71,7 @@ class Variation:
         watch.integrator.time = 0.0
 
     def _moved(self, start: list[float], pars: Floats, time: float, varied: list[float]) -> Floats:
-        """How the state at a fixed time moves with the seeds (4, m).
+        """Derivative of the state at a fixed time by the seeds (4, m).
 
         Args:
             start: state at the beginning of the piece (4,), which may be dual.

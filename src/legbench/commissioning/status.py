@@ -31,7 +31,7 @@ class NodeStatus:
     motor_counts: int
     link_counts: int | None
     temperature: float | None
-    """[deg C]"""
+    """Temperature of the drive [deg C]."""
     homed: bool | None
     """Whether the drive says that it is homed; none if it need not be."""
 

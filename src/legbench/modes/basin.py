@@ -92,7 +92,7 @@ class Question:
     jump: JumpConfig | None
     """The jump controller, or none: motors held at `motor`."""
     motor: tuple[float, float]
-    """[rad]"""
+    """Motor positions without a jump controller [rad]."""
     undamped: bool
     centre: Apex
     """The periodic hop; starts differ from it along the axes only."""

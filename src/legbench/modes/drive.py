@@ -21,7 +21,7 @@ class AbstractDrive(ABC):
     """Motor positions that follow the leg; one object is one hop after the other."""
 
     motor: Pair
-    """[rad]"""
+    """Motor positions at present [rad]."""
     probe: Pair
     """What to watch: `p1 q1 + p2 q2`."""
     alarm: float

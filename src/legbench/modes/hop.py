@@ -50,13 +50,13 @@ class Apex:
     speed: float
     """Forward speed of the centre of mass [m/s]."""
     z1: float
-    """[rad]"""
+    """Polar coordinate z1 of the joint space [rad]."""
     z2: float
-    """[rad]"""
+    """Radial coordinate z2 of the joint space [rad]."""
     dz1: float
-    """[rad/s]"""
+    """Rate of z1 [rad/s]."""
     dz2: float
-    """[rad/s]"""
+    """Rate of z2 [rad/s]."""
 
     def vector(self) -> Floats:
         """State as an array in the order of `NAMES` (6,)."""
@@ -115,7 +115,7 @@ class Hop:
     after: Apex | None
     """Apex at which the hop ended, if it did."""
     duration: float
-    """[s]"""
+    """Time from apex to apex [s]."""
     touchdown: float
     """Time of the first [s]; NaN if none."""
     liftoff: float

@@ -18,7 +18,7 @@ class LinearMode:
     name: str
     """`radial` for the one nearer to z2, `polar` for the other."""
     freq: float
-    """[Hz]"""
+    """Natural frequency [Hz]."""
     shape: Floats
     """Unit vector in joint space (2,)."""
     alignment: float

@@ -43,7 +43,7 @@ class FreeHop:
     """A hop without impact."""
 
     motor: Pair
-    """[rad]"""
+    """Motor positions, held all the time [rad]."""
     point: FixedPoint
     """Multipliers from differences: the foot lands as the square or the cube of time, so the map
     is not smooth there and they are an indication."""

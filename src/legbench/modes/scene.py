@@ -49,9 +49,9 @@ class Scene:
     model: LegModel
     terms: PairTerms
     motor: tuple[float, float]
-    """[rad]"""
+    """Motor positions, held all the time [rad]."""
     rest: tuple[float, float]
-    """[rad]"""
+    """Angles q1, q2 of the equilibrium [rad]."""
 
     def potential(self, q: Floats) -> Floats:
         """Gravity and springs over the value at rest (...) [J]."""

@@ -21,13 +21,13 @@ class Slip:
     """
 
     mass: float
-    """[kg]"""
+    """Mass of the point [kg]."""
     stiffness: float
-    """[N/m]"""
+    """Stiffness of the spring [N/m]."""
     length: float
     """Length of the relaxed spring [m]."""
     gravity: float = 9.81
-    """[m/s^2]"""
+    """Acceleration of gravity [m/s^2]."""
 
     def __post_init__(self) -> None:
         for name in ("mass", "stiffness", "length", "gravity"):
@@ -76,13 +76,13 @@ class Groups:
     drop: float
     """Apex over touchdown [l]."""
     contact_time: float
-    """[sqrt(m/k)]"""
+    """Time from touchdown to lift-off [sqrt(m/k)]."""
     flight_time: float
-    """[sqrt(m/k)]"""
+    """Time from lift-off to touchdown [sqrt(m/k)]."""
     compression: float
-    """[l]"""
+    """Largest compression of the spring [l]."""
     peak_force: float
-    """[m g]"""
+    """Largest force of the spring [m g]."""
     returned: float
     """Next apex over touchdown, by this one's [-]."""
 
