@@ -1,1 +1,1 @@
-"""Modes and maps of an elastic leg: which motions are its own, and how hops return."""
+"""Linear and nonlinear modes of an elastic leg, and return maps of its hops."""

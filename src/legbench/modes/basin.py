@@ -1,7 +1,7 @@
-"""Which hops end in the periodic one: a grid of starts, each followed until it is clear.
+"""Basin of a periodic hop: a grid of starts, each followed until its end is known.
 
-Rows of the grid go to a file as they are finished, so a map that was interrupted goes on where
-it stopped; the file begins with what was asked, and a different question is refused.
+Rows of the grid are written to a file as they are finished, so an interrupted map continues where
+it stopped. The file begins with everything that decides the map; another map is refused.
 """
 
 import json
@@ -33,20 +33,20 @@ Progress = Callable[[int, int], None]
 
 
 class Fate(IntEnum):
-    """What became of a start."""
+    """Outcome of the hops from one start."""
 
     RETURNS = 0
-    """Ended in the periodic hop."""
+    """The leg ends in the periodic hop."""
     WANDERS = 1
-    """Still hops, not (yet) periodically."""
+    """The leg still hops, but is not (yet) near the periodic hop."""
     STANDS = 2
-    """Came to stand."""
+    """The leg stops hopping and stands."""
     FELL = 3
-    """Swung over."""
+    """The leg leans so far that it falls."""
     FAULT = 4
-    """Could not be followed."""
+    """The integration failed."""
     BURIED = 5
-    """Began with the foot under the ground."""
+    """The foot would be below the ground at the start."""
 
 
 ENDINGS = {Ending.STANDS: Fate.STANDS, Ending.FELL: Fate.FELL, Ending.FAULT: Fate.FAULT}
@@ -54,7 +54,7 @@ ENDINGS = {Ending.STANDS: Fate.STANDS, Ending.FELL: Fate.FELL, Ending.FAULT: Fat
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Axis:
-    """One side of the grid.
+    """Axis of the grid: a coordinate of the apex and its range.
 
     Raises:
         ConfigError: an unknown number of the apex, or an empty range.
@@ -90,7 +90,7 @@ class Question:
 
     design: LegDesign
     jump: JumpConfig | None
-    """The jump controller, or none: motors held at `motor`."""
+    """Settings of the jump controller; if there are none, the motors are held at `motor`."""
     motor: tuple[float, float]
     """Motor positions without a jump controller [rad]."""
     undamped: bool
@@ -99,7 +99,7 @@ class Question:
     across: Axis
     up: Axis
     hops: int = 25
-    """Number of hops after which a start is said to wander."""
+    """Number of hops after which a start counts as `Fate.WANDERS`."""
     tolerance: float = MAP_TOLERANCE
     """Tolerance of the integration; far below `near`, which decides [-]."""
     near: float = 0.05
@@ -124,7 +124,7 @@ class Question:
 
 
 def fate_of(leg: TaylorLeg, drive: AbstractDrive, question: Question, start: Apex) -> Fate:
-    """Hop from a start until it is clear where it leads."""
+    """Outcome of the hops from a start, followed until it is known."""
     wanted, at = question.centre.vector(), start
     for _ in range(question.hops):
         try:
@@ -169,7 +169,7 @@ def _row(index: int) -> tuple[int, list[int]]:
 
 
 def _read(path: Path, question: Question) -> dict[int, list[int]]:
-    """Rows that an earlier run has finished; a last line that was cut off does not count."""
+    """Rows that an earlier run has finished; a last line that was cut off is left out."""
     lines = path.read_text(encoding="utf-8").splitlines()
     if not lines or lines[0] != question.text():
         raise ConfigError(
@@ -237,7 +237,7 @@ def _rows(question: Question, todo: list[int], workers: int) -> Iterator[tuple[i
 
 @contextmanager
 def _pool(question: Question, workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Fresh processes: a compiled leg does not survive a fork."""
+    """Pool of new processes; they are not forked, since a compiled leg does not survive a fork."""
     context: Any = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(
         workers, mp_context=context, initializer=_start_process, initargs=(question,)

@@ -19,14 +19,14 @@ from legbench.modes.scene import Scene
 from legbench.signals import Floats
 
 RESIDUAL = 1e-10
-"""Speed left at the far end of a closed orbit [rad/s]."""
+"""Largest speed left at the far end of a closed orbit [rad/s]."""
 NEARLY = 1e-4
-"""Speed left at the far end of an orbit next to a branch point [rad/s]: a leg that is matched to
-nine digits has no straight orbit there, but one that is straight to four."""
+"""Largest speed left at the far end of an orbit next to a branch point [rad/s]: a leg that is
+matched to nine digits has no straight orbit there, but one that is straight to four."""
 SOFT = 0.01
-"""Share of the largest singular value below which a direction is left alone there [-]."""
+"""Share of the largest singular value below which a direction is not corrected there [-]."""
 SAMPLES = 65
-"""Postures of half an orbit at which its bend and the joint limits are looked at [-]."""
+"""Number of postures of half an orbit at which bend and joint limits are evaluated [-]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,7 +45,7 @@ class BrakeOrbit:
     """Largest |z1| on the way for the radial mode, of z2's excursion from rest for the polar
     one [rad]: distance from the straight line that the mode would be."""
     monodromy: Monodromy
-    """Motion of its neighbours in one period, to first order."""
+    """Derivative of the flow over one period, which moves neighbouring orbits."""
     outside: str
     """Joint that is beyond its limit somewhere on the way, and where; empty if none is."""
 

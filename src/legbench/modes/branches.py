@@ -1,8 +1,9 @@
 """Families that branch off where a mode changes its stability.
 
 At such an orbit a multiplier is +1, or -1, which is +1 for the orbit twice around. Its eigenvector
-shows where other closed orbits lie: straight aside if they stop at both ends like the mode, along
-the speeds if they circle. Both sides are tried; where the leg is symmetric they are mirror images.
+shows where other closed orbits lie: in the direction of the angles if they are brake orbits like
+the mode, in that of the rates if they run round. Both sides are tried; on a symmetric leg they are
+mirror images.
 """
 
 from dataclasses import dataclass
@@ -16,11 +17,11 @@ from legbench.modes.periodic import CLOSED, PeriodicOrbit, Shooting
 from legbench.signals import Floats
 
 ASIDE = (0.02, 0.04, 0.01, 0.08)
-"""Distances from the mode at which a branch is looked for, in turn, scaled [-]."""
+"""Distances from the mode at which a branch is sought, one after the other, scaled [-]."""
 LEFT = 0.3
-"""Share of that distance that a solution must keep, or it has fallen back on the mode [-]."""
+"""Smallest share of that distance at which a solution belongs to a branch, not the mode [-]."""
 MOST = 25
-"""Orbits of a branch that are followed [-]."""
+"""Largest number of orbits of a branch that are followed [-]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,7 +30,7 @@ class Branch:
 
     passing: Passing
     side: int
-    """1 or -1: which way along the eigenvector."""
+    """Direction along the eigenvector, 1 or -1."""
     orbits: tuple[PeriodicOrbit, ...]
     """Orbits of the branch, by growing distance from the mode."""
     ended: str
@@ -74,7 +75,7 @@ def _left(away: Floats, aside: Floats, distance: float) -> bool:
 
 
 def _eigenvector(shooting: Shooting, start: Floats, period: float, periods: int) -> Floats:
-    """Direction (4,), scaled, in which neighbours of the same energy close up best."""
+    """Direction (4,), scaled, in which neighbours of the same energy come closest to closing."""
     carrier, size = shooting.carrier, shooting.scale[:4]
     matrix = carrier.carry(start, period).by_start * size / size[:, np.newaxis]
     moving = carrier.rates(start) / size

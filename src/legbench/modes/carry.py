@@ -1,8 +1,8 @@
-"""Flow of the two angles between events, with its derivatives: periodic orbits are made of it.
+"""Flow of the two angles without events, and its derivatives, from which orbits are computed.
 
 One integrator serves every leg and every way of holding it, because inertias, gravity, springs,
-dampers and motors are parameters of it at run time. Joint stops do not act; who asks for an orbit
-says whether it stays within them.
+dampers and motors are parameters of it at run time. Joint stops do not act; the caller has to
+check whether an orbit stays within them.
 """
 
 from dataclasses import dataclass
@@ -20,19 +20,19 @@ from legbench.modes.scene import Scene
 from legbench.signals import Floats
 
 STATES = 4
-"""Two angles and their rates [-]."""
+"""Number of states, two angles and their rates [-]."""
 TOLERANCE = 1e-15
-"""Error of a step over the size of the state [-]."""
+"""Largest error of a step over the size of the state [-]."""
 MAX_STEPS = 20_000
 """Largest number of steps of one integration [-]; an orbit takes some hundred."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Carried:
-    """A state after some time, and how it depends on where and how it began."""
+    """State after some time, and its derivatives by the start and by the parameters."""
 
     end: Floats
-    """q1, q2, v1, v2 (4,) [rad, rad/s]."""
+    """Final state q1, q2, v1, v2 (4,) [rad, rad/s]."""
     by_start: Floats
     """Derivative by the state at the start (4, 4)."""
     by_parameters: Floats
@@ -44,7 +44,7 @@ class Carried:
 
 @final
 class Carrier:
-    """A leg of a scene, on its way.
+    """Integrator of the flow of one leg.
 
     Args:
         scene: the leg and how it is held.
@@ -124,7 +124,7 @@ class Carrier:
         return np.asarray(states)[:, :STATES]
 
     def _load(self, start: Floats, extra: float, motor: Floats | None) -> Any:
-        """The integrator at a start, its derivatives those of the start by itself."""
+        """Set the integrator to a start, with the identity as derivative by the start."""
         integrator = self._integrator
         integrator.time = 0.0
         integrator.state[:STATES] = start

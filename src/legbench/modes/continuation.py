@@ -2,7 +2,7 @@
 
 Newton's method solves the equations together with one row that fixes how far along the last
 tangent the next solution lies. So a curve is followed through turning points, where no single
-unknown would do as a parameter.
+unknown can be the parameter.
 """
 
 from collections.abc import Callable
@@ -18,7 +18,7 @@ where there is nothing to solve."""
 NEWTON = 12
 """Number of iterations after which a step is given up and halved."""
 FARTHEST = 0.5
-"""Largest change of an unknown in one iteration; beyond it Newton's method is lost."""
+"""Largest change of an unknown in one iteration; a larger one ends Newton's method."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,7 +26,7 @@ class Solution:
     """One point of a curve."""
 
     unknown: Floats
-    """(n + 1,)"""
+    """Unknowns of the solution (n + 1,)."""
     slope: Floats
     """Derivative of the equations there (n, n + 1)."""
     tangent: Floats
@@ -54,10 +54,10 @@ def correct(
     *,
     stiff: float = 0.0,
 ) -> Solution | None:
-    """Newton's method on the equations and `row . unknown = value`; none if it does not converge.
+    """Newton's method on the equations and `row . unknown = value`; None if it does not converge.
 
-    Directions that the equations feel less than `stiff` times the most that they feel are left
-    alone: near a branch point there is one, and the exact solution may lie far away along it.
+    Directions whose singular value is below `stiff` times the largest one are not corrected: near a
+    branch point there is one, and the exact solution may lie far away along it.
     """
     unknown = guess.copy()
     for _ in range(NEWTON):
@@ -81,21 +81,22 @@ def tangent_of(slope: Floats, along: Floats) -> Floats:
 
 
 AGAIN = "a shorter step"
-"""Answer of a visitor who refuses a solution but may take one that is nearer."""
+"""Answer of a visitor that refuses a solution but may accept one after a shorter step."""
 MANY = "as many as were asked for"
-"""End of a curve with the largest number of solutions."""
+"""Reason of the end of a curve that has the largest number of solutions."""
 LOST = "no solution continues it"
-"""End of a curve that Newton's method does not get beyond."""
+"""Reason of the end of a curve beyond which Newton's method does not converge."""
 Visit = Callable[[Solution], str | None]
-"""Called with every solution: None to go on, `AGAIN`, or why the curve ends with it."""
+"""Function that is called with every solution; it returns None to go on, `AGAIN`, or the reason why
+the curve ends with it."""
 
 
 def trace(
     equations: Equations, first: Solution, stride: Stride, tolerance: float, visit: Visit
 ) -> str:
-    """Follow a curve from its first solution on, which is not visited; says why it ended.
+    """Follow a curve from its first solution on, which is not visited; return why it ended.
 
-    That is what the visitor said, `MANY`, `LOST`, or `AGAIN` once steps are too short for another
+    The reason is the visitor's, `MANY`, `LOST`, or `AGAIN` once steps are too short for another
     solution.
     """
     last, step = first, stride.first
@@ -115,7 +116,7 @@ def trace(
 def _next(
     equations: Equations, last: Solution, step: float, tolerance: float, visit: Visit
 ) -> tuple[Solution, str | None]:
-    """The solution a step further, or the last one, and what the visitor said of it."""
+    """Solution one step further, or the last one, and the visitor's answer to it."""
     row = last.tangent
     value = float(row @ last.unknown) + step
     found = correct(equations, last.unknown + step * row, row, value, tolerance)

@@ -1,4 +1,4 @@
-"""Curves in joint space through given points; apart, because scipy takes long to load."""
+"""Curves in joint space through given points, in a file of its own since scipy loads slowly."""
 
 import numpy as np
 from scipy.interpolate import CubicSpline

@@ -1,4 +1,4 @@
-"""Hops that repeat after n: cycles of the hopping map, and where a hop that is not stable ends."""
+"""Cycles of n hops, and the cycle in which the motion from an unstable hop ends."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,12 +23,12 @@ LONGEST = 8
 REPEATS = 1e-4
 """Distance between two apexes that count as the same, in `UNITS` [-]."""
 NUDGE = 0.01
-"""First distance from a hop whose end is looked for, in `UNITS` [-]."""
+"""Initial distance from an unstable hop whose end is sought, in `UNITS` [-]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cycle:
-    """Hops that end where the first of them began."""
+    """Cycle of hops, the last of which ends where the first began."""
 
     apexes: tuple[Apex, ...]
     hops: tuple[Hop, ...]
@@ -62,7 +62,7 @@ def stacked(
 
     Args:
         leg: the compiled leg.
-        drive: what moves its motors.
+        drive: law of its motors.
         apexes: one a row, in `UNITS` (n, 6).
 
     Returns:
@@ -86,7 +86,7 @@ def stacked(
 
 
 def find_cycle(leg: TaylorLeg, drive: AbstractDrive, guess: Sequence[Apex]) -> Cycle:
-    """The cycle near some apexes in a row, by Newton's method on all of them together.
+    """Cycle near some consecutive apexes, by Newton's method on all of them together.
 
     Raises:
         ConfigError: there is none, or a hop on the way to it does not return.
@@ -145,7 +145,7 @@ def repeats(apexes: Sequence[Apex], longest: int = LONGEST) -> int | None:
 def end_of(
     leg: TaylorLeg, drive: AbstractDrive, cycle: Cycle, hops: int
 ) -> tuple[list[Apex], Cycle | None]:
-    """Nudge a hop along its largest multiplier's direction, and follow it to its end.
+    """Disturb a hop along its largest multiplier's direction, and follow the motion to its end.
 
     Returns:
         The apexes on the way, fewer than asked for if the leg stops hopping, and the cycle in which

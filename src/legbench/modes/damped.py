@@ -1,8 +1,8 @@
-"""Modes of the damped leg: which drive, proportional to speed, would keep each motion going.
+"""Modes of the damped leg, each kept periodic by an excitation proportional to speed.
 
-An undamped leg has its modes for ever. In a damped one a mode shrinks, and its frequency and
-damping change with its amplitude. Each amplitude is studied by itself: a negative damper, the same
-at both joints, gives back what the leg's own dampers take, and the motion closes (`periodic`).
+A mode of an undamped leg is periodic. In a damped leg its amplitude decreases, and frequency and
+damping change with it. Each amplitude is computed by itself: a negative damper, the same at both
+joints, returns the energy that the leg's own dampers take, and the motion is periodic (`periodic`).
 """
 
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ class DampedFamily:
     name: str
     """`radial` or `polar`."""
     damping: tuple[float, float]
-    """Dampers of both joints [N m s/rad]."""
+    """Viscous damping of both joints [N m s/rad]."""
     orbits: tuple[PeriodicOrbit, ...]
     ended: str
     """Reason why there are no more, in words."""

@@ -1,4 +1,4 @@
-"""What moves the motors during a hop: nothing, or the jump controller without its clock."""
+"""Laws of the motors during a hop: motors held still, or the jump controller without sampling."""
 
 import math
 from abc import ABC, abstractmethod
@@ -18,12 +18,12 @@ SCALE = math.sqrt(0.5)
 
 
 class AbstractDrive(ABC):
-    """Motor positions that follow the leg; one object is one hop after the other."""
+    """Law of the motor positions, with a state of its own that goes on from hop to hop."""
 
     motor: Pair
     """Motor positions at present [rad]."""
     probe: Pair
-    """What to watch: `p1 q1 + p2 q2`."""
+    """Factors p1, p2 of the probe `p1 q1 + p2 q2` that the law watches [-]."""
     alarm: float
     """Time at which `ring` is to be called [s]."""
 
@@ -37,21 +37,21 @@ class AbstractDrive(ABC):
 
     @abstractmethod
     def happen(self, what: Watched, value: float, time: float) -> None:
-        """The probe did what was watched for."""
+        """Handle an event of the probe."""
 
     @abstractmethod
     def ring(self, value: float, time: float) -> None:
-        """The alarm."""
+        """Handle the alarm."""
 
     @property
     @abstractmethod
     def settled(self) -> bool:
-        """Whether the drive has forgotten the stance: the state of the leg says it all."""
+        """Whether the law keeps no state from the stance, so that the leg's state is complete."""
 
 
 @final
 class Passive(AbstractDrive):
-    """Motors held for good."""
+    """Motors that are held in place."""
 
     probe = (-SCALE, SCALE)
     alarm = math.inf
@@ -61,21 +61,21 @@ class Passive(AbstractDrive):
 
     @property
     def settled(self) -> bool:
-        """Always."""
+        """Whether the law is without state, which is always so."""
         return True
 
     def restart(self) -> None:
-        """Nothing to forget."""
+        """Do nothing, as there is no state."""
 
     def levels(self) -> Levels:
-        """Nothing to watch."""
+        """No levels, as there is nothing to watch."""
         return SILENT
 
     def happen(self, what: Watched, value: float, time: float) -> None:
-        """Never called."""
+        """Do nothing, as no event is watched."""
 
     def ring(self, value: float, time: float) -> None:
-        """Never called."""
+        """Do nothing, as no alarm is set."""
 
 
 @final
@@ -83,7 +83,7 @@ class JumpLaw(AbstractDrive):
     """`legbench.control.Jump` in continuous time: the limit of a fast control cycle.
 
     Fold and load are both `y = s (k2 q2 - k1 q1) / k`, shifted by the motor position, so every
-    threshold of the controller is a level of y, and every extreme one of its turns.
+    threshold of the controller is a level of y, and every extreme one of its turning points.
 
     Raises:
         ConfigError: settings that the controller itself refuses for this leg.
@@ -115,7 +115,7 @@ class JumpLaw(AbstractDrive):
         self._enter(JumpPhase.FLIGHT)
 
     def levels(self) -> Levels:
-        """The transitions out of the phase; the same object as long as they are the same."""
+        """Levels that end the phase; the same object as long as they do not change."""
         if self._levels is None:
             self._levels = self._new_levels()
         return self._levels
@@ -134,7 +134,7 @@ class JumpLaw(AbstractDrive):
                 return SILENT
 
     def happen(self, what: Watched, value: float, time: float) -> None:
-        """Advance the phases."""
+        """Advance the phase after an event of the probe."""
         self._levels = None
         match (self.phase, what):
             case (JumpPhase.FLIGHT, Watched.RISE):
@@ -155,7 +155,7 @@ class JumpLaw(AbstractDrive):
                 pass
 
     def ring(self, value: float, time: float) -> None:
-        """The release is over, or a load has lasted."""
+        """Advance the phase after the alarm: the release is over, or a load has lasted."""
         self._levels = None
         if self._loaded:
             self._leave(value)
