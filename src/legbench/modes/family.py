@@ -1,8 +1,8 @@
 """Families of nonlinear modes: a mode's orbits by growing energy, and where stability changes.
 
-Pseudo-arclength continuation follows the brake orbits out of a linear mode. Along them the trace
-of the pair of multipliers says what happens: beyond 2 a pair of multipliers is real and positive,
-beyond -2 real and negative, and neighbours leave the orbit. Where it passes `2 cos(2 pi p / q)` an
+Pseudo-arclength continuation follows the brake orbits from a linear mode on. The trace of the pair
+of multipliers decides their stability: above 2 the pair is real and positive, below -2 real and
+negative, and neighbours leave the orbit. Where it passes `2 cos(2 pi p / q)` an
 oscillation across the mode takes q periods for p turns: an internal resonance.
 """
 
@@ -22,15 +22,15 @@ from legbench.modes.seed import APART, FIRST, first_unknown, gap
 from legbench.signals import Floats
 
 STEP = 0.03
-"""Longest arc between two orbits; [rad], half periods count in units of the linear one."""
+"""Longest arc between two orbits [rad]; half periods count in units of the linear one."""
 SMALLEST = 1e-5
-"""Amplitude of the smallest orbit that is solved for [rad]."""
+"""Amplitude of the smallest orbit that is computed [rad]."""
 DETERMINANT = 1e-8
-"""Error of the product of multipliers beyond which it is told [-]."""
+"""Error of the product of multipliers beyond which a warning is given [-]."""
 RATIOS = ((2, 1), (3, 1), (3, 2), (1, 2), (1, 3), (2, 3))
-"""Ratios of linear frequencies, radial to polar, that are told as internal resonances."""
+"""Ratios of linear frequencies, radial to polar, that are reported as internal resonances."""
 NEAR = 0.02
-"""Relative distance from such a ratio within which it is told [-]."""
+"""Relative distance from such a ratio within which it is reported [-]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,7 +53,7 @@ class Passing:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Family:
-    """A mode's orbits by growing amplitude: backbone and generator curve."""
+    """Orbits of a mode by growing amplitude: its backbone and generator curve."""
 
     mode: LinearMode
     shooting: BrakeShooting
@@ -63,7 +63,7 @@ class Family:
     ended: str
     """Reason why there are no more, in words."""
     warnings: tuple[str, ...]
-    """Reasons not to take the family at its word: resonances, errors of its multipliers."""
+    """Reasons to doubt the family: resonances, and errors of its multipliers."""
 
     @property
     def largest(self) -> float:
@@ -141,9 +141,9 @@ def _grow(
     energy: float,
     progress: Callable[[int, int], None] | None = None,
 ) -> str:
-    """Append orbits beyond `unknown` on the side of `along`; says why there are no more.
+    """Append orbits beyond `unknown` on the side of `along`; return why there are no more.
 
-    Towards an energy of zero it goes down to the amplitude `FIRST`.
+    With an energy of zero the family is followed down to the amplitude `FIRST`.
     """
     halted = ""
 
@@ -177,7 +177,7 @@ def _grow(
 def at_energy(family: Family, energy: float) -> BrakeOrbit:
     """The orbit of a family that has just this energy [J].
 
-    Below the smallest one of the family it is solved for from there.
+    An energy below that of the smallest orbit is reached by continuation from that orbit.
 
     Raises:
         ConfigError: the family has no orbit of that energy; the message says which it has.
@@ -216,7 +216,7 @@ def _small(family: Family, energy: float) -> BrakeOrbit:
 
 
 def _refined(shooting: BrakeShooting, orbits: list[BrakeOrbit]) -> list[BrakeOrbit]:
-    """Orbits with one more wherever the trace seems to touch 2 or -2 between three of them."""
+    """Orbits, with one more wherever the trace seems to touch 2 or -2 between three of them."""
     more: list[tuple[int, BrakeOrbit]] = []
     for index, (one, two, three) in enumerate(zip(orbits, orbits[1:], orbits[2:], strict=False)):
         energies = np.array([orbit.energy for orbit in (one, two, three)])

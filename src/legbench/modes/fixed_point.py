@@ -1,4 +1,4 @@
-"""Fixed points of the hopping map: hops that return to where they began, and whether they last."""
+"""Fixed points of the hopping map, which are hops that repeat, and their stability."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,15 +15,15 @@ from legbench.signals import Floats
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FixedPoint:
-    """A hop that returns to where it began."""
+    """Hop that ends at the apex from which it began."""
 
     apex: Apex
     hop: Hop
     multipliers: tuple[complex, ...]
-    """Eigenvalues of the map's derivative, largest first: stable when all are inside the unit
-    circle."""
+    """Eigenvalues of the map's derivative, largest first; the hop is stable if all are inside the
+    unit circle."""
     residual: float
-    """What is left of `map(apex) - apex` in the map's own units."""
+    """Remainder of `map(apex) - apex`, in `UNITS` [-]."""
 
     @property
     def stable(self) -> bool:
@@ -32,19 +32,20 @@ class FixedPoint:
 
 
 UNITS = np.array([0.01, 0.1, 0.1, 0.1, 1.0, 1.0])
-"""Sizes that count as large: [m, m/s, rad, rad, rad/s, rad/s]."""
+"""Units by which the six numbers of an apex are scaled [m, m/s, rad, rad, rad/s, rad/s]."""
 DIFFERENCE = 1e-6
-"""Step of central differences, in the unit of each number."""
+"""Step of central differences, in `UNITS` [-]."""
 
 Derivative = Callable[[TaylorLeg, AbstractDrive, Apex], Floats]
 """Function that gives the map's derivative at an apex (6, 6), in `UNITS`."""
 
 
 def tangent_map(leg: TaylorLeg, drive: AbstractDrive, at: Apex) -> tuple[Floats, Floats]:
-    """The next apex (6,), and its exact derivative by this one (6, 6), both in `UNITS`.
+    """Next apex (6,) and its exact derivative by this one (6, 6), both in `UNITS`.
 
-    The hop is followed on dual numbers; the drive must make its levels and alarms of what it is
-    told by sums and products. Not for a touchdown without speed, where the map is not smooth.
+    The hop is computed on dual numbers; the drive must compute its levels and alarms from its
+    arguments by sums and products. At a touchdown without speed the map is not smooth, and the
+    derivative does not exist.
 
     Raises:
         ConfigError: the hop does not return to an apex.
@@ -68,7 +69,7 @@ def derivative(leg: TaylorLeg, drive: AbstractDrive, at: Apex) -> Floats:
 
 
 def differences(leg: TaylorLeg, drive: AbstractDrive, at: Apex) -> Floats:
-    """Derivative of the map by central differences, which exist where it is not smooth, too (6, 6).
+    """Derivative of the map by central differences (6, 6), also where the map is not smooth.
 
     Raises:
         ConfigError: a neighbour does not return to an apex.

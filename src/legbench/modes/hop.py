@@ -1,7 +1,7 @@
-"""Hopping as a map: from the apex of one flight to the apex of the next.
+"""Return map of hopping, from the apex of one flight to the apex of the next.
 
-The section is the instant in flight when the centre of mass is highest. Travel along the ground
-changes nothing, so six numbers say where the leg is (`Apex`), and a hop maps six onto six.
+The Poincare section is the instant in flight when the centre of mass is highest. The motion does
+not depend on the place along the ground, so six numbers are the state of the leg there (`Apex`).
 """
 
 import math
@@ -20,11 +20,11 @@ from legbench.modes.drive import AbstractDrive
 from legbench.signals import Floats
 
 HORIZON = 2.0
-"""A leg that has not flown through an apex by then stands [s]."""
+"""Time within which a hopping leg reaches an apex; without one it counts as standing [s]."""
 FALLEN = 1.2
-"""|x1| beyond which the leg lies rather than stands [rad]."""
+"""Polar angle |x1| at which the leg counts as fallen [rad]."""
 CALLS = 400
-"""Events in one hop after which it is given up."""
+"""Largest number of events in one hop [-]."""
 NAMES = ("height", "speed", "z1", "z2", "dz1", "dz2")
 SCALE = math.sqrt(0.5)
 
@@ -36,14 +36,14 @@ class Ending(StrEnum):
     STANDS = "stands"
     """No lift-off within two seconds."""
     FELL = "fell"
-    """The leg swung too far."""
+    """The leg leans so far that it has fallen."""
     FAULT = "fault"
-    """Integration or drive lost step."""
+    """The integration failed, or the hop has too many events."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Apex:
-    """A leg at the highest point of its centre of mass."""
+    """State of a leg in flight when its centre of mass is highest."""
 
     height: float
     """Height of the centre of mass over the ground [m]."""
@@ -101,7 +101,7 @@ class Apex:
 
 
 def apex_of(model: LegModel, state: LegState) -> Apex:
-    """The section's numbers of a leg in flight."""
+    """Apex of a leg in flight, from its state."""
     height = state.trunk_pos[1] + model.mass_centre_from_hip(state.q)[1]
     speed = state.trunk_vel[0] + model.mass_centre_vel_from_hip(state.q, state.v)[0]
     return Apex.at(height, speed, state.q, state.v)
@@ -109,19 +109,19 @@ def apex_of(model: LegModel, state: LegState) -> Apex:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hop:
-    """One application of the map."""
+    """Result of one hop."""
 
     ending: Ending
     after: Apex | None
-    """Apex at which the hop ended, if it did."""
+    """Apex at which the hop ended, if it reached one."""
     duration: float
     """Time from apex to apex [s]."""
     touchdown: float
-    """Time of the first [s]; NaN if none."""
+    """Time of the first touchdown [s]; NaN if there is none."""
     liftoff: float
-    """Time of the last [s]; NaN if none."""
+    """Time of the last lift-off [s]; NaN if there is none."""
     impact: float
-    """Energy lost to the ground [J]."""
+    """Energy lost in the impact with the ground [J]."""
 
 
 def hop(leg: TaylorLeg, drive: AbstractDrive, start: Apex) -> Hop:
@@ -166,7 +166,7 @@ def hop(leg: TaylorLeg, drive: AbstractDrive, start: Apex) -> Hop:
 def _pause(
     course: Course, drive: AbstractDrive, *, flew: bool
 ) -> tuple[Watched | None, Ending | None]:
-    """Go on to the next event, alarm or ending; `flew` if the leg has let go of the ground."""
+    """Go on to the next event, alarm or ending; `flew` if the leg has lifted off."""
     until, apex = min(HORIZON, drive.alarm), math.inf
     if flew and course.regime is Regime.FLIGHT:
         apex = course.apex_time()
@@ -184,7 +184,7 @@ def _pause(
 
 
 def _launch(course: Course, start: Apex) -> None:
-    """Put a leg at an apex.
+    """Set a leg to an apex.
 
     Raises:
         ConfigError: the foot would be below the ground.
@@ -196,7 +196,7 @@ def _launch(course: Course, start: Apex) -> None:
 
 
 def _reached(course: Course) -> Apex:
-    """The section's numbers of a leg at its apex."""
+    """Apex of a leg that has reached it."""
     (_, height), (speed, _) = course.centre()
     return Apex.at(height, speed, course.q, course.v)
 
@@ -226,7 +226,7 @@ def return_map(leg: TaylorLeg, drive: AbstractDrive, start: Apex) -> Hop:
 
 
 def settle(leg: TaylorLeg, drive: AbstractDrive, start: Apex, hops: int) -> list[Apex]:
-    """Apexes of up to `hops` hops in a row, the start first; fewer when the leg stops hopping."""
+    """Apexes of up to `hops` consecutive hops, the start first; fewer if the leg stops hopping."""
     apexes = [start]
     for _ in range(hops):
         done = return_map(leg, drive, apexes[-1])

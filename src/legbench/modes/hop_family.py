@@ -29,7 +29,7 @@ from legbench.modes.hop_setting import SPANS, Setting, tools_at, value_of
 from legbench.signals import Floats
 
 CLOSED = 1e-8
-"""Distance between the two ends of a cycle of the family, in `fixed_point.UNITS` [-]."""
+"""Largest distance between the two ends of a cycle of the family, in `fixed_point.UNITS` [-]."""
 DIFFERENCE = 1e-5
 """Step of the central difference by the setting, in its `SPANS` [-]."""
 STEP = 0.1
@@ -41,12 +41,12 @@ MARGINAL = 1e-4
 LOOKS = 12
 """Largest number of hops that are solved for at a change of stability [-]."""
 AGAIN_NEAR, AGAIN_AFTER = 0.03, 5
-"""Distance within which a family has come back to one of its hops, and how many hops later [-]."""
+"""Distance within which a family has returned to one of its hops, and how many hops later [-]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Member:
-    """A periodic hop at one value of the setting."""
+    """Periodic hop at one value of the setting."""
 
     value: float
     cycle: Cycle
@@ -68,7 +68,7 @@ class Change:
 
     @property
     def kind(self) -> str:
-        """Words for what happens there."""
+        """Kind of the change of stability, in words."""
         multiplier = self.member.cycle.multipliers[0]
         if abs(multiplier.imag) > 1e-3:
             return "a pair of multipliers, to hops that wander around it"
@@ -112,7 +112,7 @@ class _Equations:
                 self._ends(apexes, value + sign * DIFFERENCE * self.span) for sign in (1.0, -1.0)
             ]
         except (ConfigError, DesignError) as error:
-            # What has happened; what follows the semicolon is advice for who chose the start.
+            # The part before the semicolon is the cause; the rest is advice on choosing a start.
             self.why = str(error).partition(";")[0]
             return np.full(size, np.nan), np.zeros((size, size + 1))
         by_setting = (ends[0] - ends[1]) / (2.0 * DIFFERENCE)
@@ -143,7 +143,7 @@ def follow_hop(
     Args:
         design: the leg.
         jump: settings of the controller.
-        setting: what is varied.
+        setting: the setting that is varied.
         start: the hop at the present value.
         to: value at which the family ends, if it gets there.
         progress: called with the share of the way that is done, in hundredths, and 100.
@@ -193,7 +193,7 @@ def _first(equations: _Equations, start: Cycle, value: float) -> Solution:
 
 @final
 class _Walk:
-    """The hops that a family has passed, and when it has gone far enough."""
+    """Hops that a family has passed, and the conditions that end it."""
 
     def __init__(
         self,
@@ -208,7 +208,7 @@ class _Walk:
         self._passed, self._progress = [first.unknown], progress
 
     def visit(self, found: Solution) -> str | None:
-        """Take a hop; says why it is the last one, if it is."""
+        """Add a hop; return why it is the last one, or None if it is not."""
         self._equations.why = ""
         setting, member = self._equations.setting, _member(self._equations, found)
         self.members.append(member)
@@ -224,7 +224,7 @@ class _Walk:
         return f"it turned back past {self._from:g}" if share < 0.0 else None
 
     def changes(self) -> list[Change]:
-        """Changes of stability between neighbours, each solved for."""
+        """Changes of stability between neighbouring hops, each located by a root search."""
         pairs = zip(pairwise(self.members), pairwise(self._passed), strict=True)
         return [
             Change(member=self._marginal(before, after, *ends), stable_after=after.cycle.stable)

@@ -25,7 +25,7 @@ class Setting(StrEnum):
 
 
 SPANS = {Setting.Z2: 0.1, Setting.DZ2: 0.1, Setting.DAMPING: 1.0, Setting.MISMATCH: 0.1}
-"""Changes of a setting that count as large."""
+"""Units by which changes of each setting are scaled, in the unit of the setting."""
 
 
 def tools_at(
@@ -35,9 +35,9 @@ def tools_at(
     value: float,
     same: TaylorLeg | None = None,
 ) -> tuple[TaylorLeg, JumpLaw]:
-    """The leg and its law with a setting at some value; the law knows the leg.
+    """Compiled leg and its control law with a setting at some value.
 
-    Settings of the controller leave the leg as it is: `same` is then used again.
+    A setting of the controller does not change the leg, so that `same` is used again.
 
     Raises:
         ConfigError: a value that the controller refuses, or no leg can have.

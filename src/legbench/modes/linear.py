@@ -13,7 +13,7 @@ RADIAL = np.array([-1.0, 1.0]) / np.sqrt(2.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinearMode:
-    """One of the two."""
+    """One of the two linear modes of a leg at rest."""
 
     name: str
     """`radial` for the one nearer to z2, `polar` for the other."""
@@ -28,7 +28,7 @@ class LinearMode:
 def linear_modes(scene: Scene) -> dict[str, LinearMode]:
     """Solve `K w = omega^2 M w` at rest; keys `radial` and `polar`."""
     rest = np.asarray(scene.rest)
-    # In coordinates in which the inertia is one, the stiffness is symmetric still.
+    # In coordinates in which the inertia matrix is the identity, the stiffness stays symmetric.
     unit = np.linalg.inv(np.linalg.cholesky(scene.mass(rest)))
     values, vectors = np.linalg.eigh(unit @ scene.stiffness(rest) @ unit.T)
     vectors = unit.T @ vectors

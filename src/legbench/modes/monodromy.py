@@ -1,9 +1,9 @@
-"""Motion of the neighbours of a periodic orbit over one period.
+"""Derivative of the flow over one period of a periodic orbit, and its Floquet multipliers.
 
 In a conservative leg two of the four Floquet multipliers are one: along the orbit, and towards
 orbits of another energy. As a double eigenvalue they are known to half of the digits only. They
-are taken out exactly, by their eigenvectors, and what is left is the pair that says whether the
-orbit is stable.
+are taken out exactly, by their eigenvectors; the pair that is left decides whether the orbit is
+stable.
 """
 
 from dataclasses import dataclass

@@ -1,14 +1,14 @@
-"""Hopping without motors: the hops at which touchdown costs nothing.
+"""Passive hops without impact, at which an undamped leg with held motors loses no energy.
 
 A plastic impact takes `m v^2 / 2` of the foot, so an undamped leg loses height at every hop,
 unless its own oscillation in flight brings the foot down at rest. By time reversal that happens
-when the stance turns round at rest and the flight at an apex where nothing but the fall moves:
-each is then its own mirror image, and the hop ends as it began.
+when the leg is at rest both in the middle of the stance and at the apex of the flight: each half of
+the hop is then the mirror image of the other in time, and the hop ends as it began.
 
-A stance that turns round at rest is two numbers, q1 and q2; the apex is three conditions, dz1 =
-dz2 = speed = 0. So hops without impact exist at isolated values of one more number, taken here to
-be z1 of the motors. On a matched leg that value is zero, because x1 = 0 meets two of the
-conditions by itself, and the third one picks the depth of the stance.
+The posture of rest in stance has two numbers, q1 and q2; the apex has three conditions, dz1 = dz2 =
+speed = 0. So hops without impact exist at isolated values of one more number, taken here to be z1
+of the motors. On a matched leg that value is zero, because x1 = 0 meets two of the conditions by
+itself, and the third one decides the depth of the stance.
 """
 
 import math
@@ -27,20 +27,20 @@ from legbench.modes.roots import bracketed, solved
 from legbench.signals import Floats
 
 STANCE = 2.0
-"""Longest [s]."""
+"""Longest stance [s]."""
 STILL = 1e-9
-"""Speeds left at the apex of a solved hop [m/s, rad/s]."""
+"""Largest speeds left at the apex of a solved hop [m/s, rad/s]."""
 CLOSE = 1e-12
 """Speeds at which the solution ends [m/s, rad/s]."""
 CLOSED = 1e-5
 """Distance between an apex and the next one of a hop without impact, in `UNITS` [-]."""
 NUDGE = 1e-10
-"""The foot may only touch the ground tangentially; so much lower it surely lands [m]."""
+"""Height by which the leg is lowered, so that a foot that only grazes the ground lands [m]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FreeHop:
-    """A hop without impact."""
+    """Hop without impact."""
 
     motor: Pair
     """Motor positions, held all the time [rad]."""
@@ -48,7 +48,7 @@ class FreeHop:
     """Multipliers from differences: the foot lands as the square or the cube of time, so the map
     is not smooth there and they are an indication."""
     symmetric_loss: float
-    """What the ground takes when the motors stand at z1 = 0 instead, z2 the same [J]."""
+    """Energy that the impact takes if the motors are at z1 = 0 instead, with the same z2 [J]."""
 
     @property
     def motor_z1(self) -> float:
@@ -57,7 +57,7 @@ class FreeHop:
 
 
 def rebound(leg: TaylorLeg, motor: Pair, posture: Pair) -> Apex | None:
-    """Apex after a leg is let go at rest from a standing posture (q1, q2) [rad].
+    """Apex after a leg is released at rest from a standing posture (q1, q2) [rad].
 
     None if it does not fly, or meets the ground before its apex.
     """
@@ -91,7 +91,7 @@ def depths(leg: TaylorLeg, half: float, halves: Floats) -> list[float]:
     ):
         if before * after < 0.0:
             depth = bracketed(still, float(low), float(high), 1e-14)
-            if abs(still(depth)) < 1e-6:  # else a jump, not a zero
+            if abs(still(depth)) < 1e-6:  # otherwise the sign changes by a jump, not at a zero
                 found.append(depth)
     return found
 
@@ -99,7 +99,7 @@ def depths(leg: TaylorLeg, half: float, halves: Floats) -> list[float]:
 def free_hop(leg: TaylorLeg, half: float, depth: float) -> FreeHop | None:
     """The hop without impact near a depth of `depths`; None if there is none.
 
-    Unknown are the posture in which the stance turns round and z1 of the motors.
+    The unknowns are the posture of rest in stance and z1 of the motors.
     """
 
     def motor_of(z1: float) -> Pair:
@@ -128,7 +128,7 @@ def free_hop(leg: TaylorLeg, half: float, depth: float) -> FreeHop | None:
 
 
 def _closed(leg: TaylorLeg, drive: Passive, apex: Apex) -> FixedPoint | None:
-    """The whole hop, if it comes back: a leg that met a joint stop does not."""
+    """The whole hop if it returns to its apex; a leg that met a joint stop does not."""
     for lower in (0.0, NUDGE):
         start = Apex.of(apex.vector() - lower * np.eye(6)[0])
         done = return_map(leg, drive, start)
