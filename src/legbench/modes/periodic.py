@@ -23,14 +23,14 @@ from legbench.signals import Floats
 CLOSED = 1e-9
 """Largest distance between the two ends of a closed orbit, scaled [-]."""
 SAMPLES = 129
-"""States of an orbit at which its shape and the joint limits are looked at [-]."""
+"""Number of states of an orbit at which its shape and the joint limits are evaluated [-]."""
 BRAKES = 1e-3
-"""Smallest speed over the largest below which an orbit stops and goes back the way it came [-]."""
+"""Smallest speed over the largest below which an orbit counts as a brake orbit [-]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PeriodicOrbit:
-    """One oscillation, of any shape."""
+    """Periodic orbit of any shape."""
 
     start: Floats
     """q1, q2, v1, v2 at one instant (4,) [rad, rad/s]."""
@@ -50,13 +50,13 @@ class PeriodicOrbit:
     slowest: float
     """Smallest speed on the way over the largest, by kinetic energy [-]."""
     monodromy: Monodromy
-    """Pair and trace mean what they say for an undamped leg only."""
+    """Derivative of the flow over a period; its pair and trace hold for an undamped leg only."""
     outside: str
     """Joint that is beyond its limit on the way, and where; empty if none is."""
 
     @property
     def brakes(self) -> bool:
-        """Whether it stops somewhere, from where it goes back the way it came."""
+        """Whether the orbit is a brake orbit, which stops and then returns on the same path."""
         return self.slowest < BRAKES
 
     @property

@@ -1,4 +1,4 @@
-"""Response of the damped leg to motors that switch between two set points for ever.
+"""Periodic response of the damped leg to motors that switch between two set points.
 
 For half a period the motors hold z2 + dz2, for the other half z2 - dz2. The response is closed:
 `phi_stretched(phi_folded(x)) = x`, four equations, and with the period as the fifth unknown a
@@ -23,7 +23,7 @@ from legbench.signals import Floats
 CLOSED = 1e-10
 """Largest distance between the two ends of a closed response, scaled [-]."""
 SAMPLES = 65
-"""States of each half at which the range and the joint limits are looked at [-]."""
+"""Number of states of each half at which range and joint limits are evaluated [-]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,7 +84,7 @@ class Switched:
         self.size = np.array([1.0, 1.0, 1.0 / second, 1.0 / second])
 
     def motors(self, dz2: float) -> tuple[Floats, Floats]:
-        """Motor positions (2,) that hold the link at z2 + dz2, and how they grow with dz2 (2,)."""
+        """Motor positions (2,) that hold the link at z2 + dz2, and their derivative by dz2 (2,)."""
         q = np.asarray(self.scene.rest) + dz2 * RADIAL
         support = SUPPORTED[self.scene.kind]
         slope = np.asarray(self.scene.terms.moment) * np.cos(q)

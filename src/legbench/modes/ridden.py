@@ -1,4 +1,4 @@
-"""The curve that bang-bang rides: its limit cycles, by growing amplitude of the motors.
+"""Limit cycles of bang-bang, followed by growing amplitude of the motors.
 
 Bang-bang switches its motors itself, when the spring torque along z2, zero at rest, passes
 `+threshold` (to z2 + dz2) or `-threshold` (to z2 - dz2). Its limit cycle is closed, and both
@@ -28,9 +28,9 @@ from legbench.modes.scene import Scene
 from legbench.signals import Floats
 
 SETTLING = 60
-"""Periods that the law is followed for before its cycle is solved [-]."""
+"""Number of periods for which the law is followed before its cycle is solved [-]."""
 LOOKED = 40
-"""Instants of a linear period at which a switch is looked for [-]."""
+"""Number of instants of a linear period at which a switch is sought [-]."""
 LONGEST = 3.0
 """Longest time without a switch, in linear periods [-]."""
 

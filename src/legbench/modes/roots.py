@@ -1,4 +1,4 @@
-"""Zeros of few equations, without the seconds that a library of optimisers takes to load."""
+"""Zeros of few equations, computed here because an optimisation library takes seconds to load."""
 
 from collections.abc import Callable
 
@@ -11,7 +11,7 @@ NUDGE = 1e-6
 ITERATIONS = 60
 """Steps after which a search is given up [-]."""
 HALVINGS = 12
-"""Number of times that a step is halved that leads uphill [-]."""
+"""Largest number of times that a step is halved if it increases the residual [-]."""
 
 
 def bracketed(function: Callable[[float], float], low: float, high: float, width: float) -> float:
@@ -53,7 +53,7 @@ def bracketed(function: Callable[[float], float], low: float, high: float, width
 def solved(function: Callable[[Floats], Floats], guess: Floats, small: float) -> Floats:
     """Zero of n equations near a guess (n,), by Newton's method on central differences.
 
-    Steps are halved until they lead downhill; a function that is NaN somewhere is uphill there.
+    Steps are halved until they reduce the residual; NaN counts as larger than any residual.
     Returns the best point found, whether or not it is within `small` of zero.
     """
     at, value = guess, function(guess)

@@ -1,4 +1,4 @@
-"""A leg without damping around an equilibrium: what all mode analysis starts from."""
+"""Undamped leg about an equilibrium, the starting point of every mode analysis."""
 
 import math
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from legbench.signals import Floats
 
 
 class Holding(StrEnum):
-    """How the leg is held while it oscillates."""
+    """Way in which the leg is held while it oscillates."""
 
     HFTS = "hfts"
     """Trunk fixed, no gravity."""
@@ -27,7 +27,7 @@ class Holding(StrEnum):
     JUMP = "jump"
     """The stance of a jump: foot pinned."""
     FLIGHT = "flight"
-    """Nothing held: the angles turn about the falling centre of mass."""
+    """Leg in the air: the angles turn about the falling centre of mass."""
 
 
 SUPPORTED = {
@@ -37,7 +37,7 @@ SUPPORTED = {
     Holding.JUMP: Support.FOOT,
     Holding.FLIGHT: Support.NONE,
 }
-"""What carries the leg's weight."""
+"""Part that carries the leg's weight, by holding."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,8 +1,8 @@
-"""The first orbit of a nonlinear mode: out of its linear mode, or around a resonance.
+"""First orbit of a nonlinear mode, from its linear mode or from the other side of a resonance.
 
-Where both linear modes have nearly one frequency, every shape is nearly a mode, and the smallest
-imperfection of the numbers decides which two are found. The orbits of finite amplitude are not
-arbitrary. They are followed from a set point at which the frequencies lie apart.
+If both linear modes have nearly the same frequency, every shape is nearly a mode, and rounding
+decides which two are found. Orbits of finite amplitude are well defined even there. They are
+followed from a set point at which the frequencies lie apart.
 """
 
 import numpy as np
@@ -37,7 +37,7 @@ def gap(modes: dict[str, LinearMode]) -> float:
 def first_unknown(scene: Scene, name: str) -> tuple[BrakeShooting, Floats, float | None]:
     """Shooting, and a small orbit (3,) of the `radial` or `polar` mode.
 
-    With it comes the set point from which the mode was followed [rad], if there is a resonance.
+    If there is a resonance, the set point from which the mode was followed [rad] is returned, too.
 
     Raises:
         ConfigError: the orbit does not exist.

@@ -1,4 +1,4 @@
-"""The template: a point mass on a massless spring, with the leg's stiffness (Fig. 2c)."""
+"""SLIP template: a point mass on a massless spring with the leg's stiffness (Fig. 2c)."""
 
 import math
 from dataclasses import dataclass
@@ -50,7 +50,7 @@ class Slip:
 
     @property
     def rate(self) -> float:
-        """sqrt(k/m) [rad/s]."""
+        """Natural angular frequency sqrt(k/m) [rad/s]."""
         return math.sqrt(self.stiffness / self.mass)
 
     @property
@@ -59,22 +59,22 @@ class Slip:
         return self.stiffness * self.length / (self.mass * self.gravity)
 
     def contact_time(self, drop: float) -> float:
-        """Touchdown to lift-off after a drop [m]; half a period and the sag [s]."""
+        """Time from touchdown to lift-off after a drop [m]: half a period and the sag [s]."""
         speed = math.sqrt(2.0 * self.gravity * drop)
         return 2.0 / self.rate * (math.pi - math.atan(speed * self.rate / self.gravity))
 
     def compression(self, drop: float) -> float:
-        """Deepest, after a drop [m] (m)."""
+        """Largest compression of the spring [m] after a drop [m]."""
         sag = self.mass * self.gravity / self.stiffness
         return sag + math.sqrt(sag * sag + 2.0 * sag * drop)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Groups:
-    """One hop without dimensions: lengths in l, times in sqrt(m/k), forces in m g."""
+    """Dimensionless numbers of one hop: lengths in l, times in sqrt(m/k), forces in m g."""
 
     drop: float
-    """Apex over touchdown [l]."""
+    """Height of the apex above touchdown [l]."""
     contact_time: float
     """Time from touchdown to lift-off [sqrt(m/k)]."""
     flight_time: float
@@ -84,7 +84,7 @@ class Groups:
     peak_force: float
     """Largest force of the spring [m g]."""
     returned: float
-    """Next apex over touchdown, by this one's [-]."""
+    """Height of the next apex above touchdown over that of this one [-]."""
 
 
 def slip_groups(slip: Slip, drop: float) -> Groups:
@@ -137,7 +137,7 @@ def leg_groups(leg: TaylorLeg, slip: Slip, motor_half: float, drop: float) -> Gr
 
 
 def _lower_apex(leg: TaylorLeg, drive: Passive, state: LegState) -> LegState:
-    """State at which the leg turns round in stance; a touch that lets go at once does not count."""
+    """State at the lower apex in stance; a touchdown that lifts off at once does not count."""
     for _ in range(CALLS):
         state, what = leg.watch(state, HORIZON, drive.motor, Levels(turns=True))
         if what is Watched.CONTACT:

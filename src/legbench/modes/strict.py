@@ -1,8 +1,8 @@
-"""Is a curve in joint space a strict mode: does the leg, started on it, stay on it?
+"""Test whether a curve in joint space is a strict mode, on which a leg stays once started there.
 
-Two conditions, both geometric (section II-B, [15]). The curve is a geodesic of the inertia
-metric, so that motion along it does not throw the leg off; and the force `tau - g`, turned into
-an acceleration by M^-1, is tangent to it, so that nothing pushes the leg off.
+There are two geometric conditions (section II-B, [15]). The curve is a geodesic of the inertia
+metric, so that inertia does not drive the leg off it; and the acceleration `M^-1 (tau - g)` is
+tangent to it, so that no force does.
 """
 
 from dataclasses import dataclass
@@ -16,12 +16,12 @@ from legbench.modes.scene import Scene
 from legbench.signals import Floats
 
 KNOTS = 200
-"""Points at which a curve is looked at."""
+"""Number of points at which a curve is evaluated [-]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Curve:
-    """Points, first and second derivatives by one parameter, each (n, 2)."""
+    """Curve as points with first and second derivatives by one parameter, each (n, 2)."""
 
     points: Floats
     tangent: Floats
@@ -30,7 +30,7 @@ class Curve:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Strictness:
-    """How far a curve is from a strict mode; all zero on one."""
+    """Distances of a curve from a strict mode, for which all of them are zero."""
 
     geodesic: float
     """Largest curvature off the curve, by the inertia metric, per arc length [1/rad]."""
@@ -41,7 +41,7 @@ class Strictness:
 
 
 def radial_reach(scene: Scene) -> float:
-    """How far z2 can go either way from rest before a joint reaches its limit [rad]."""
+    """Largest change of z2 either way from rest within the joint limits [rad]."""
     (q1, q2), limits = scene.rest, scene.design.limits
     knee, hip = q2 - q1, q1
     return float(

@@ -17,14 +17,14 @@ from legbench.signals import Floats
 from legbench.writing import reason, write_whole
 
 ROWS = 101
-"""Instants of a period, both ends included [-]."""
+"""Number of instants of a period, both ends included [-]."""
 COLUMNS = ("time", "q1", "q2", "v1", "v2")
 """Names of a trajectory's columns [s, rad, rad, rad/s, rad/s]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OrbitPath:
-    """One orbit, sampled over its period."""
+    """Orbit that is sampled over its period."""
 
     family: str
     """Name of the family to which the orbit belongs."""
