@@ -1,4 +1,4 @@
-"""A leg one of whose parts dies in mid-run, around any computed plant."""
+"""Plant that wraps a computed one and lets a motor or encoder of it die in mid-run."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -17,7 +17,7 @@ DRIFT = 1.0
 
 
 class Part(StrEnum):
-    """What may die, of one drive."""
+    """Part of one drive that may die."""
 
     JAMMED = "jammed motor"
     MOTOR_FROZEN = "frozen motor encoder"
@@ -30,12 +30,12 @@ class Part(StrEnum):
 
     @property
     def drifts(self) -> bool:
-        """Whether it becomes wrong little by little."""
+        """Whether its reading becomes wrong gradually."""
         return self in (Part.MOTOR_DRIFT, Part.LINK_DRIFT)
 
     @property
     def shows_at_once(self) -> bool:
-        """Whether it contradicts a healthy leg from the moment on in which it dies."""
+        """Whether it differs from a healthy part from the instant in which it dies."""
         return self.drifts or self in (Part.MOTOR_STEP, Part.LINK_STEP)
 
     @property
@@ -48,7 +48,7 @@ class Part(StrEnum):
 
 @final
 class BrokenPlant(AbstractPlant):
-    """Shows what the plant within shows, until a part of it dies.
+    """Plant that shows the observations of the plant within until a part of it dies.
 
     Attributes:
         contradiction: difference between what the dead part shows and what a healthy one would
@@ -61,8 +61,8 @@ class BrokenPlant(AbstractPlant):
         Args:
             plant: one leg.
             stiffness: of the series springs (2,) [N m/rad].
-            part: what is to die.
-            drive: of which drive, 0 or 1.
+            part: the part that is to die.
+            drive: index of its drive, 0 or 1.
         """
         self.period = plant.period
         self.contradiction = 0.0
@@ -77,7 +77,7 @@ class BrokenPlant(AbstractPlant):
         return self._seen
 
     def break_part(self) -> None:
-        """Let the part die now: the next observation shows it."""
+        """Let the part die now, so that the next observation shows it."""
         if self._seen is None:
             raise RuntimeError("a plant that was never reset has nothing to break")
         place = self._drive

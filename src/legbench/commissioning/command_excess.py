@@ -1,4 +1,4 @@
-"""How far commands on the wire went beyond the limits, from raw frames."""
+"""Excess of commands on the bus over the limits, from raw frames."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What the drives hold against what the bus file says."""
+"""Comparison of the drives' objects with the bus file, and writing of the configuration."""
 
 from dataclasses import dataclass
 
@@ -8,12 +8,12 @@ from legbench.drives.setup.taken import check_taken, unprotected
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Difference:
-    """One object that a drive holds otherwise."""
+    """Object whose value in a drive differs from the bus file's."""
 
     node: str
     object: str
     holds: int | None
-    """Value there; none where the drive has no such object."""
+    """Value in the drive; None if the drive has no such object."""
     wanted: int
 
 
@@ -35,14 +35,14 @@ def differences(session: Session) -> list[Difference]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Written:
-    """What became of a configuration that was written."""
+    """Result of writing a configuration."""
 
     objects: int
     """Number of objects that hold what was wanted, or what does the same."""
     lines: tuple[str, ...]
-    """What the drives lack or hold otherwise, and what takes its place."""
+    """Lines that tell what the drives lack or hold otherwise, and what takes its place."""
     held: frozenset[tuple[str, str]]
-    """Node and object of those that a drive holds otherwise for good."""
+    """Node and object of every value that a drive holds otherwise and cannot change."""
 
 
 def write(session: Session) -> Written:

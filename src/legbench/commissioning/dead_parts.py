@@ -1,4 +1,4 @@
-"""Dead motors and encoders: how soon the limits find them, and that they find none that lives."""
+"""Trials of dead motors and encoders: how soon the limits find them, and that healthy ones pass."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -39,11 +39,11 @@ from legbench.plants import LIMITS_NAME, limits_for
 from legbench.servo import ServoConfig
 
 EXCITATION = 0.03
-"""A dead part counts as contradicted from this difference to a healthy one on [rad]."""
+"""Smallest difference from a healthy part at which a dead one counts as contradicted [rad]."""
 BOUND, DRIFT_BOUND = 0.05, 0.15
 """Longest times from the contradiction to the end of the run, and for a drift [s]."""
 PATIENCE = 1.5
-"""A part that is not found so long after it died is missed [s]."""
+"""Time after which a dead part that has not been found counts as missed [s]."""
 CONTROLLERS: dict[str, ControllerSettings] = {
     "jump": JumpConfig(),
     "bang-bang": BangBangConfig(),
@@ -52,7 +52,7 @@ CONTROLLERS: dict[str, ControllerSettings] = {
 
 
 class Emulation(StrEnum):
-    """What stands in for the leg."""
+    """Plant that takes the place of the leg."""
 
     CAN = "can"
     """Emulated drives on an emulated bus, with the simulated leg on their shafts."""
@@ -77,7 +77,7 @@ class Bench:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Death:
-    """A part that dies in mid-run."""
+    """Death of a part in mid-run."""
 
     part: Part
     drive: int
@@ -91,7 +91,7 @@ class Found:
     """What came of a run."""
 
     cause: str | None
-    """Why the run ended; None if nothing ended it."""
+    """Cause of the end of the run; None if nothing ended it."""
     time: float | None
     """Time from the contradiction to the end of the run, 0 if the end came before; None if nothing
     ended it [s]. Steps and drifts contradict a healthy leg from the moment on in which they
@@ -99,10 +99,10 @@ class Found:
     since_death: float | None
     """Time since the part died [s]."""
     excited: bool
-    """Whether there ever was a contradiction."""
+    """Whether the dead part ever contradicted a healthy one."""
 
     def within(self, part: Part) -> bool:
-        """Whether it was found in time; a part that shows nothing wrong need not be found."""
+        """Whether the part was found in time; one that shows nothing wrong need not be found."""
         if self.time is None:
             return not self.excited
         return self.time <= (DRIFT_BOUND if part.drifts else BOUND)
@@ -119,7 +119,7 @@ class _Stage:
 def try_dead_part(
     bench: Bench, emulation: Emulation, controller: str, death: Death, servo: ServoConfig
 ) -> Found:
-    """Run a controller, let a part die, see when the limits end the run.
+    """Run a controller, let a part die, and measure when the limits end the run.
 
     Raises:
         PlantFault: the run ended before the part died.
@@ -152,7 +152,7 @@ def try_dead_part(
 def watch_healthy(
     bench: Bench, emulation: Emulation, controller: str, servo: ServoConfig, seconds: float
 ) -> str | None:
-    """Run a controller on a leg that is well; what ended the run before its time, if anything."""
+    """Run a controller on a healthy leg; return what ended the run early, or None."""
     with _staged(bench, emulation, controller, servo, None) as stage:
         observation = stage.plant.reset()
         stage.controller.reset(observation)

@@ -1,4 +1,4 @@
-"""The emulated leg for other processes."""
+"""Server of the emulated leg for other processes."""
 
 import time
 from collections.abc import Callable
@@ -20,7 +20,7 @@ Server = UnixServer | SlcanServer | BusServer
 BODY_PERIOD_NS = 1_000_000
 """Period of the leg on the shafts, whatever that of the cycle is [ns]."""
 Report = Callable[[float, str, str], None]
-"""Called with time since the start [s], node and its new state."""
+"""Function that is called with the time since the start [s], a node and its new state."""
 
 
 def serve(
@@ -36,17 +36,17 @@ def serve(
 ) -> None:
     """Serve emulated drives until told to stop.
 
-    The drives reply at once: the way through two processes takes long enough.
+    The drives reply without delay, since the way through two processes takes time enough.
 
     Args:
         config: the bus.
         serve_at: makes the server of a network.
         start_pos: motor positions at power-on [rad].
-        body: what hangs on the shafts.
+        body: mechanical load on the motor shafts.
         patience: periods without SYNC or target after which an enabled drive faults.
         report: told every change of a drive's state, until it fails.
         ready: called when the bus can be used.
-        stop: asked all the time.
+        stop: called repeatedly; the server ends when it returns true.
 
     Raises:
         BusError: the bus cannot be opened, or has failed.

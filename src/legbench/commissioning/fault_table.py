@@ -1,4 +1,4 @@
-"""The faults that are tried in mid-jump on the emulated leg, and what each has to lead to."""
+"""Table of the faults that are tried in mid-jump on the emulated leg, with expected results."""
 
 from dataclasses import dataclass
 
@@ -21,21 +21,21 @@ MS = 1_000_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trial:
-    """A fault to be tried."""
+    """Trial of one fault, and its expected result."""
 
     name: str
     faults: tuple[Fault, ...] = ()
     cause: str | None = None
-    """Cause that has to end the run; none: the run has to bridge the fault."""
+    """Cause that has to end the run; None if the run has to bridge the fault."""
     or_cause: str | None = None
     """Cause that may end the run first, where two come in one cycle and the delays of the answers
     decide."""
     gone: bool = False
-    """The master itself stops without a word, as by SIGKILL or SIGSTOP."""
+    """Whether the master itself stops without notice, as by SIGKILL or SIGSTOP."""
     interrupted: bool = False
-    """^C."""
+    """Whether the run is interrupted by ^C."""
     viewer: bool = False
-    """The live view of the run is frozen, by SIGSTOP."""
+    """Whether the live view of the run is stopped by SIGSTOP."""
 
 
 def _frame(

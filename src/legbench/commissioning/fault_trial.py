@@ -1,4 +1,4 @@
-"""One fault in mid-jump on the emulated leg, and what came of it."""
+"""Trial of one fault in mid-jump on the emulated leg."""
 
 import os
 import signal
@@ -30,7 +30,7 @@ from legbench.recording.writer import RunWriter
 CYCLES = 900
 """Number of cycles of a trial that nothing ends."""
 SILENCE_NS = 200_000_000
-"""How long the drives are watched after the master has gone."""
+"""Time for which the drives are watched after the master has gone [ns]."""
 POWERED = (
     DriveState.OPERATION_ENABLED,
     DriveState.QUICK_STOP_ACTIVE,
@@ -39,7 +39,7 @@ POWERED = (
 
 
 class View(Protocol):
-    """A live view of a run, in a process of its own."""
+    """Live view of a run, in a process of its own."""
 
     @property
     def pid(self) -> int:
@@ -47,17 +47,17 @@ class View(Protocol):
         ...
 
     def stop(self) -> None:
-        """End it."""
+        """End the view."""
         ...
 
 
 StartView = Callable[[Path], View]
-"""Opens a view of the run in a folder."""
+"""Function that opens a view of the run in a folder."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
-    """What came of it."""
+    """Result of the trial of one fault."""
 
     name: str
     status: str
@@ -69,14 +69,14 @@ class Result:
     excess: float
     """Largest command beyond a limit, in range or in step, below zero [rad]."""
     intact: bool
-    """Every row is in the recording, which says how it ended."""
+    """Whether the recording has every row and the right end."""
     lost_cycles: int
     run: Path
-    """Its recording."""
+    """Folder of the recording."""
 
     @property
     def safe(self) -> bool:
-        """No drive has power, no command left the limits, no row was lost."""
+        """Whether no drive has power, no command left the limits, and no row was lost."""
         quiet = not any(state in POWERED for state in self.drives)
         return quiet and self.excess <= 0.0 and self.intact
 
@@ -184,7 +184,7 @@ def _run(
 
 
 def _wait_for_drives(network: Network) -> int:
-    """Nobody speaks any more: when the last drive has lost its power [ns]."""
+    """Time at which the last drive has lost its power, after the master has gone [ns]."""
     until_ns = network.now_ns + SILENCE_NS
     while network.now_ns < until_ns:
         network.advance(network.now_ns + MS)

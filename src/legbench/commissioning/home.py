@@ -34,7 +34,7 @@ from legbench.errors import ConfigError
 from legbench.interrupts import shielded
 
 START_HOMING = 0x1F
-"""Enable operation with bit 4."""
+"""Controlword that enables operation, with bit 4, which starts the homing."""
 IN_PLACE = (35, 37)
 """Methods that do not move."""
 INDEX_ONLY = (33, 34)
@@ -44,11 +44,11 @@ STANDARD, MAKERS = range(1, 38), range(-128, 0)
 NEEDED = ((0x6065, 0), (0x6072, 0), (0x6085, 0))
 """Window, torque and ramp that a search is not made without, in the bus file."""
 FASTEST = 1.0
-"""A search for a hard stop goes no faster (6099h:01) [rad/s]."""
+"""Highest speed of a search for a hard stop (6099h:01) [rad/s]."""
 LONGEST = 600.0
 """A search at the lowest sensible speed, 0.01 rad/s, has made a turn by then [s]."""
 PATIENCE = 200
-"""Looks at a drive for one step."""
+"""Largest number of times that a drive is asked whether it has made a step [-]."""
 LOOK_NS = 5_000_000
 """Longest time between two looks, so that each can bring a heartbeat in time [ns]."""
 U16, U32, I8, I32 = (
@@ -61,7 +61,7 @@ U16, U32, I8, I32 = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Homed:
-    """What homing left."""
+    """Result of a homing."""
 
     node: str
     method: int
@@ -74,9 +74,9 @@ def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20
 
     Args:
         session: the channel is taken.
-        node: of the bus file.
+        node: drive of the bus file.
         method: 6098h; 37 calls the present position zero, all others but 35 search.
-        timeout: [s]
+        timeout: longest duration of the homing [s].
 
     Raises:
         ConfigError: no time at all or more than 10 minutes, the bus file does not bound a search,
@@ -263,7 +263,7 @@ class _Master(Lead):
             self._closed = True
 
     def command(self, controlword: int) -> None:
-        """Write 6040h."""
+        """Write the controlword (6040h)."""
         self._sdo.put(0x6040, 0, U16, controlword)
 
     def _look(self) -> int:

@@ -1,4 +1,4 @@
-"""How punctual the cycle is: wake-up latency and exchange time, nothing enabled."""
+"""Measurement of the cycle's timing, wake-up latency and exchange time; nothing is enabled."""
 
 import time
 from collections.abc import Iterator, Sequence
@@ -24,7 +24,7 @@ points begin to show it."""
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Timing:
-    """What a measurement found; arrays have one value a cycle."""
+    """Result of a measurement; arrays have one value for each cycle."""
 
     late_us: Floats
     """Lateness of SYNC after its place on the grid."""
@@ -47,7 +47,7 @@ class Timing:
         }
 
     def counts(self) -> dict[str, int]:
-        """What went wrong, by name."""
+        """Counts of skipped, silent, late and lost ticks, by name."""
         return {
             "skipped": self.skipped,
             "late": self.late,
@@ -61,7 +61,7 @@ def measure(
 ) -> Timing:
     """Exchange frames in read-only for a number of cycles, and record every one of them.
 
-    A machine or a bus that is bad ends nothing: what is skipped, late and lost is counted.
+    A slow machine or a disturbed bus does not end it: skipped, late and lost ticks are counted.
 
     Args:
         session: of the bus.
@@ -70,7 +70,7 @@ def measure(
         writer: takes a row a cycle and every frame, as in a run; none measures without recording.
 
     Raises:
-        PlantFault: another master leads the drives, whose punctuality is not ours.
+        PlantFault: another master leads the drives, so that the timing would be that master's.
         BusError, DriveError: as `Link.start`.
         RecordingError: the recording failed.
     """

@@ -1,4 +1,4 @@
-"""A passive look at a bus: what the drives tell whoever asks them."""
+"""Passive observation of a bus, from the frames that the drives send."""
 
 from collections.abc import Iterator
 from typing import final
@@ -16,7 +16,7 @@ from legbench.drives.setup.config import NodeConfig
 
 @final
 class Watched:
-    """What was heard of one drive."""
+    """Latest state of one drive, from its frames."""
 
     def __init__(self, node: NodeConfig) -> None:
         self.node, self.axis = node, AxisLink(node)
@@ -25,7 +25,7 @@ class Watched:
         self.frames = 0
 
     def hear(self, message: can.Message) -> None:
-        """Take a frame, whoever it is from."""
+        """Take a frame from any sender."""
         cob_id, data = message.arbitration_id, bytes(message.data)
         if cob_id in self.axis.tpdo_ids:
             if self.axis.fresh:

@@ -1,4 +1,4 @@
-"""Another node id for the one drive on the bus, by layer setting services (CiA 305)."""
+"""Change of the node id of the only drive on a bus, by layer setting services (CiA 305)."""
 
 from dataclasses import dataclass
 

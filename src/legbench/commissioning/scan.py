@@ -1,4 +1,4 @@
-"""Who is on the bus."""
+"""Scan of a bus for the identities of its nodes."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -19,20 +19,20 @@ PROBE_MS = 15
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Found:
-    """One node."""
+    """Node that was found on the bus."""
 
     node_id: int
     device_type: int
-    """1000h."""
+    """Device type (1000h)."""
     vendor: int
     product: int | None
     revision: int | None
     serial: int | None
-    """None where the drive tells none."""
+    """Serial number (1018h:04); None if the drive has none."""
     answers: int
     """Number of drives that answer under this node id; each has to have one of its own."""
     verdict: str
-    """How it compares with the bus file."""
+    """Comparison with the bus file, in words."""
 
 
 def scan(session: Session, last: int = LAST_NODE) -> Iterator[Found]:

@@ -1,4 +1,4 @@
-"""What the drives say of themselves, in words; by SDO, nothing is written."""
+"""Status of the drives in words, read by SDO; nothing is written."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ MODES = {mode.value: mode.name.lower().replace("_", " ") for mode in Mode}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NodeStatus:
-    """One drive."""
+    """Status of one drive."""
 
     name: str
     node_id: int
@@ -27,7 +27,7 @@ class NodeStatus:
     motor_pos: float
     """Angle of that encoder [rad]."""
     link_pos: float | None
-    """None without an encoder there [rad]."""
+    """Angle of the link by the second encoder; None without one [rad]."""
     motor_counts: int
     link_counts: int | None
     temperature: float | None
@@ -54,7 +54,7 @@ def _counts(sdo: SdoPort, node: NodeConfig) -> tuple[int, int | None]:
 
 
 def status(session: Session) -> list[NodeStatus]:
-    """All drives of the bus file.
+    """Read the status of all drives of the bus file.
 
     Raises:
         BusError: nobody can be asked, such as at a wrong bitrate.

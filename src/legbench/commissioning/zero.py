@@ -1,4 +1,4 @@
-"""Encoder offsets from a leg that stands in a known posture."""
+"""Encoder offsets, measured on a leg in a known posture."""
 
 import math
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ STILL_COUNTS = 40
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Zero:
-    """Offsets of one node."""
+    """Encoder offsets of one node."""
 
     node: str
     side: Side
