@@ -9,7 +9,7 @@ from legbench.signals import Bools, Floats
 
 
 def flown() -> tuple[Floats, Bools, Floats]:
-    """Time, contact and height of a foot that stands, rises and falls for 0.1 s each, and stands."""
+    """Time, contact and height of a foot that stands, rises, falls and stands, 0.1 s each."""
     time = clock(400)
     contact = (time < 0.1 - 1e-9) | (time > 0.3 - 1e-9)
     foot = np.interp(time, [0.0, 0.1, 0.2, 0.3, 0.4], [0.0, 0.0, 0.05, 0.0, 0.0])
