@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from metrics_runs import Hop, clock, manifest, recording, truncated
+from metrics_runs import Hop, clock, guest, manifest, recording, truncated
 
 from legbench.metrics import compare, differences
 from legbench.metrics.compare import first_touchdown
+from legbench.phases import PhaseInfo, Role
 from legbench.recording.reader import Recording
 from legbench.signals import Floats
 
@@ -55,6 +56,20 @@ def test_flights_are_matched_until_they_part_whichever_run_lags(swap: bool) -> N
     overlapping = [index for index in range(8) if long.liftoff(index) < short.touchdown(index)]
     seen = compare(*(reversed(runs) if swap else runs))
     assert len(seen.liftoff) == len(seen.touchdown) == len(seen.apex_height) == len(overlapping)
+
+
+STAND = PhaseInfo(code=1, name="stand", role=Role.STANCE)
+FLY = PhaseInfo(code=2, name="fly", role=Role.FLIGHT)
+
+
+@pytest.mark.parametrize(("late", "matched"), [(0, 1), (9, 1), (10, 0), (11, 0)])
+def test_flights_overlap_if_one_begins_before_the_other_has_ended(late: int, matched: int) -> None:
+    """Flights of ten rows of a real leg, whose events lie on rows."""
+    phases = [np.repeat([1, 2, 1], [10 + shift, 10, 30 - shift]) for shift in (0, late)]
+    runs = [guest(phase, (STAND, FLY)) for phase in phases]
+    for pair in (runs, runs[::-1]):
+        seen = compare(*pair)
+        assert len(seen.liftoff) == len(seen.touchdown) == matched
 
 
 @pytest.mark.parametrize(("after", "counts"), [(14, False), (15, False), (16, True), (29, True)])
