@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from metrics_runs import Hop
+from metrics_runs import PROTOTYPE, Hop
 
 from legbench.metrics.analysis import Analysis
 from legbench.metrics.budget import EnergyBudget, energy_budget
-from legbench.metrics.energy import energy_flows
+from legbench.metrics.energy import energy_flows, spring_energy
 
 PARTS = ("impact_loss", "stop_loss", "contact_loss", "other_loss")
 HOP = Hop()
@@ -76,3 +76,20 @@ def test_a_jump_has_what_lies_between_its_lower_apexes() -> None:
             gain = budget_with(int(row)).gain
             expected = np.where(np.arange(len(jumps)) == index, -LOSS, 0.0)
             np.testing.assert_allclose(gain, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize(("hops", "jumps"), [(0.0, 0), (2.1, 0), (3.1, 1), (4.1, 2)])
+def test_a_budget_has_one_figure_a_jump(hops: float, jumps: int) -> None:
+    hop = Hop(hops=hops)
+    count = len(hop.signals()["time"])
+    energy = np.stack([np.linspace(9.0, 8.0, count), np.ones(count)], axis=-1)
+    run = hop.recording(energy=energy)
+    found = energy_budget(run, Analysis(run).gait, energy_flows(run))
+    for name in EnergyBudget.__dataclass_fields__:
+        assert getattr(found, name).shape == (jumps,), name
+    rows = np.searchsorted(run.time, Analysis(run).gait.jumps.start)
+    ends = np.searchsorted(run.time, Analysis(run).gait.jumps.end)
+    lost = energy[rows].sum(axis=-1) - energy[ends].sum(axis=-1)
+    springs = found.gain + lost
+    held = spring_energy(PROTOTYPE, run["motor_pos"], run["joint_pos"])
+    np.testing.assert_allclose(springs, held[ends] - held[rows], atol=1e-12)

@@ -53,7 +53,7 @@ def test_a_leg_that_rests_in_its_first_row_alone_turns_there() -> None:
 def test_a_rate_that_lingers_at_zero_turns_where_it_leaves_it() -> None:
     """Where it touches zero on the way and falls back, the last crossing counts."""
     rate = np.array([1.0, -1.0, -1.0, -0.01, 0.01, -0.01, 0.0, 0.0, 0.01, 1.0, 1.0])
-    time = 0.5 * np.arange(11)
+    time = 0.5 * np.arange(11, dtype=np.float64)
     assert turning_points(time, rate).tolist() == [3.5]
 
 

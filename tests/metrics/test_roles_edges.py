@@ -30,7 +30,7 @@ def test_a_late_phase_began_its_lateness_ago_or_with_the_phase_before_it(rows: i
     """A clock of quarters of a second, so that the instant is a row's to the bit."""
     stand = PhaseInfo(code=2, name="stand", role=Role.STANCE, late=5.0)
     phase = np.repeat([1, 0, 2], [7, rows, 9])
-    time = 0.25 * np.arange(len(phase))
+    time = 0.25 * np.arange(len(phase), dtype=np.float64)
     states = foot_states(phase, time, (FALL, stand))
     began = max(7, 7 + rows - 20)
     assert np.flatnonzero(states == STANCE).tolist() == list(range(began, len(phase)))

@@ -14,7 +14,7 @@ def test_an_empty_column_has_no_stretch_and_one_value_has_one() -> None:
 
 
 def test_a_stretch_as_long_as_the_minimum_stays_and_those_at_the_ends_do() -> None:
-    time = 0.25 * np.arange(12)
+    time = np.linspace(0.0, 2.75, 12)
     column = np.array([1, 0, 0, 0, 1, 1, 0, 0, 0, 0, 1, 1], dtype=bool)
     # Stretches of 0.25, 0.75, 0.5, 1 and 0.25 s, the first and the last of them cut by the ends.
     kept = without_short(time, column, value=True, minimum=0.5)

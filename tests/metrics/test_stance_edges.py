@@ -76,7 +76,7 @@ def test_a_foot_falls_if_it_was_higher_five_milliseconds_before(before: int, lan
 def test_rows_further_apart_than_the_look_back_are_compared_with_their_neighbour(
     lands: bool,
 ) -> None:
-    time = 0.01 * np.arange(40)
+    time = np.linspace(0.0, 0.39, 40)
     contact = np.isin(np.arange(40), [*range(10), *range(20, 40)])
     foot = np.where(contact, 0.0, 0.02)
     foot[19] = 0.001 if lands else -0.001

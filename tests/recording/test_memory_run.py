@@ -91,8 +91,8 @@ def test_a_run_in_memory_refuses_what_a_run_in_files_does() -> None:
     with pytest.raises(ConfigError, match="manifest's rows are filled in"):
         MemoryRun({"rows": 3})
     run = MemoryRun({})
-    command, *others = cycle(0)
+    command, seen, cycle_us, late_us = cycle(0)
     batch = Command(motor_pos=np.zeros((3, 2)), phase=command.phase)
     with pytest.raises(ConfigError, match="a run records one leg"):
-        run.append(batch, *others)
+        run.append(batch, seen, cycle_us, late_us)
     assert run.rows == 0
