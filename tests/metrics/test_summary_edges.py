@@ -81,3 +81,14 @@ def test_each_caveat_is_told_where_it_holds_and_only_there() -> None:
     assert told == "nothing was rated: no stance or flight lies complete within the run"
     (told,) = warnings_of(Analysis(short.real()))
     assert told == "nothing was rated: no stance or flight lies complete within the run"
+
+
+def test_what_an_analysis_has_read_cannot_be_changed_and_the_recording_stays_as_it_was() -> None:
+    run = Hop().recording()
+    analysis = Analysis(run)
+    for name in ("joint_pos", "phase", "contact"):
+        with pytest.raises(ValueError, match="read-only"):
+            analysis[name][0] = 1
+        assert analysis[name] is analysis[name]
+        np.testing.assert_array_equal(analysis[name], run[name])
+        assert run[name].flags.writeable
