@@ -8,6 +8,7 @@ from legbench.kinematics import modal_to_joint
 from legbench.metrics.analysis import Analysis
 from legbench.metrics.caveats import warnings_of
 from legbench.metrics.summary import summarise
+from legbench.signals import MEASURED
 
 LOSSES = ("motor_work", "damper_loss", "impact_loss", "stop_loss", "contact_loss", "other_loss")
 
@@ -92,3 +93,26 @@ def test_what_an_analysis_has_read_cannot_be_changed_and_the_recording_stays_as_
         assert analysis[name] is analysis[name]
         np.testing.assert_array_equal(analysis[name], run[name])
         assert run[name].flags.writeable
+
+
+@pytest.mark.parametrize("name", MEASURED)
+def test_a_signal_that_no_row_knows_is_named_and_one_known_row_is_enough(name: str) -> None:
+    hop = Hop()
+    run = hop.recording()
+    unknown = np.full_like(run[name], np.nan)
+    told = warnings_of(Analysis(hop.recording(**{name: unknown})))
+    assert told[0].startswith(f"{name} are not known in any row, as of drives with one encoder")
+    if name == "joint_pos":
+        # All that is rated follows from the links: nothing more is to be said.
+        assert len(told) == 1
+    unknown[7] = run[name][7]
+    told = warnings_of(Analysis(hop.recording(**{name: unknown})))
+    assert not any("not known" in text for text in told)
+
+
+def test_several_signals_that_no_row_knows_are_named_together() -> None:
+    hop = Hop()
+    unknown = np.full_like(hop.recording()["joint_pos"], np.nan)
+    names = MEASURED[:2]
+    told = warnings_of(Analysis(hop.recording(**dict.fromkeys(names, unknown))))
+    assert told[0].startswith(f"{' and '.join(names)} are not known in any row")
