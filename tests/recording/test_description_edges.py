@@ -164,3 +164,11 @@ def test_entries_that_only_one_run_has_are_unlike_and_tables_that_only_one_has_a
     other = json.loads(json.dumps(DESIGN))
     other["trunk"]["mass"] += 1.0
     assert unlike(ours, described(design=other)) == ["design.trunk.mass"]
+
+
+@pytest.mark.parametrize("other", [3.0, "wood", [1]])
+def test_a_table_is_unlike_what_is_no_table(other: object) -> None:
+    ours, theirs = described(ground={"kind": {"slope": 0.1}}), described(ground={"kind": other})
+    assert unlike(ours, theirs) == unlike(theirs, ours) == ["ground.kind"]
+    absent = described(ground={})
+    assert unlike(ours, absent) == unlike(absent, ours) == ["ground.kind"]
