@@ -19,8 +19,9 @@ from legbench.strict_json import null_for_nan
 class Summary:
     """Figures of one run; NaN where the run, its setup or a missing truth does not show them.
 
-    RatingLists hold every complete phase or period, in order; the lists without a suffix use the
-    reference that the run's conventions ask for, the motor unless they say otherwise.
+    Lists of ratings hold every complete phase or period, in order. Those without a suffix are about
+    `rating_reference`: what the run's conventions ask for, or else the equilibrium in a fixed
+    setup and the motor in a jump. Those with one are about the motor and about the equilibrium.
     """
 
     run: str
@@ -40,12 +41,16 @@ class Summary:
     real_time_factor: float
     """Ratio of the duration to the wall time of all cycles [-]."""
     rating_reference: str
+    """Reference of the ratings that come first, `motor` or `equilibrium`."""
     rating_stance: list[float]
     """P^r of each complete stance, eq. (14) [-]."""
     rating_flight: list[float]
     """P^r of each complete flight [-]."""
     rating_periods: list[float]
     """P^r of each oscillation period in a fixed setup [-]."""
+    rating_stance_motor: list[float]
+    rating_flight_motor: list[float]
+    rating_periods_motor: list[float]
     rating_stance_equilibrium: list[float]
     rating_flight_equilibrium: list[float]
     rating_periods_equilibrium: list[float]
@@ -109,7 +114,7 @@ def summarise(recording: Recorded) -> Summary:
     """
     run = analysed(recording)
     description, ratings = run.description, run.ratings
-    chosen, equilibrium = ratings.chosen, ratings.equilibrium
+    chosen, motor, equilibrium = ratings.chosen, ratings.motor, ratings.equilibrium
     periods = [] if description.jumps else (run.periods.end - run.periods.start).tolist()
     return Summary(
         run=str(run.path),
@@ -121,6 +126,9 @@ def summarise(recording: Recorded) -> Summary:
         rating_stance=chosen.stance,
         rating_flight=chosen.flight,
         rating_periods=chosen.periods,
+        rating_stance_motor=motor.stance,
+        rating_flight_motor=motor.flight,
+        rating_periods_motor=motor.periods,
         rating_stance_equilibrium=equilibrium.stance,
         rating_flight_equilibrium=equilibrium.flight,
         rating_periods_equilibrium=equilibrium.periods,
