@@ -4,6 +4,7 @@ import math
 
 from legbench.metrics import Comparison, Summary
 from legbench.metrics.rating_text import rated_lines
+from legbench.metrics.soundness import Soundness
 
 Row = tuple[str, float, str, float]
 """Row of a table: label, value, unit, and factor from SI to that unit."""
@@ -12,8 +13,9 @@ Row = tuple[str, float, str, float]
 def print_summary(summary: Summary) -> None:
     """Print the figures of a run; those that it does not show are left out."""
     print(f"run               {summary.run}")
-    ending = summary.status or "unknown"
-    print(f"ended             {ending}" + (f": {summary.cause}" if summary.cause else ""))
+    ending = (summary.status or "unknown") + (f": {summary.cause}" if summary.cause else "")
+    unsound = summary.numerics == Soundness.UNSOUND
+    print(f"ended             {ending}{', but its numerics are unsound' if unsound else ''}")
     if summary.limited_cycles:
         print(f"{'limited':<17} {limited(summary)}")
     for line in rated_lines(summary):

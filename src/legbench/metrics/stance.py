@@ -58,7 +58,7 @@ def without_bounces(loaded: Bools, hip_height: Floats) -> Bools:
     filled = loaded.copy()
     falls = np.diff(hip_height) < 0.0
     for landed, left, back in zip(runs.first[1:-2], runs.first[2:-1], runs.first[3:], strict=True):
-        if loaded[landed] and falls[landed:back].all():
+        if loaded[landed] and falls[landed : back - 1].all():
             filled[left:back] = True
     return filled
 

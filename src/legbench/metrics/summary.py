@@ -11,8 +11,13 @@ from legbench.metrics.analysis import Analysis, analysed
 from legbench.metrics.caveats import warnings_of
 from legbench.metrics.energy import energy_residual, loop_gap_max
 from legbench.metrics.limited import limited_commands
+from legbench.metrics.soundness import judge_numerics
 from legbench.metrics.source import Recorded
 from legbench.strict_json import null_for_nan
+
+
+SPARSE = 1.5
+"""Time from row to row above which a run is thinned out, in periods of its own [-]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,6 +37,9 @@ class Summary:
     """Status with which the run ended."""
     cause: str | None
     """Cause of an early end; none if the run came to its end."""
+    numerics: str
+    """Verdict on the numerics of a simulated run, `sound`, `unsound` or `unknown`: whether energy
+    residual and loop gap are within bounds. The warnings say which is not."""
     limited_cycles: int
     """Cycles in which the limits changed the command."""
     limited_max: list[float]
@@ -116,6 +124,8 @@ def summarise(recording: Recorded) -> Summary:
     description, ratings = run.description, run.ratings
     chosen, motor, equilibrium = ratings.chosen, ratings.motor, ratings.equilibrium
     periods = [] if description.jumps else (run.periods.end - run.periods.start).tolist()
+    energy, gap = _energy(run), loop_gap_max(run)
+    verdict = judge_numerics(energy["energy_residual"] if _dense(run) else math.nan, gap)
     return Summary(
         run=str(run.path),
         setup=description.setup.kind.value,
@@ -133,12 +143,21 @@ def summarise(recording: Recorded) -> Summary:
         rating_flight_equilibrium=equilibrium.flight,
         rating_periods_equilibrium=equilibrium.periods,
         periods=periods,
-        loop_gap_max=loop_gap_max(run),
-        warnings=warnings_of(run),
+        loop_gap_max=gap,
+        numerics=verdict.soundness.value,
+        warnings=[*warnings_of(run), *verdict.reasons],
         **limited_commands(run),
         **_clock(run),
         **_jumping(run),
-        **_energy(run),
+        **energy,
+    )
+
+
+def _dense(run: Analysis) -> bool:
+    """Whether the rows are those of every cycle; between sparser ones energy flows unseen."""
+    period = run.description.period
+    return len(run.time) > 1 and (
+        period is None or float(np.median(np.diff(run.time))) < SPARSE * period
     )
 
 

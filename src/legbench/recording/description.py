@@ -149,11 +149,11 @@ def describe(manifest: Mapping[str, Any], fallback_id: str = "") -> RunDescripti
     settings, provenance = controller.table("settings"), head.table("provenance")
     kind = head.table("plant").text("kind") or experiment.table("plant").text("kind")
     said = parse_controller(head.table("controller"))
-    setup = _setup(experiment.table("setup"))
+    design, setup = _design(experiment.table("design")), _setup(experiment.table("setup"))
     return RunDescription(
         id=head.text("id") or fallback_id,
         created=head.text("created"),
-        design=_design(experiment.table("design")),
+        design=design,
         setup=setup,
         linkage=None if kind in IDEAL_LINKAGE else experiment.table("linkage").text("kind"),
         crank_length=_crank_length(experiment.table("linkage")),

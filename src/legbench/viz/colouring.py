@@ -81,12 +81,12 @@ def _by_stance(run: Analysis, first: int, stop: int) -> tuple[ColouredRows, ...]
 
 def _both(ratings: RunRatings, words: Callable[[RatingLists], str]) -> str:
     """Ratings about the reference that comes first, and about the other one where they differ."""
-    lines = [f"{text} about the {ratings.reference.value}" if (text := words(ratings.chosen)) else ""]
-    for other in Reference:
-        text = words(ratings.about(other))
-        if text and text != words(ratings.chosen):
-            lines.append(f"{text} about the {other.value}")
-    return "\n".join(lines)
+    first = ratings.reference
+    found = {each: words(ratings.about(each)) for each in (first, *Reference)}
+    if not found[first]:
+        return ""
+    said = [each for each in found if each is first or found[each] != found[first]]
+    return "\n".join(f"about the {each.value}: {found[each]}" for each in said)
 
 
 def _jump_ratings(jumps: int, ratings: RatingLists) -> str:
