@@ -31,7 +31,7 @@ def build_spec(design: LegDesign, options: BuildOptions) -> mujoco.MjSpec:
         ConfigError: the bars outweigh the trunk, no step or bar suits the leg, or MuJoCo refuses a
             mass or an inertia.
     """
-    setup, numerics = options.setup, options.numerics.fitted([design])
+    setup, numerics = options.setup, options.numerics.fitted([design], options.linkage)
     spec = mujoco.MjSpec()
     spec.modelname = f"{design.name}_{setup.kind}_{options.linkage.kind}"
     spec.compiler.degree = False

@@ -1,12 +1,11 @@
 """Step and bars that suit a leg: both scale with what is light in it and stiff about it.
 
-The joint equality of the linkage carries the foot with a softness of one step, so what a leg loses
-of its mode grows with the square of step times the frequency at which its springs would swing the
-foot alone. Bars are to weigh little against the segments that they run along.
+The linkage carries foot and bars with a softness of one step, so what a leg loses of its mode grows
+with the square of step times the frequency at which its springs would swing them alone. Bars are to
+weigh little against the segments that they run along.
 """
 
 import math
-from collections.abc import Sequence
 from typing import Final
 
 from legbench.design import LegDesign
@@ -15,11 +14,17 @@ from legbench.errors import ConfigError
 STEP: Final = 0.00025
 """Longest step that is taken by itself [s]: the one of the paper's legs."""
 SWING_PER_STEP: Final = 1.0 / 16.0
-"""Largest swing of a foot on the springs in one step [rad]. The paper's legs have 0.044 to 0.052; of
-random feasible legs with a fixed foot those above 0.08 leave the mode by more than 1e-6 rad a
-second, those at 1/16 by less than 9e-7."""
-FINEST: Final = 16
-"""Largest number of parts that `STEP` is divided into: 64 steps a control period."""
+"""Largest swing of a foot on the springs in one step [rad]. The paper's legs have 0.044 to 0.052.
+With 0.25 ms for all, four of twenty random feasible legs leave the mode by 1.1e-6 to 2.9e-6 rad in
+a second with the foot fixed, all of them above 0.11; with this bound the worst does by 9e-7."""
+BAR_SWING_PER_STEP: Final = 1.5
+"""Largest swing in one step of crank and thigh bar on spring 2, if no leg held them [rad]. The
+paper's legs have 0.92 to 1.07. What the solver adds to the motion of light bars grows with its
+square; at the bound it is some 2e-4 rad in a second, a tenth of what the paper's bars add by their
+mass."""
+PARTS: Final = (1, 2, 4, 5, 8, 10, 16)
+"""Numbers of parts that `STEP` is divided into, up to 64 steps a control period: those whose step
+MJCF, which prints six digits, holds exactly."""
 BAR_SHARE: Final = 1.0 / 60.0
 """Largest mass per length of a bar, as a share of the lightest segment's [-]; the bars of the
 paper's legs have 1/72."""
@@ -35,23 +40,53 @@ def foot_omega(design: LegDesign) -> float:
     return math.sqrt(max(design.stiffness) / (foot.inertia + foot.mass * foot.com**2))
 
 
-def fitted_step(designs: Sequence[LegDesign]) -> float:
-    """Longest step at which all of some legs keep their mode, a whole part of `STEP` [s].
+def bar_omega(design: LegDesign, density: float, crank_length: float) -> float:
+    """Frequency at which spring 2 would swing crank and thigh bar without the leg [rad/s].
+
+    Args:
+        design: the leg.
+        density: mass per length of crank and bar [kg/m].
+        crank_length: length of the crank [m].
+    """
+    inertia = density * crank_length**2 * (crank_length / 3.0 + design.thigh.length)
+    return math.sqrt(design.stiffness[1] / inertia)
+
+
+def parts_of_step(
+    design: LegDesign, density: float | None = None, crank_length: float = 0.0
+) -> float:
+    """Number of parts into which `STEP` is to be divided for a leg; below one it is short enough.
+
+    Args:
+        design: the leg.
+        density: mass per length of its bars; none: it has no bars [kg/m].
+        crank_length: length of the crank of its bars [m].
+    """
+    parts = foot_omega(design) * STEP / SWING_PER_STEP
+    if density is None:
+        return parts
+    return max(parts, bar_omega(design, density, crank_length) * STEP / BAR_SWING_PER_STEP)
+
+
+def step_in_parts(parts: float, name: str) -> float:
+    """Longest whole part of `STEP` that is not longer than one of `parts` parts of it [s].
+
+    Args:
+        parts: number of parts, as `parts_of_step` says.
+        name: name of the design, for the message.
 
     Raises:
-        ConfigError: a leg whose foot is so light, or whose springs are so stiff, that the finest
-            step would be too long.
+        ConfigError: the finest step would be too long.
     """
-    worst = max(designs, key=foot_omega)
-    parts = foot_omega(worst) * STEP / SWING_PER_STEP
-    if parts > FINEST:
+    enough = next((each for each in PARTS if each >= parts), None)
+    if enough is None:
         raise ConfigError(
-            f"design '{worst.name}': springs of {max(worst.stiffness):g} N m/rad would swing its "
-            f"foot of {worst.foot.mass:g} kg at {foot_omega(worst):.4g} rad/s; up to "
-            f"{FINEST * SWING_PER_STEP / STEP:g} rad/s a step of {STEP / FINEST:g} s follows: take "
-            "softer springs or a heavier foot, or set numerics.timestep and mind the energy residual"
+            f"design '{name}': springs so stiff on a foot or bars so light ask for a step of "
+            f"{STEP / parts:.2g} s; down to {STEP / PARTS[-1]:g} s it is chosen by itself: take "
+            "softer springs, a heavier foot or heavier bars, or set numerics.timestep and mind the "
+            "energy residual"
         )
-    return STEP / max(1, math.ceil(parts))
+    return STEP / enough
 
 
 def fitted_bar_density(design: LegDesign) -> float:

@@ -8,7 +8,12 @@ from enum import StrEnum
 from legbench.design import LegDesign
 from legbench.design.setup import Setup
 from legbench.errors import ConfigError
-from legbench.mjcf.fitting import LIGHTEST_BAR, fitted_bar_density, fitted_step
+from legbench.mjcf.fitting import (
+    LIGHTEST_BAR,
+    fitted_bar_density,
+    parts_of_step,
+    step_in_parts,
+)
 
 
 class LinkageKind(StrEnum):
@@ -53,6 +58,12 @@ class Linkage:
     def density(self, design: LegDesign) -> float:
         """Mass per length of crank and bars [kg/m]; raises as `fitted_bar_density`."""
         return fitted_bar_density(design) if self.bar_density is None else self.bar_density
+
+    def parts_of_step(self, design: LegDesign) -> float:
+        """`fitting.parts_of_step` of a leg with this linkage; raises as `density`."""
+        if self.kind is LinkageKind.REDUCED:
+            return parts_of_step(design)
+        return parts_of_step(design, self.density(design), self.crank_length)
 
     def mass(self, design: LegDesign) -> float:
         """Mass of everything that the linkage adds to a leg [kg]; raises as `density`."""
@@ -129,13 +140,16 @@ class Numerics:
                 f"timestep is {step:g} s; it must divide the control period of 0.001 s"
             )
 
-    def fitted(self, designs: Sequence[LegDesign]) -> "Numerics":
+    def fitted(self, designs: Sequence[LegDesign], linkage: Linkage) -> "Numerics":
         """These settings with a step and a loop closure that suit all of some legs.
 
         Raises:
-            ConfigError: no step suits one of them.
+            ConfigError: no step or no bar suits one of them.
         """
-        step = fitted_step(designs) if self.timestep is None else self.timestep
+        step = self.timestep
+        if step is None:
+            parts, name = max((linkage.parts_of_step(design), design.name) for design in designs)
+            step = step_in_parts(parts, name)
         solref = (step, 1.0) if self.loop_solref is None else self.loop_solref
         return replace(self, timestep=step, loop_solref=solref)
 

@@ -54,7 +54,7 @@ class BatchPlant(AbstractPlant):
                 )
         self.period = PERIOD
         # Legs in step share the step of the one that needs the finest.
-        options = replace(options, numerics=options.numerics.fitted(designs))
+        options = replace(options, numerics=options.numerics.fitted(designs, options.linkage))
         models = _models(designs, options)
         self.model = models[0]
         self.threads = threads or os.cpu_count() or 1

@@ -61,8 +61,8 @@ class RatedRows:
 class RatingSeries:
     """Publisher of P^r of every finished period, or of every stance and flight of a jump.
 
-    Each is rated about the motor and about the equilibrium, and shown as P^r and, where ratings near
-    one differ, as the logarithm of 1 - P^r.
+    Each is rated about the motor and about the equilibrium, and shown as P^r and, since ratings
+    near one differ there alone, as the logarithm of 1 - P^r.
     """
 
     def __init__(self, stream: rr.RecordingStream, facts: Facts) -> None:
@@ -151,7 +151,7 @@ class RatingSeries:
         return rows.rows >= SHORTEST and not (lands and rows.fell_on)
 
     def _alignment(self, joint: Floats, motor: Floats) -> Floats:
-        """Alignments of rows in which the leg is carried as its setup has it, by reference (2, n)."""
+        """Alignments of rows with the leg carried as its setup has it, by reference (2, n)."""
         design, support = self._run.design, SUPPORTS[self._run.setup.kind]
         return np.stack(
             [
