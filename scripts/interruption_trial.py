@@ -176,6 +176,7 @@ class Theatre:
             behaviours: list[Behaviour] | None = None,
             *,
             body: Callable[..., Any] = stiff_body,
+            body_period_ns: int | None = None,
             faults: tuple[Any, ...] = (),
             configured: bool = False,
         ) -> Network:
@@ -191,13 +192,20 @@ class Theatre:
                 Behaviour(start_pos=start, hard_stop=(start - reach, start + reach))
                 for start in starts
             ]
-            network = emulate(config, drives_, body=seen, faults=faults, configured=configured)
+            network = emulate(
+                config,
+                drives_,
+                body=seen,
+                body_period_ns=body_period_ns,
+                faults=faults,
+                configured=configured,
+            )
             witness.network = network
             return network
 
         with (
             mock.patch.object(can_open, "emulate", bench),
-            mock.patch.object(can_plant, "STILL_PATIENCE", STILL_CYCLES),
+            mock.patch.object(can_plant, "STILL_PATIENCE_MS", STILL_CYCLES),
             mock.patch.object(landing, "STILL_TIME", STILL_TIME),
             mock.patch.object(landing, "PATIENCE", PATIENCE),
             mock.patch.object(loop, "_cycle", cycling),
