@@ -15,7 +15,6 @@ from legbench.metrics.soundness import judge_numerics
 from legbench.metrics.source import Recorded
 from legbench.strict_json import null_for_nan
 
-
 SPARSE = 1.5
 """Time from row to row above which a run is thinned out, in periods of its own [-]."""
 

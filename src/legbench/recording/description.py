@@ -137,16 +137,14 @@ def describe(manifest: Mapping[str, Any], fallback_id: str = "") -> RunDescripti
         fallback_id: name of a run whose manifest does not tell it.
 
     Raises:
-        FormatError: it describes no leg or no controller that can be, names a setup, a modal
-            convention or a rating reference that does not exist, or has an entry of a wrong type.
+        FormatError: it describes no leg, controller or setup that can be, names a convention that
+            does not exist, or has an entry of a wrong type.
     """
-    if manifest.get("format", FORMAT) == 1:
-        manifest = upgraded(manifest)
-    head = Table(entries=manifest)
+    head = Table(entries=upgraded(manifest) if manifest.get("format", FORMAT) == 1 else manifest)
     # Messages leave out "experiment": the entries have the same names in either format.
     experiment = Table(entries=head.table("experiment").entries)
-    controller, conventions = experiment.table("controller"), experiment.table("conventions")
-    settings, provenance = controller.table("settings"), head.table("provenance")
+    controller, provenance = experiment.table("controller"), head.table("provenance")
+    settings, conventions = controller.table("settings"), experiment.table("conventions")
     kind = head.table("plant").text("kind") or experiment.table("plant").text("kind")
     said = parse_controller(head.table("controller"))
     design, setup = _design(experiment.table("design")), _setup(experiment.table("setup"))

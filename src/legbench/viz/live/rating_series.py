@@ -19,7 +19,7 @@ from legbench.viz.trace import TracedRows
 SHORTEST = 15
 """Stretches of fewer rows are contact chatter and belong to the stretch around them."""
 ORIGIN, LOST = "/series/rating", "/series/lost"
-"""Where P^r is shown, and where log10(1 - P^r)."""
+"""Entities of P^r, and of log10(1 - P^r)."""
 LEAST = 1e-12
 """Smallest 1 - P^r that is told from none [-]: a mean of some hundred roundings."""
 REFERENCES = tuple(Reference)
