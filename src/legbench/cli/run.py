@@ -121,8 +121,8 @@ def _report(finished: "Finished", *, as_json: bool) -> int:
         )
     if summary.numerics == Soundness.UNSOUND:
         note(
-            "legbench: the numerics of this run are unsound: its motion is not that of the leg; the "
-            "last notes say why"
+            "legbench: the numerics of this run are unsound, its motion is not that of the leg; "
+            "its warnings say why"
         )
     if as_json:
         print_json(summary.to_json())
