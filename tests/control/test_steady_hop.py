@@ -1,8 +1,7 @@
-"""Hop of the optimal leg after a push along the polar mode: what lets it linger, what steadies it."""
+"""Hop of the optimal leg after a push along the polar mode, and what steadies it."""
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from legbench.control import JumpConfig, make_controller
@@ -15,7 +14,7 @@ from legbench.plant.sim import SimPlant
 from legbench.servo import ServoConfig
 
 SETTLED, LATER, END = 8_000, 18_000, 20_000
-"""Cycles by which the hop has grown, after which the rest of the push is looked for, and the end."""
+"""Cycles by which the hop has grown, from which on the push is looked for, and of the end."""
 PUSH = 0.02
 """Angle by which the leg is turned about its hip, in the air [rad]."""
 LIMITED = ServoConfig(slew_rate=10.0, bandwidth=30.0, delay_cycles=2, encoder_counts=4096)

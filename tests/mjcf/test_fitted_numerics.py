@@ -50,7 +50,7 @@ def departure(
     with SimPlant(leg, chosen, start) as plant:
         plant.reset()
         for _ in range(1000):
-            seen = plant.step(Command(motor_pos=motor_pos, phase=np.int64(1)))
+            seen = plant.step(Command(motor_pos=motor_pos, phase=np.array(1)))
             largest = max(largest, abs(float(joint_to_modal(seen.joint_pos)[0])))
     return largest
 

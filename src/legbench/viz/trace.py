@@ -46,7 +46,7 @@ class TracedRows:
 
 
 @final
-class Landing:
+class TouchdownMemory:
     """Memory of a leg that touches down, across slices of a run as if they were one."""
 
     def __init__(self) -> None:
@@ -77,7 +77,7 @@ class Tracer:
         self._period, self._between = 0, False
         self._fastest = 0.0
         self._grounded = -np.inf
-        self._landing = Landing()
+        self._landing = TouchdownMemory()
 
     def extend(self, rows: Recorded) -> TracedRows:
         """Derive what pictures need of the next rows."""
