@@ -119,7 +119,7 @@ def test_settings_reach_the_run(tmp_path: Path, capfd: pytest.CaptureFixture[str
         capfd,
         *("run", "bang-bang", *DESIGN, "--z2", "0.9", "--three-levels", "--sign", "-1"),
         *("--setup", "ffs", "--boom-radius", "1.5", "--slew-rate", "7", "--delay-cycles", "2"),
-        *("--setpoint", "motor", "--z2", "1", "--convention", "literal", "--dz2", "0.05"),
+        *("--setpoint", "motor", "--z2", "0.6", "--convention", "literal", "--dz2", "0.05"),
         *("--duration", "0.15", "--out", tmp_path, "--json"),
     )
     assert done.status == 0, done.err
