@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import final
 
 import mujoco
@@ -20,7 +21,7 @@ from legbench.signals import Bools, Command, Floats, Observation
 
 @final
 class BatchPlant(AbstractPlant):
-    """Batch of legs that differ in design but share setup, linkage and servo.
+    """Batch of legs that differ in design but share setup, linkage, servo and step.
 
     A leg that leaves its branch does not stop the others: it is marked in `faulted` and its
     observations mean nothing from then on.
@@ -32,7 +33,7 @@ class BatchPlant(AbstractPlant):
             number (n,).
 
     Raises:
-        ConfigError: no design, or a start that is not one row a leg.
+        ConfigError: no design, a start that is not one row a leg, or a leg that no step suits.
     """
 
     def __init__(
@@ -52,6 +53,8 @@ class BatchPlant(AbstractPlant):
                     f"({len(designs)}, 2)"
                 )
         self.period = PERIOD
+        # Legs in step share the step of the one that needs the finest.
+        options = replace(options, numerics=options.numerics.fitted(designs, options.linkage))
         models = _models(designs, options)
         self.model = models[0]
         self.threads = threads or os.cpu_count() or 1
