@@ -1,4 +1,4 @@
-"""What the motors of an emulated bus move."""
+"""Mechanical loads that the motors of an emulated bus move."""
 
 from collections.abc import Callable, Sequence
 

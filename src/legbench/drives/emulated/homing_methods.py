@@ -10,7 +10,7 @@ from enum import Enum
 
 
 class Until(Enum):
-    """What ends a move."""
+    """Condition that ends a move."""
 
     NEGATIVE_LIMIT = "negative limit switch"
     POSITIVE_LIMIT = "positive limit switch"

@@ -39,7 +39,7 @@ class LinkParts:
     channel: ChannelHold
     """Hold on the lock of the channel."""
     status: LinkStatus
-    """What has become of the link so far."""
+    """Present status of the link."""
 
     @classmethod
     def wired(

@@ -54,7 +54,7 @@ class StopReport:
 
 
 class Lead(ABC):
-    """Whatever gives drives power, and takes it away when its `with` ends."""
+    """Interface of everything that gives drives power, and takes it away when its `with` ends."""
 
     @property
     @abstractmethod

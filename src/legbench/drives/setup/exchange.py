@@ -78,7 +78,7 @@ def check_exchange(bus: BusConfig) -> None:
 
 
 def _way(bus: BusConfig, one: Exchange) -> str:
-    """What lets the last answer come in time."""
+    """Advice on how to let the last answer come in time."""
     if one.commands_us <= bus.period_us and one.answers_us < bus.period_us - 1:
         return f"raise it to {one.answers_us + 1:.0f}, or map fewer objects"
     return (

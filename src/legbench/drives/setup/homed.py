@@ -35,7 +35,7 @@ class HomedCondition:
 
     @property
     def wanted(self) -> int:
-        """What the bits are when the drive is homed."""
+        """Value of the bits when the drive is homed."""
         return self.mask if self.value is None else self.value
 
     def met(self, shown: int) -> bool:

@@ -31,7 +31,7 @@ half of a joint's range at the 5 rad/s of a jump.
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Means:
-    """One way in which a drive notices that its master is gone."""
+    """Means by which a drive notices that its master is gone."""
 
     name: str
     """Name of the object that makes the drive notice."""

@@ -1,4 +1,4 @@
-"""What every object of a drive's configuration is for, and what a drive without it lacks; pure.
+"""Purpose of every object of a drive's configuration, and what a drive without it lacks; pure.
 
 One table decides for all who write, compare or judge: whether cyclic synchronous position mode
 needs an object, whether a protection needs it that another one can replace, or whether it is merely
@@ -38,9 +38,9 @@ class Need(Enum):
     REQUIRED = "required"
     """Cyclic synchronous position mode, or the bus file itself, asks for it."""
     PROTECTION = "protection"
-    """It protects; a drive without it is protected by something else, or not in this way."""
+    """Object of a protection; without it another one protects the drive, or nothing does."""
     OPTIONAL = "optional"
-    """It is good to have; nothing is protected by it."""
+    """Object that is useful, but protects nothing."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""What became of an object that was written: taken, there already, rounded, missing; pure."""
+"""Outcome of writing an object: taken, there already, rounded, or missing; pure."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What a drive has, has fixed, or lacks of all that a run needs, by its data sheet; pure."""
+"""Assessment of the objects that a drive has, has fixed, or lacks, by its data sheet; pure."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ class State(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """One thing that a run needs, and how the drive has it."""
+    """Object that a run needs, and whether the drive has it, has it fixed, or lacks it."""
 
     object: str
     need: str
@@ -51,7 +51,7 @@ class Finding:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Assessment:
-    """What a drive is worth for a node of a bus file."""
+    """Assessment of a drive for a node of a bus file."""
 
     node: str
     findings: tuple[Finding, ...]

@@ -1,4 +1,4 @@
-"""What a drive will make of its configuration, by its data sheet alone; pure."""
+"""Prediction of how a drive takes its configuration, from its data sheet alone; pure."""
 
 from collections.abc import Iterator
 from dataclasses import replace

@@ -24,7 +24,7 @@ TORQUE = (0x6077, 0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proposal:
-    """What of a data sheet goes into a bus file."""
+    """Proposal for a bus file, from a data sheet."""
 
     sheet: DataSheet
     eds: str

@@ -65,7 +65,7 @@ class ChannelLock:
 
     @classmethod
     def joined(cls, locks: "Sequence[ChannelLock]") -> "ChannelLock":
-        """One lock of several channels: it is taken with all of them, or not at all."""
+        """Join locks of several channels into one, which takes all of them or none."""
         first = locks[0]
         first._others = tuple(locks[1:])
         return first

@@ -30,7 +30,7 @@ def frame_of(message: can.Message) -> Frame:
 
 
 def _objection(message: can.Message) -> str:
-    """What makes a message none of classic CAN."""
+    """Reason why a message is none of classic CAN; None if it is one."""
     if message.is_error_frame:
         return "an error frame is not sent: controllers flag errors by themselves"
     if message.is_fd:

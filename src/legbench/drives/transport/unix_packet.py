@@ -25,7 +25,7 @@ class Controller(IntEnum):
 
 
 class Opening(NamedTuple):
-    """What a master asks of its controller."""
+    """Settings that a master asks of its controller."""
 
     bitrate: int | None = None
     """Bitrate of the controller; none for that of the wire behind [bit/s]."""
@@ -67,7 +67,7 @@ def pack_opening(asked: Opening) -> bytes:
 
 
 def opening_of(frame: Frame) -> Opening | None:
-    """What an opening packet asks for; none if it is a frame like any other."""
+    """Settings that an opening packet asks for; None if the packet is an ordinary frame."""
     if not frame.error or len(frame.data) != OPENING.size:
         return None
     bitrate, own = OPENING.unpack(frame.data)
