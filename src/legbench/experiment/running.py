@@ -124,10 +124,17 @@ def _prepared(experiment: Experiment) -> Iterator[Prepared]:
     """Build the controller and open the plant of an experiment; it is closed in the end."""
     start = start_of(experiment)
     leg = Leg(
-        design=experiment.design, options=experiment.options, start=start, servo=experiment.servo
+        design=experiment.design,
+        options=experiment.options,
+        start=start,
+        servo=experiment.servo,
+        imperfections=experiment.imperfections,
+        seed=experiment.seed,
     )
     controller = make_controller(experiment.controller, targets_of(experiment))
-    xml = model_text(experiment.design, experiment.options)
+    imperfections = experiment.imperfections
+    built = imperfections.leg_of(experiment.design), experiment.options.built(imperfections)
+    xml = model_text(*built)
     opened = open_plant(experiment.plant, leg)
     with opened.plant:
         yield Prepared(

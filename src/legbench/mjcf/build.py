@@ -12,6 +12,7 @@ from legbench.mjcf.ground import add_world
 from legbench.mjcf.linkage import (
     HINGE_AXIS,
     add_bars,
+    add_friction,
     add_reduced,
     linear_damping,
 )
@@ -48,6 +49,8 @@ def build_spec(design: LegDesign, options: BuildOptions) -> mujoco.MjSpec:
     else:
         add_reduced(spec, design, numerics)
     _add_springs(spec, design, options.linkage.kind)
+    if any(options.friction):
+        add_friction(spec, options.friction, numerics)
     add_world(spec, setup, options.ground, numerics)
     sensors.add_sensors(spec, setup.kind, bars=options.linkage.kind is LinkageKind.BARS)
     look.add_camera(spec, 0.6 * height)
@@ -71,11 +74,21 @@ def _add_trunk(
         return
     if setup.boom_radius:
         pivot = [0.0, -setup.boom_radius, 0.0]
-        trunk.add_joint(name="boom_yaw", pos=pivot, axis=[0.0, 0.0, 1.0])
-        trunk.add_joint(name="boom_roll", pos=pivot, axis=[1.0, 0.0, 0.0])
+        # A force c v at the end of an arm r turns the boom back by c r^2 omega.
+        yaw, roll = (value * setup.boom_radius**2 for value in options.guide_damping)
+        for name, axis, damping in (
+            ("boom_yaw", [0.0, 0.0, 1.0], yaw),
+            ("boom_roll", [1.0, 0.0, 0.0], roll),
+        ):
+            trunk.add_joint(name=name, pos=pivot, axis=axis, damping=linear_damping(damping))
         return
-    for name, axis in (("trunk_x", [1.0, 0.0, 0.0]), ("trunk_z", [0.0, 0.0, 1.0])):
-        trunk.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
+    forward, upward = options.guide_damping
+    for name, axis, damping in (
+        ("trunk_x", [1.0, 0.0, 0.0], forward),
+        ("trunk_z", [0.0, 0.0, 1.0], upward),
+    ):
+        slide = trunk.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
+        slide.damping = np.array(linear_damping(damping))
 
 
 def _trunk_mass(design: LegDesign, linkage: Linkage) -> float:

@@ -103,3 +103,20 @@ def add_reduced(spec: mujoco.MjSpec, design: LegDesign, numerics: Numerics) -> N
     tendon = spec.add_tendon(name="q2", damping=linear_damping(design.damping[1]))
     tendon.wrap_joint("hip", 1.0)
     tendon.wrap_joint("knee", 1.0)
+
+
+def add_friction(spec: mujoco.MjSpec, friction: tuple[float, float], numerics: Numerics) -> None:
+    """Add Coulomb friction on q1 and q2 [N m], as hard as the loops.
+
+    Friction on q2 acts on a tendon along hip and knee, which is the shank's absolute angle: on the
+    crank of the bars, which weighs next to nothing, it would be lost in the softness of the loop.
+    """
+    hip = spec.joint("hip")
+    hip.frictionloss = friction[0]
+    hip.solref_friction = np.array(numerics.loop_solref)
+    hip.solimp_friction = np.array(numerics.loop_solimp)
+    tendon = spec.add_tendon(name="q2_friction", frictionloss=friction[1])
+    tendon.solref_friction = np.array(numerics.loop_solref)
+    tendon.solimp_friction = np.array(numerics.loop_solimp)
+    tendon.wrap_joint("hip", 1.0)
+    tendon.wrap_joint("knee", 1.0)

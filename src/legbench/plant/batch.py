@@ -9,12 +9,13 @@ import numpy as np
 from mujoco import batch
 
 from legbench.design import LegDesign
+from legbench.encoders import EncoderErrors
 from legbench.errors import ConfigError
 from legbench.mjcf import BuildOptions, build_spec, rest_qpos, to_xml
 from legbench.plant.abstract import AbstractPlant
 from legbench.plant.observe import LiveArrays, Observer, branch_fault_mask
 from legbench.plant.start import PERIOD, Start
-from legbench.servo import Servo, ServoConfig
+from legbench.servo import PERFECT, Servo, ServoConfig
 from legbench.signals import Bools, Command, Floats, Observation
 
 
@@ -74,7 +75,9 @@ class BatchPlant(AbstractPlant):
             energy=self._batch.bind("energy"),
         )
         stiffness = np.array([design.stiffness for design in designs])
-        self._observer = Observer(models[0], self._arrays, stiffness, self._servo)
+        self._observer = Observer(
+            models[0], self._arrays, stiffness, self._servo, EncoderErrors(PERFECT)
+        )
         self.faulted: Bools = np.zeros(len(designs), dtype=np.bool_)
         self._cycle = 0
 
