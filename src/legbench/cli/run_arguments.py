@@ -45,7 +45,7 @@ class CommonArguments:
     duration: float = 8.0
     """Length of the run [s]."""
     seed: int = 0
-    """Source of all randomness; recorded, nothing in a run is random yet."""
+    """Source of all randomness, which is the noise of encoders."""
     set: str | None = None
     """Replace an entry of the experiment, in the words of its file, such as
     design.springs.stiffness="[2.5, 2.3]"; may be repeated, other flags come after it."""

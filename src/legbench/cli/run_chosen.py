@@ -22,6 +22,7 @@ from legbench.experiment.reading import placed
 from legbench.experiment.tables import read_tables, read_toml
 from legbench.experiment.writing import Writer
 from legbench.guests import Registry
+from legbench.imperfections import Imperfections
 from legbench.plants import PLANTS
 from legbench.servo import ServoConfig
 
@@ -171,11 +172,12 @@ def _command(scanned: Scan) -> str:
 
 
 def _flags(tables: Tables) -> list[GuestFlag]:
-    """Flags of the servo and of the chosen controller and plant."""
+    """Flags of servo and imperfections, and of the chosen controller and plant."""
     taken = {entry.name for entry in fields(CommonArguments)}
     found: list[GuestFlag] = []
     for place, kind in (
         ("servo", ServoConfig),
+        ("imperfections", Imperfections),
         ("controller.settings", _kind(CONTROLLERS, tables, "controller")),
         ("plant.settings", _kind(PLANTS, tables, "plant")),
     ):

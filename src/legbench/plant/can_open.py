@@ -20,7 +20,7 @@ from legbench.drives.transport.realtime import Granted
 from legbench.errors import ConfigError
 from legbench.limits.safety import SafetyLimits
 from legbench.plant.can import CanPlant
-from legbench.plant.can_choice import BUS_LOG, LIMITS_NAME, CanChoice
+from legbench.plant.can_choice import BUS_LOG, EMULATED, LIMITS_NAME, CanChoice
 from legbench.plant.can_events import bus_events
 from legbench.plant.design_limits import joint_ranges, limits_events, limits_within
 from legbench.plant.emulated_leg import EmulatedLeg
@@ -64,6 +64,11 @@ def open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
             "slew_rate, bandwidth, delay_cycles and encoder_counts out"
         )
     config = load_bus(choice.bus)
+    if not (leg.imperfections.perfect or choice.is_virtual(config)):
+        raise ConfigError(
+            "imperfections describe an emulated leg; the leg on the bench has its own: leave them "
+            f"out, or give --interface {EMULATED}"
+        )
     if len(config.nodes) != 2:
         raise ConfigError(f"{choice.bus}: {len(config.nodes)} nodes; a leg has 2")
     if config.period != PERIOD:
@@ -165,11 +170,29 @@ def _emulated(config: BusConfig, choice: CanChoice, leg: Leg | None) -> Network:
         starts = IDLE_POS if len(config.nodes) == len(IDLE_POS) else (0.0,) * len(config.nodes)
         idle = [on_bench(node, start) for node, start in zip(config.nodes, starts, strict=True)]
         return emulate(config, idle, configured=choice.read_only)
-    motors = [float(value) for value in leg.start.motor_pos]
+    body = EmulatedLeg(leg.design, leg.options, leg.start, leg.imperfections, leg.seed)
     return emulate(
         config,
-        [Behaviour(start_pos=motor) for motor in motors],
-        body=EmulatedLeg(leg.design, leg.options, leg.start),
+        [_behaviour(leg, body, place) for place in range(len(config.nodes))],
+        body=body,
         faults=choice.faults,
         configured=choice.read_only,
+    )
+
+
+def _behaviour(leg: Leg, body: EmulatedLeg, place: int) -> Behaviour:
+    """Behaviour of the drive of one motor, with the imperfections of that motor."""
+    imperfections, start = leg.imperfections, float(leg.start.motor_pos[place])
+    slew, delay = imperfections.motor_slew_rate, imperfections.motor_delay_cycles
+    if imperfections.motor_range is None:
+        stops = None
+    else:
+        low, high = stops = imperfections.motor_range[place]
+        start = min(max(start, low), high)
+    return Behaviour(
+        start_pos=start,
+        hard_stop=stops,
+        slew_rate=None if slew is None else slew[place],
+        setpoint_delay=0 if delay is None else delay[place],
+        motor_noise=None if imperfections.motor_noise is None else lambda: body.motor_noise[place],
     )

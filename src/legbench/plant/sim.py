@@ -44,7 +44,8 @@ class SimPlant(AbstractPlant):
         seed: int = 0,
     ) -> None:
         self.period = PERIOD
-        self.xml = model_text(imperfections.leg_of(design), options.built(imperfections))
+        built = imperfections.leg_of(design)
+        self.xml = model_text(built, options.built(imperfections))
         self.model = mujoco.MjModel.from_xml_string(self.xml)
         self.data = mujoco.MjData(self.model)
         self._backlash = Backlash(imperfections)
@@ -62,8 +63,9 @@ class SimPlant(AbstractPlant):
             sensordata=self.data.sensordata,
             energy=self.data.energy,
         )
-        stiffness = np.asarray(design.stiffness)
-        self._observer = Observer(self.model, self._arrays, stiffness, self._servo, self._errors)
+        self._stiffness = np.asarray(built.stiffness)
+        believed = np.asarray(design.stiffness)
+        self._observer = Observer(self.model, self._arrays, believed, self._servo, self._errors)
         self._cycle = 0
 
     def reset(self) -> Observation:
@@ -115,6 +117,11 @@ class SimPlant(AbstractPlant):
             joint_pos, joint_vel = self._observer.links()
             self._arrays.ctrl[:] = self._backlash.flank(shaft, joint_pos, joint_vel, timestep)
             self._steps.advance()
+
+    def spring_torque(self) -> Floats:
+        """Return the true torques of the springs on the links at this instant (2,) [N m]."""
+        joint_pos, _ = self._observer.links()
+        return self._stiffness * (self._arrays.ctrl - joint_pos)
 
     def rest(self, motor_pos: Floats, interrupted: Callable[[], bool]) -> None:
         """Leave the simulated leg where it is."""

@@ -187,6 +187,8 @@ class Axis:
     def sense(self, link_pos: float, spring_torque: float) -> None:
         """Take over the state of the body: link angle [rad] and spring torque [N m]."""
         self._link_counts = self._node.link.to_counts(link_pos)
+        if self._behaviour.motor_noise is not None:
+            self.sensors.motor.disturb(self._behaviour.motor_noise())
         rated = self._behaviour.rated_torque
         self._torque = round(self._node.motor.sign * 1000.0 * spring_torque / rated)
 
