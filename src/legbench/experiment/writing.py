@@ -14,7 +14,7 @@ from legbench.guests import Registry
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Writer:
-    """Writer that makes tables of plain values; None is left out."""
+    """Writer that makes tables of plain values; None and tables without entries are left out."""
 
     tables_of: Mapping[type, Callable[[Any], dict[str, Any]]]
     """Classes whose tables have words of their own."""
@@ -34,7 +34,7 @@ class Writer:
         for entry in fields(kind):
             if entry.init and (self.where or not entry.metadata.get("where")):
                 content = self._field(entry, hints[entry.name], getattr(value, entry.name))
-                if content is not None:
+                if content is not None and content != {}:
                     found[entry.name] = content
         return found
 
