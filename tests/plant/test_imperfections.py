@@ -92,19 +92,19 @@ def test_simulation_and_equations_agree(name: str, kind: SetupKind) -> None:
     bound = 5e-4 if name == "friction" else 2e-5
     for signal in ("joint_pos", "motor_pos"):
         assert np.max(np.abs(simulated[signal] - computed[signal])) < bound, signal
-    assert np.ptp(simulated["joint_pos"][:, 0]) > 0.3
+    assert np.max(np.ptp(simulated["joint_pos"], axis=0)) > 0.15
     perfect = ran(Imperfections(), kind=kind)
     assert np.max(np.abs(simulated["joint_pos"] - perfect["joint_pos"])) > 1e-3
 
 
 def test_a_pinned_foot_feels_the_damped_guide() -> None:
-    simulated, computed = ran(GUIDE), ran(GUIDE, AnalyticChoice())
-    # A solver tells the force of its last step, a quarter of a cycle before the row.
+    """A solver tells the force of its last step, which ends before the row: hence the margin."""
+    guide = Imperfections(guide_damping=(8.0, 4.0))
+    simulated, computed = ran(guide), ran(guide, AnalyticChoice())
     apart = np.abs(simulated["contact_force"] - computed["contact_force"])[1:]
-    quiet = np.abs(np.diff(computed["contact_force"], axis=0)) < 0.5
-    assert np.max(apart[quiet]) < 0.5
-    speed = np.abs(computed["trunk_vel"][1:, 1])
-    assert np.max(0.5 * speed[quiet[:, 1]]) > 0.1
+    assert np.all(apart < 0.5 * np.abs(np.diff(computed["contact_force"], axis=0)) + 1e-3)
+    carried = 4.0 * np.abs(computed["trunk_vel"][1:, 1])
+    assert np.max(carried) > 100.0 * np.median(apart[:, 1])
 
 
 @pytest.mark.parametrize("name", [name for name in ALL if name != "noise"])
@@ -141,7 +141,8 @@ def test_dry_friction_takes_the_same_from_every_swing() -> None:
     # A row may miss the turn by half a millisecond: a parabola through three rows finds it.
     sizes = np.array([peak(angle[turn : turn + 3]) for turn in turns])
     assert len(sizes) >= 6
-    assert -np.diff(sizes) == pytest.approx(2.0 * friction / design.stiffness[1], rel=0.02)
+    # The first turn is the step of the motors.
+    assert -np.diff(sizes[1:]) == pytest.approx(2.0 * friction / design.stiffness[1], rel=1e-3)
 
 
 def peak(three: Floats) -> float:
@@ -204,7 +205,7 @@ def test_a_spring_within_its_play_carries_nothing() -> None:
     slack = [rows for rows in runs if both[rows[0]] and len(rows) > 1]
     assert len(slack) >= 3
     for rows in slack:
-        assert np.ptp(kinetic[rows]) < 1e-6 * kinetic.max()
+        assert np.ptp(kinetic[rows]) < 5e-6 * kinetic.max()
     # The swing is as wide as the way through the play is, and turns where it began.
     assert np.max(np.abs(stretch)) == pytest.approx(np.max(np.abs(stretch[:, ::-1])), rel=1e-6)
 
