@@ -31,6 +31,32 @@ def build_spec(design: LegDesign, options: BuildOptions) -> mujoco.MjSpec:
     Raises:
         ConfigError: the bars outweigh the trunk, or MuJoCo refuses a mass or an inertia.
     """
+    spec = _assembled(design, options, dry=any(options.friction), seen=True)
+    model = _compiled(spec, design)
+    spec.add_key(name="bent", qpos=rest_qpos(model, design, BENT).tolist(), ctrl=BENT.tolist())
+    return spec
+
+
+def bare_model(
+    design: LegDesign, options: BuildOptions, *, dry: bool | None = None
+) -> mujoco.MjModel:
+    """Compile a model that moves to the bit as that of `build_spec`, and cannot be looked at.
+
+    Without textures, geoms to see and keyframe it takes a hundredth of the memory.
+
+    Args:
+        design: the leg.
+        options: setup, linkage, ground, numerics, friction.
+        dry: whether joints have dry friction, be it zero: models of one batch have the same parts.
+
+    Raises:
+        ConfigError: as `build_spec`.
+    """
+    dry = any(options.friction) if dry is None else dry
+    return _compiled(_assembled(design, options, dry=dry, seen=False), design)
+
+
+def _assembled(design: LegDesign, options: BuildOptions, *, dry: bool, seen: bool) -> mujoco.MjSpec:
     setup, numerics = options.setup, options.numerics
     spec = mujoco.MjSpec()
     spec.modelname = f"{design.name}_{setup.kind}_{options.linkage.kind}"
@@ -39,7 +65,8 @@ def build_spec(design: LegDesign, options: BuildOptions) -> mujoco.MjSpec:
     spec.option.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
     flat = setup.kind is SetupKind.HFTS
     spec.option.gravity = GRAVITY * np.array([0.0, 1.0, 0.0] if flat else [0.0, 0.0, -1.0])
-    look.add_scenery(spec)
+    if seen:
+        look.add_scenery(spec)
 
     height = hip_height(design, BENT)
     _add_trunk(spec, design, options, height)
@@ -49,12 +76,14 @@ def build_spec(design: LegDesign, options: BuildOptions) -> mujoco.MjSpec:
     else:
         add_reduced(spec, design, numerics)
     _add_springs(spec, design, options.linkage.kind)
-    if any(options.friction):
+    if dry:
         add_friction(spec, options.friction, numerics)
     add_world(spec, setup, options.ground, numerics)
     sensors.add_sensors(spec, setup.kind, bars=options.linkage.kind is LinkageKind.BARS)
-    look.add_camera(spec, 0.6 * height)
-    _add_keyframe(spec, design)
+    if seen:
+        look.add_camera(spec, 0.6 * height)
+    else:
+        look.strip(spec)
     return spec
 
 
@@ -151,10 +180,9 @@ def _add_springs(spec: mujoco.MjSpec, design: LegDesign, kind: LinkageKind) -> N
         )
 
 
-def _add_keyframe(spec: mujoco.MjSpec, design: LegDesign) -> None:
+def _compiled(spec: mujoco.MjSpec, design: LegDesign) -> mujoco.MjModel:
     try:
-        model = spec.compile()
+        return spec.compile()
     except ValueError as error:
         why = " ".join(str(error).split())
         raise ConfigError(f"MuJoCo refuses the leg of design '{design.name}': {why}") from error
-    spec.add_key(name="bent", qpos=rest_qpos(model, design, BENT).tolist(), ctrl=BENT.tolist())

@@ -4,6 +4,8 @@ import mujoco
 import numpy as np
 
 GREY, BLUE, GREEN, BLACK, ORANGE = "segment", "trunk", "bar_green", "bar_black", "servo"
+SEEN = 1
+"""Group of the geoms that touch nothing."""
 MATERIALS = {
     GREY: (0.80, 0.80, 0.82, 1.0),
     BLUE: (0.16, 0.36, 0.62, 1.0),
@@ -138,5 +140,14 @@ def add_table(spec: mujoco.MjSpec) -> None:
     table.contype, table.conaffinity = 0, 0
 
 
+def strip(spec: mujoco.MjSpec) -> None:
+    """Take away what can only be seen; what remains has no material."""
+    for geom in list(spec.geoms):
+        if geom.group == SEEN:
+            spec.delete(geom)
+        else:
+            geom.material = ""
+
+
 def _visual(geom: mujoco.MjsGeom) -> None:
-    geom.contype, geom.conaffinity, geom.group, geom.mass = 0, 0, 1, 0.0
+    geom.contype, geom.conaffinity, geom.group, geom.mass = 0, 0, SEEN, 0.0
