@@ -16,7 +16,7 @@ from legbench.signals import Floats
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Built:
-    """True leg of a run, as far as its readings tell: where they are noisy, its positions are NaN."""
+    """True leg of a run as far as its readings tell; where they are noisy, positions are NaN."""
 
     design: LegDesign
     shaft: Floats

@@ -46,27 +46,38 @@ class Backlash:
         middle = joint_pos + 0.5 * step * joint_vel
         return np.minimum(np.maximum(middle, shaft - self._half), shaft + self._half)
 
+    def resting(self, shaft: Floats, load: Floats) -> Floats:
+        """Return where the springs begin (..., 2) [rad] that carry a load (..., 2) [N m]."""
+        return shaft - np.sign(load) * self._half
+
 
 def rest_of(
-    design: LegDesign, support: Support, motor_pos: Floats, imperfections: Imperfections
+    design: LegDesign | Sequence[LegDesign],
+    support: Support,
+    motor_pos: Floats,
+    imperfections: Imperfections | Sequence[Imperfections],
 ) -> Floats:
-    """Link angles (2,) [rad] at which a leg with imperfections rests.
+    """Link angles (..., 2) [rad] at which legs with imperfections rest.
 
     A spring that carries gravity leans on the flank that gravity presses it to. Friction, which
     would hold the links beside their equilibrium, too, is left out.
 
     Args:
-        design: what the controller believes.
-        support: what carries the leg.
-        motor_pos: positions that the motors are told (2,) [rad].
-        imperfections: what the leg has besides.
+        design: what the controller believes; of a batch, one for each leg.
+        support: what carries the legs.
+        motor_pos: positions that the motors are told (..., 2) [rad].
+        imperfections: what a leg has besides; of a batch, one for each leg.
 
     Raises:
-        DesignError: the springs are too soft to hold the leg there.
+        DesignError: the springs are too soft to hold a leg there.
     """
     servo = Servo(ServoConfig(), PERIOD, imperfections)
     servo.reset(motor_pos)
-    built, shaft = imperfections.leg_of(design), servo.shaft(servo.position)
-    half = 0.5 * np.array(imperfections.backlash or (0.0, 0.0))
-    load = gravity_load(built, support).torque(shaft)
-    return equilibrium(built, shaft - np.sign(load) * half, support)
+    shaft, play = servo.shaft(servo.position), Backlash(imperfections)
+    one = isinstance(design, LegDesign)
+    legs = [design] if one else design
+    flaws = [imperfections] if isinstance(imperfections, Imperfections) else imperfections
+    built = [each.leg_of(leg) for leg, each in zip(legs, flaws, strict=True)]
+    moment = np.array([gravity_load(leg, support).moment for leg in built])
+    load = (moment[0] if one else moment) * np.sin(shaft)
+    return equilibrium(built[0] if one else built, play.resting(shaft, load), support)

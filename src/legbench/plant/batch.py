@@ -15,7 +15,13 @@ from legbench.imperfections import Imperfections
 from legbench.mjcf import BuildOptions, bare_model, rest_qpos
 from legbench.plant.abstract import AbstractPlant
 from legbench.plant.backlash import Backlash
-from legbench.plant.observe import LiveArrays, Observer, branch_fault, branch_fault_mask
+from legbench.plant.observe import (
+    LiveArrays,
+    Observer,
+    branch_fault,
+    branch_fault_mask,
+    branch_message,
+)
 from legbench.plant.start import PERIOD, Start
 from legbench.servo import PERFECT, Servo, ServoConfig
 from legbench.signals import Bools, Command, Floats, Observation
@@ -39,6 +45,7 @@ class BatchPlant(AbstractPlant):
         faulted: which legs have left their branch, diverged or had a command that was no
             number (n,).
         causes: cause of each leg's fault, as `SimPlant` names it; None for a leg without one.
+        messages: what to tell a user of each fault.
         fault_cycles: number of cycles that each leg was commanded until its fault, that of the
             fault included; -1 for a leg without one.
 
@@ -132,6 +139,7 @@ class BatchPlant(AbstractPlant):
         count = len(self._start_qpos)
         self.faulted: Bools = np.zeros(count, dtype=np.bool_)
         self.causes: list[str | None] = [None] * count
+        self.messages: list[str | None] = [None] * count
         self.fault_cycles = np.full(count, -1, dtype=np.int64)
 
     def _note(self, faults: Bools, cause: str | None) -> None:
@@ -142,7 +150,11 @@ class BatchPlant(AbstractPlant):
         self.faulted = self.faulted | new
         for leg in np.flatnonzero(new).tolist():
             posture = branch_fault(self._observer.joints, self._arrays.qpos[leg])
-            self.causes[leg] = posture if cause is None else cause
+            named = cause or posture or FAILED
+            time = self._cycle * PERIOD
+            self.causes[leg] = named
+            at = f"{named} at t = {time:.3f} s"
+            self.messages[leg] = branch_message(named, time) if cause is None else at
             self.fault_cycles[leg] = self._cycle
 
 

@@ -20,8 +20,8 @@ class EmulatedLeg:
     """Body on the drives' shafts: a `SimPlant` whose motors are where the drives put them.
 
     It rests in its start posture until the drives move. It knows nothing of time: one call is one
-    period of `plant.start.PERIOD`. Imperfections of the leg, of the link encoders and of the motors'
-    zeros and noise are its own; how motors follow their targets is the drives'.
+    period of `plant.start.PERIOD`. Imperfections of the leg and of its encoders are its own; how
+    motors follow their targets is the drives'.
 
     Attributes:
         periods: how many have passed.

@@ -69,6 +69,14 @@ def branch_fault(layout: JointLayout, qpos: Floats) -> str | None:
     return None
 
 
+def branch_message(cause: str, time: float) -> str:
+    """What to tell a user of a leg that left its branch at `time` [s]."""
+    return (
+        f"{cause} at t = {time:.3f} s: the leg is no longer on the branch it was assembled on; "
+        "push less (--dz2) or limit the servo (--slew-rate)"
+    )
+
+
 def branch_fault_mask(layout: JointLayout, qpos: Floats) -> Bools:
     """Which legs of a batch (n, nq) `branch_fault` would name; (n,)."""
     knee = qpos[:, layout.knee]

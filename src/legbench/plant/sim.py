@@ -14,7 +14,7 @@ from legbench.imperfections import Imperfections
 from legbench.mjcf import BuildOptions, model_text, rest_qpos
 from legbench.plant.abstract import AbstractPlant
 from legbench.plant.backlash import Backlash
-from legbench.plant.observe import LiveArrays, Observer, branch_fault
+from legbench.plant.observe import LiveArrays, Observer, branch_fault, branch_message
 from legbench.plant.start import PERIOD, Start
 from legbench.plant.stepping import PeriodSteps
 from legbench.servo import PERFECT, Servo, ServoConfig
@@ -99,11 +99,7 @@ class SimPlant(AbstractPlant):
             raise PlantFault("simulation failed", str(error)) from error
         self._cycle += 1
         if (cause := branch_fault(self._observer.joints, self._arrays.qpos)) is not None:
-            raise PlantFault(
-                cause,
-                f"{cause} at t = {self._cycle * PERIOD:.3f} s: the leg is no longer on the branch "
-                "it was assembled on; push less (--dz2) or limit the servo (--slew-rate)",
-            )
+            raise PlantFault(cause, branch_message(cause, self._cycle * PERIOD))
         return self._observer.look(self._cycle * PERIOD, command.motor_pos)
 
     def _advance(self, shaft: Floats) -> None:
