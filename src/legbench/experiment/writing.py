@@ -4,12 +4,19 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import Field, dataclass, fields, is_dataclass
 from enum import Enum
+from functools import lru_cache
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
 from legbench.experiment.reading import REGISTRY, joined, tagged
 from legbench.guests import Registry
+
+
+@lru_cache(maxsize=256)
+def _hints(kind: type[Any]) -> dict[str, Any]:
+    """Types of the fields of a class; finding them out takes longer than writing them."""
+    return get_type_hints(kind)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,7 +36,7 @@ class Writer:
         own = self.tables_of.get(kind)
         if own is not None:
             return own(value)
-        hints = get_type_hints(kind)
+        hints = _hints(kind)
         found = {}
         for entry in fields(kind):
             if entry.init and (self.where or not entry.metadata.get("where")):

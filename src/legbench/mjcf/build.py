@@ -78,12 +78,12 @@ def _assembled(design: LegDesign, options: BuildOptions, *, dry: bool, seen: boo
     _add_springs(spec, design, options.linkage.kind)
     if dry:
         add_friction(spec, options.friction, numerics)
-    add_world(spec, setup, options.ground, numerics)
+    if seen:
+        look.dress(spec, design, options.linkage)
+    add_world(spec, setup, options.ground, numerics, seen=seen)
     sensors.add_sensors(spec, setup.kind, bars=options.linkage.kind is LinkageKind.BARS)
     if seen:
         look.add_camera(spec, 0.6 * height)
-    else:
-        look.strip(spec)
     return spec
 
 
@@ -98,7 +98,6 @@ def _add_trunk(
     trunk.ipos = np.array([0.0, 0.0, 0.03])
     trunk.inertia = np.array([5e-4, 7e-4, 7e-4])
     trunk.add_site(name="hip", size=[0.004] * 3, group=3)
-    look.add_trunk_box(trunk)
     if not setup.trunk_moves:
         return
     if setup.boom_radius:
@@ -145,10 +144,7 @@ def _add_segments(spec: mujoco.MjSpec, design: LegDesign, numerics: Numerics) ->
             hinge.solref_limit = np.array(numerics.stop_solref)
             hinge.solimp_limit = np.array(numerics.stop_solimp)
         _set_inertia(body, segment)
-        look.add_capsule(body, name, segment.length, 0.006, look.GREY)
         parent, down = body, segment.length
-    look.add_servo(spec.body("thigh"), "servo_thigh", 0.0)
-    look.add_servo(spec.body("shank"), "servo_shank", 0.0)
     parent.add_site(name="tip", pos=[0.0, 0.0, -down], size=[0.004] * 3, group=3)
 
 
