@@ -66,7 +66,8 @@ def ran(
     design: LegDesign = PROTOTYPE,
     controller: ControllerSettings = STEP,
     duration: float = 0.4,
-    **more: Any,
+    linkage: Linkage = REDUCED,
+    seed: int = 0,
 ) -> Recording:
     experiment = Experiment(
         design=design,
@@ -75,7 +76,8 @@ def ran(
         plant=plant or SimChoice(),
         imperfections=imperfections,
         duration=duration,
-        **({"linkage": REDUCED} | more),
+        linkage=linkage,
+        seed=seed,
     )
     return record_in_memory(experiment)
 
@@ -200,7 +202,7 @@ def test_a_spring_within_its_play_carries_nothing() -> None:
     stretch = (run["motor_pos"] - run["joint_pos"])[2:]
     within = np.abs(stretch) < 0.015
     kinetic = run["energy"][2:, 1]
-    both = within.all(axis=1)
+    both = np.logical_and.reduce(within, axis=1)
     runs = np.split(np.arange(len(both)), np.flatnonzero(np.diff(both)) + 1)
     slack = [rows for rows in runs if both[rows[0]] and len(rows) > 1]
     assert len(slack) >= 3

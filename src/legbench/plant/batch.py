@@ -109,7 +109,7 @@ class BatchPlant(AbstractPlant):
     def step(self, command: Command) -> Observation:
         """Apply each leg's command over one period of substeps."""
         self._cycle += 1
-        self._note(~np.isfinite(command.motor_pos).all(axis=-1), NOT_FINITE)
+        self._note(~np.logical_and.reduce(np.isfinite(command.motor_pos), axis=-1), NOT_FINITE)
         shaft = self._servo.shaft(self._servo.follow(command.motor_pos))
         for _ in range(self._rounds):
             self._push(shaft)
