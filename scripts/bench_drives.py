@@ -253,7 +253,7 @@ def main() -> int:
     start = start_of(chosen)
     pairs = list(zip(config.nodes, start.motor_pos, start.joint_pos, strict=True))
     motors = [node.motor.to_counts(float(motor)) for node, motor, _ in pairs]
-    links = [node.link.to_counts(float(link)) for node, _, link in pairs]
+    links = [node.link_units.to_counts(float(link)) for node, _, link in pairs]
     with (
         tempfile.TemporaryDirectory() as folder,
         socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listener,

@@ -6,8 +6,18 @@ on this package's scalar equations, which are already several times faster; the 
 first, the second is printed beside it. The yardstick is DOP853 at 1e-12. Compiling is done before
 the clock starts. The fast path runs at both of its tolerances, for reference and for maps. Rounds
 go through all paths in turn, so that a machine that slows down slows them all.
+
+Then: legs a second side by side, for 2 s of FFS on one core, plain and with derivatives to nine
+parameters; a hop under the jump controller over heyoka alone on the same pieces; processor time
+from the start of Python to the first hop of a new leg, nothing compiled yet and all compiled.
+`--basin N` maps N x N starts in two processes.
 """
 
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -18,11 +28,18 @@ from scipy.integrate import solve_ivp
 
 from legbench.analytic import Accuracy, HybridLeg, LegModel, LegState, Method, flying
 from legbench.analytic import matrices as mx
-from legbench.analytic.hybrid import switch
+from legbench.analytic.compiled import TOLERANCE
+from legbench.analytic.contact import switch
+from legbench.analytic.lanes import Lanes
 from legbench.analytic.state import Regime
 from legbench.analytic.taylor import MAP_TOLERANCE, TaylorLeg
+from legbench.control import JumpConfig
 from legbench.design import load_design
 from legbench.design.statics import Support, motor_holding
+from legbench.modes.basin import Axis, Question, map_basin
+from legbench.modes.drive import JumpLaw
+from legbench.modes.fixed_point import fixed_point
+from legbench.modes.hop import Apex, return_map, settle
 from legbench.signals import Floats
 
 DESIGN = Path(__file__).parents[1] / "models" / "optimal.toml"
@@ -106,8 +123,142 @@ def matrix_hop(model: LegModel, start: LegState, motor: Motor) -> LegState:
     return state
 
 
+def legs_a_second() -> dict[str, float]:
+    """Legs a second, side by side on one core, for two seconds of FFS."""
+    model, count, times = LegModel.of(load_design(DESIGN)), 64, np.array([0.0, 2.0])
+    starts = np.tile([-0.9, 0.85, 0.0, 0.0], (count, 1)) + np.linspace(
+        0.0, 0.05, 4 * count
+    ).reshape(count, 4)
+    found = {}
+    for name, derivatives in (("plain", False), ("with nine derivatives", True)):
+        lanes = Lanes([model] * count, Regime.PINNED, derivatives=derivatives)
+
+        def run(lanes: Lanes = lanes) -> None:
+            lanes.start(starts)
+            lanes.path(times, np.tile([-0.7, 0.7], (count, 1)))
+
+        found[name] = count / best({name: (run, 1)}, 25)[name]
+    return found
+
+
+def over_bare(name: str, tolerance: float) -> tuple[float, float]:
+    """A hop [s], and heyoka's own share of it [s]: the same pieces without what lies between."""
+    design = load_design(DESIGN.parent / f"{name}.toml")
+    law = JumpLaw(JumpConfig(), design)
+    leg = TaylorLeg(LegModel.of(design), probe=law.probe, tolerance=tolerance)
+    start = Apex(height=0.27, speed=0.0, z1=0.0, z2=0.6, dz1=0.0, dz2=0.0)
+    apex = settle(leg, law, start, 30)[-1]
+    hop = best({"hop": (lambda: return_map(leg, law, apex), 1)}, 500)["hop"]
+    pieces = []
+
+    class Spy:
+        """An integrator that notes where it was sent from and to."""
+
+        def __init__(self, real: Any) -> None:
+            self.real = real
+
+        def __getattr__(self, what: str) -> Any:
+            return getattr(self.real, what)
+
+        def __setattr__(self, what: str, value: Any) -> None:
+            if what == "real":
+                object.__setattr__(self, what, value)
+            else:
+                setattr(self.real, what, value)
+
+        def propagate_until(self, *until: Any) -> Any:
+            real = self.real
+            begin = (real, real.state.copy(), real.pars.copy(), real.time)
+            outcome = real.propagate_until(*until)
+            pieces.append((*begin, real.time))
+            return outcome
+
+    for watch in leg.course.watches():
+        watch.integrator = Spy(watch.integrator)
+    return_map(leg, law, apex)
+    bare = 0.0
+    for real, state, pars, begin, end in pieces:
+        least = float("inf")
+        for _ in range(200):
+            real.state[:], real.pars[:], real.time = state, pars, begin
+            real.reset_cooldowns()
+            began = time.perf_counter()
+            real.propagate_until(end, 1000)
+            least = min(least, time.perf_counter() - began)
+        bare += least
+    return hop, bare
+
+
+def start_up() -> tuple[float, float, float]:
+    """Processor time of `hop` for a leg: NumPy's import, nothing compiled, all compiled [s]."""
+    hop = (
+        "from legbench.cli.hop import main; "
+        f"main([{str(DESIGN)!r}, '--z2', '0.65', '--dz2', '0.1', '--json'])"
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        cache = {"LEGBENCH_CACHE": str(Path(folder) / "cache")}
+        return _seconds("import numpy", cache), _seconds(hop, cache), _seconds(hop, cache)
+
+
+def _seconds(code: str, environment: dict[str, str]) -> float:
+    script = f"import time; {code}; import sys; print(time.process_time(), file=sys.stderr)"
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return float(done.stderr.split()[-1])
+
+
+def basin(points: int) -> float:
+    """Wall time of a basin map in two processes [s]."""
+    design = load_design(DESIGN.parent / "prototype.toml")
+    law = JumpLaw(JumpConfig(), design)
+    leg = TaylorLeg(LegModel.of(design), probe=law.probe)
+    start = Apex(height=0.27, speed=0.0, z1=0.0, z2=0.6, dz1=0.0, dz2=0.0)
+    centre = fixed_point(leg, law, settle(leg, law, start, 60)[-1]).apex
+    height = centre.height
+    question = Question(
+        design=design,
+        jump=JumpConfig(),
+        motor=(0.0, 0.0),
+        undamped=False,
+        centre=centre,
+        across=Axis(name="z1", low=-0.3, high=0.3, count=points),
+        up=Axis(name="height", low=height - 0.08, high=height + 0.08, count=points),
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        began = time.perf_counter()
+        map_basin(question, Path(folder) / "basin.jsonl", workers=2)
+        return time.perf_counter() - began
+
+
+def figures(points: int) -> None:
+    """Print what has no bound here."""
+    for name, rate in legs_a_second().items():
+        print(f"2 s of FFS, {name}: {rate:.0f} legs a second")
+    for name in ("prototype", "optimal"):
+        for tolerance in (MAP_TOLERANCE, TOLERANCE):
+            hop, bare = over_bare(name, tolerance)
+            print(
+                f"hop of {name} at {tolerance:g}: {1e6 * hop:.0f} us, heyoka alone on its pieces "
+                f"{1e6 * bare:.0f} us, ratio {hop / bare:.2f}"
+            )
+    numpy, cold, warm = start_up()
+    print(
+        f"processor time of hop besides numpy: cold {cold - numpy:.2f} s, warm {warm - numpy:.2f} s"
+    )
+    if points:
+        print(f"basin, {points} x {points}, two processes: {basin(points):.1f} s")
+
+
 def main() -> int:
     """Print one line a path; fail below the bound."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--basin", type=int, default=0, help="points a side of a basin map")
+    flags = parser.parse_args()
     design = load_design(DESIGN)
     model = LegModel.of(design, undamped=True, stops=False)
     held = motor_holding(design, np.array([-0.8, 0.8]), Support.FOOT)
@@ -148,6 +299,7 @@ def main() -> int:
         print(
             f"{name:<16}{1e3 * seconds:10.3f}{wrong[name]:12.1e}{ratios[0]:12.1f}{ratios[1]:12.1f}"
         )
+    figures(flags.basin)
     ratio = taken["RK45, matrices"] / taken[MAPS]
     good = ratio >= BOUND and wrong[MAPS] < min(wrong[other] for other in slow)
     print("ok" if good else f"below the bound of {BOUND:g} times at a smaller error")

@@ -45,7 +45,7 @@ there, and seconds less than a leg really needs."""
 OFFSET, STOP, FAR = 0.02, 0.06, 3.0
 """How far a run starts from its start posture, where a search finds its stop, and where stops are
 that nobody meets [rad]."""
-SEARCH = '"6099:01 u32" = 60_000\n'
+SEARCH, FAST = '"6099:01 u32" = 12517', '"6099:01 u32" = 60_000'
 """Speed of a search, in the parameters of a drive [counts/s]."""
 COMMANDS = ("run", "rest", "jog", "home", "zero", "configure", "jitter", "script")
 """`rest` is a run that ends with its way to rest, `run` one that ends with a stop at once."""
@@ -68,11 +68,10 @@ class Theatre:
     """Plays commands on an emulated leg, with files in a folder of their own."""
 
     def __init__(self, folder: Path) -> None:
-        """Copy the bench's files into a folder, with a speed for searches."""
+        """Copy the bench's files into a folder, with a higher speed of searches."""
         self._bus, self._runs, self._zero = folder / "leg.toml", folder / "runs", folder / "zero"
         text = (ROOT / "hardware" / "leg.toml").read_text(encoding="utf-8")
-        key = "[node.parameters]\n"
-        self._bus.write_text(text.replace(key, key + SEARCH), encoding="utf-8")
+        self._bus.write_text(text.replace(SEARCH, FAST), encoding="utf-8")
         shutil.copy(ROOT / "hardware" / "limits.toml", folder)
         self._design = ROOT / "models" / "optimal.toml"
 
@@ -176,6 +175,7 @@ class Theatre:
             behaviours: list[Behaviour] | None = None,
             *,
             body: Callable[..., Any] = stiff_body,
+            body_period_ns: int | None = None,
             faults: tuple[Any, ...] = (),
             configured: bool = False,
         ) -> Network:
@@ -191,13 +191,20 @@ class Theatre:
                 Behaviour(start_pos=start, hard_stop=(start - reach, start + reach))
                 for start in starts
             ]
-            network = emulate(config, drives_, body=seen, faults=faults, configured=configured)
+            network = emulate(
+                config,
+                drives_,
+                body=seen,
+                body_period_ns=body_period_ns,
+                faults=faults,
+                configured=configured,
+            )
             witness.network = network
             return network
 
         with (
             mock.patch.object(can_open, "emulate", bench),
-            mock.patch.object(can_plant, "STILL_PATIENCE", STILL_CYCLES),
+            mock.patch.object(can_plant, "STILL_PATIENCE_MS", STILL_CYCLES),
             mock.patch.object(landing, "STILL_TIME", STILL_TIME),
             mock.patch.object(landing, "PATIENCE", PATIENCE),
             mock.patch.object(loop, "_cycle", cycling),

@@ -259,7 +259,7 @@ def _watched(seen: Seen, interrupts: list[Interrupt]) -> Iterator[None]:
     with ExitStack() as stack:
         for patch in (
             mock.patch.object(can_open, "emulate", bench),
-            mock.patch.object(can_plant, "STILL_PATIENCE", STILL_CYCLES),
+            mock.patch.object(can_plant, "STILL_PATIENCE_MS", STILL_CYCLES),
             mock.patch.object(landing, "STILL_TIME", STILL_TIME),
             mock.patch.object(landing, "PATIENCE", PATIENCE),
             before(LockstepBus, "send"),

@@ -79,7 +79,15 @@ def read_toml(path: Path) -> dict[str, Any]:
         FileNotFoundError: there is no such file.
         UnreadableError: it cannot be read, is no UTF-8 or no TOML, too large, too wide or too deep.
     """
-    content = read_file(path, LARGEST_TOML)
+    return parse_toml(read_file(path, LARGEST_TOML))
+
+
+def parse_toml(content: bytes) -> dict[str, Any]:
+    """Return the tables of a TOML text.
+
+    Raises:
+        UnreadableError: it is no UTF-8 or no TOML, too wide or too deep.
+    """
     longest = max(map(len, content.split(b"\n")))
     if longest > LONGEST_LINE:
         raise UnreadableError(

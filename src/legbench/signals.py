@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Ints = NDArray[np.int64]
+MEASURED = ("motor_pos", "joint_pos", "spring_torque")
+"""Signals that a plant may not know, being not a number then: drives with one encoder a joint."""
 REST = 0
 """Code of the phase at rest, which every controller that is built in declares."""
 

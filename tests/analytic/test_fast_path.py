@@ -175,3 +175,14 @@ def test_the_tolerance_for_maps_costs_a_hop_no_more_than_it_says(fast: TaylorLeg
         one, other = (leg.advance(start, 0.3, MOTOR)[0] for leg in (fast, loose))
         worst = max(worst, float(np.max(np.abs(np.subtract(one.q + one.v, other.q + other.v)))))
     assert 0.0 < worst < 1e-7
+
+
+def test_a_leg_that_was_sent_elsewhere_goes_on_from_its_state(fast: TaylorLeg) -> None:
+    start = standing(EXACT, (-0.9, 0.9), pinned=True)
+    half, _ = fast.watch(start, 0.1, MOTOR, Levels())
+    wanted, _ = fast.watch(half, 0.2, MOTOR, Levels())
+    half, _ = fast.watch(start, 0.1, MOTOR, Levels())
+    fast.course.fly((-0.3, 0.3), (1.0, 2.0), (0.0, 1.0), (0.0, 0.0))
+    fast.course.go(0.05)
+    found, _ = fast.watch(half, 0.2, MOTOR, Levels())
+    assert np.allclose(found.q + found.v, wanted.q + wanted.v, rtol=0.0, atol=1e-12)

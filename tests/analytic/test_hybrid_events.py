@@ -21,7 +21,7 @@ from legbench.analytic import (
     flying,
     standing,
 )
-from legbench.analytic.hybrid import hold
+from legbench.analytic.contact import hold
 from legbench.design import load_design
 from legbench.design.statics import GRAVITY
 from legbench.errors import ConfigError

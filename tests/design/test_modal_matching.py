@@ -80,6 +80,8 @@ def test_equation_5_is_equation_20(leg: LegDesign) -> None:
     terms = inertia_terms(Inertial.of(leg))
     scale = abs(t["t6"]) + float(np.abs(terms).sum())
     assert abs(terms.sum() + coupling) < 1e-13 * scale
+    printed = conditions(leg)["inertia"].residual
+    assert abs(printed - coupling) < 1e-13 * scale
 
 
 @settings(derandomize=True, max_examples=60)

@@ -30,10 +30,10 @@ CASES = [
     (SOFT, "soft_limits = [1.2]", "soft_limits", "pairs [low, high]"),
     (SOFT, "link_object = 3", "link_object", "is no object"),
     (SOFT, "rpdo = 3", "'rpdo'", "must be a list"),
-    (SOFT, f"rpdo = [{{number=7,objects=[{COMMANDS}]}}]", "rpdo: PDO number 7", "has 1 to 4"),
+    (SOFT, f"rpdo = [{{number=7,objects=[{COMMANDS}]}}]", "rpdo: PDO number 7", "1 to 4"),
     (SOFT, f"rpdo = [{{cob_id=0x601,number=1,objects=[{COMMANDS}]}}]", "rpdo: cob_id 601h", "SDO"),
     (SOFT, f"rpdo = [{{cob_id=0x6E0,number=1,objects=[{COMMANDS}]}}]", "cob_id 6E0h", "reserved"),
-    ("bits = 16", "bits = 17", "link: bits", "16 or 32"),
+    ("bits = 16", "bits = 17", "link: bits", "8, 16, 32, 64"),
 ]
 
 

@@ -27,7 +27,7 @@ from legbench.servo import ServoConfig
 from legbench.signals import Command, Floats, Observation
 
 SIGNALS = ("command_pos", "applied_pos", "motor_pos", "joint_pos", "spring_torque")
-RESOLUTION = load_bus(BUS).nodes[0].link.resolution
+RESOLUTION = load_bus(BUS).nodes[0].link_units.resolution
 """Of the bench's link encoders [rad]."""
 
 

@@ -36,7 +36,8 @@ def test_no_fault_survives(trial: Trial, tmp_path: Path) -> None:
         assert result.status == "complete"
         assert result.cycles is None
     else:
-        assert (result.status, result.cause) == ("fault", trial.cause)
+        assert result.status == "fault"
+        assert result.cause in {trial.cause, trial.or_cause} - {None}
         assert result.cycles is not None
         assert 0 < result.cycles <= WITHIN
 

@@ -42,7 +42,8 @@ def test_another_stack_reads_them() -> None:
     assert variable is not None
     assert variable.value == -3
     # Read as its slave would say it: the identity of this very drive.
-    assert [node.sdo[0x1018][sub].raw for sub in (1, 2, 3, 4)] == [0x123, 0x402, 0, 1001]
+    said = [int.from_bytes(node.get_data(0x1018, sub), "little") for sub in (1, 2, 3, 4)]
+    assert said == [0x123, 0x402, 0, 1001]
 
 
 @pytest.mark.parametrize("name", ["optimal", "prototype"])

@@ -96,7 +96,12 @@ def test_a_bus_file_becomes_a_bus(tmp_path: Path) -> None:
         ('"6065:00 u32"', '"6065 u32"', "'6065 u32' is no object; write index"),
         ("= 20000", "= 2.5", "parameter '6065:00 u32' is 2.5; it must be a whole number"),
         ('["6040:00 u16", ', "[", "maps 6040h:00 0 times; it must stand in one RPDO"),
-        ("number = 2", "number = 9", "PDO number 9; a drive has 1 to 4"),
+        (
+            "number = 2",
+            "number = 9",
+            "PDO number 9 has no COB-ID by the standard, .* give it a 'cob_id'",
+        ),
+        ("number = 2", "number = 513", "PDO number 513; a drive has 1 to 512"),
         ('"6077:00 i16"', '"6064:00 i32", "6064:00 i32"', "has 12 bytes; it must have 1 to 8"),
         ("bits = 16", "bits = 32", "link bits is 32, but 2064h:00 has 16"),
         ("[[node]]", "[[node", "not valid TOML"),

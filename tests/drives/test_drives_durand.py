@@ -109,7 +109,7 @@ class Slave:
         ):
             od.write(0x1018, sub, value)
         od.write(0x6064, 0, node.motor.to_counts(start))
-        od.write(0x2064, 0, node.link.to_counts(start))
+        od.write(0x2064, 0, node.link_units.to_counts(start))
         od.update_callbacks[(0x6060, 0)].add(lambda mode: od.write(0x6061, 0, mode))
         self.sync()
 
@@ -124,7 +124,7 @@ class Slave:
             target = od.read(0x607A, 0)
             self.targets.append(target)
             od.write(0x6064, 0, target)
-            od.write(0x2064, 0, self.config.link.to_counts(self.config.motor.to_rad(target)))
+            od.write(0x2064, 0, self.config.link_units.to_counts(self.config.motor.to_rad(target)))
         od.write(0x6041, 0, word)
 
 

@@ -42,9 +42,9 @@ def shows(node: NodeConfig, motor: float, link: float) -> float:
     """What a new link makes of both positions, as a drive's encoders show them [rad]."""
     axis = AxisLink(node)
     axis.begin_cycle()
-    low, mask = -(1 << node.link.bits - 1), (1 << node.link.bits) - 1
-    short = (node.link.to_counts(link) - low & mask) + low
-    kind = {16: DataType.INTEGER16, 32: DataType.INTEGER32}[node.link.bits]
+    low, mask = -(1 << node.link_units.bits - 1), (1 << node.link_units.bits) - 1
+    short = (node.link_units.to_counts(link) - low & mask) + low
+    kind = {16: DataType.INTEGER16, 32: DataType.INTEGER32}[node.link_units.bits]
     data = pack(DataType.UNSIGNED16, 0) + pack(DataType.INTEGER32, node.motor.to_counts(motor))
     assert axis.feed(node.tpdo_id(node.tpdos[0]), data + pack(kind, short))
     return axis.link_pos
@@ -121,7 +121,6 @@ def test_the_way_out_is_one() -> None:
     [
         (AxisUnits(counts_per_rev=1 << 30, gear=10.0), "-2147483648 to 2147483647"),
         (AxisUnits(counts_per_rev=1 << 16, offset_counts=(1 << 31) - 5), "2147483647"),
-        (AxisUnits(counts_per_rev=1 << 16, gear=6.0, bits=16), "of 16 bits hold -32768 to 32767"),
     ],
 )
 def test_a_motor_beyond_its_object_is_refused(units: AxisUnits, held: str) -> None:

@@ -216,7 +216,7 @@ def test_one_frame_while_listening_is_enough(name: str, said: str, at_ms: int) -
 
 
 @pytest.mark.parametrize("name", ["configure", "home", "run", "jog"])
-@pytest.mark.parametrize("after_ms", range(2, 50, 6))
+@pytest.mark.parametrize("after_ms", range(2, 44, 6))
 def test_a_newcomer_during_the_bring_up_ends_it_at_once(name: str, after_ms: int) -> None:
     frame = SPOKEN["SYNC"]
     listened_ms = LISTEN_NS // MS * (2 if name == "jog" else 1)
@@ -264,7 +264,7 @@ def test_a_heartbeat_that_nobody_watches_for_is_a_bystanders() -> None:
     _, network = spoken(Frame(0x700 + FOREIGN, b"\x05"), 10 * MS, every_ns=100 * MS)
     session = Session(LockstepBus("it", network=network), bus_config())
     with session:
-        assert configure.write(session) > 0
+        assert configure.write(session).objects > 0
 
 
 @pytest.mark.parametrize("period_ms", [1, 20, 100, 333, 500])

@@ -285,6 +285,24 @@ def test_what_is_no_classic_frame_is_not_sent_and_a_closed_bus_does_nothing(
             call()
 
 
+@pytest.mark.parametrize(
+    ("given", "error"),
+    [
+        ({"bitrat": 5}, TypeError),
+        ({"receive_own_messages": True}, TypeError),
+        ({"fd": True}, can.CanInitializationError),
+    ],
+)
+def test_settings_that_an_adapter_does_not_have_are_refused(
+    server: SlcanServer, given: dict[str, object], error: type[Exception]
+) -> None:
+    with pytest.raises(
+        error, match=r"classic CAN|takes no (bitrat|receive_own_messages); .*bitrate"
+    ):
+        SlcanBus(server.path, sleep_after_open=0.0, **given)
+    SlcanBus(server.path, sleep_after_open=0.0, fd=False, single_handle=True).shutdown()
+
+
 def test_frames_are_stamped_when_their_bytes_are_read(
     server: SlcanServer, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -141,7 +141,7 @@ def test_the_body_moves_once_a_period_with_the_motors_where_they_are() -> None:
         network.drives, config().nodes, (0.25, -0.5), (1.0, -2.0), strict=True
     ):
         values = drive.axis._values
-        assert values[0x60E4, 1] == node.link.to_counts(link)
+        assert values[0x60E4, 1] == node.link_units.to_counts(link)
         assert values[0x6077, 0] == node.motor.sign * 100 * torque
 
 

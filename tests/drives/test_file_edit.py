@@ -12,19 +12,24 @@ from hypothesis import strategies as st
 
 from legbench.commissioning.zero import Zero, write
 from legbench.drives.setup.bus_file import load_bus
+from legbench.drives.setup.encoders import Side
 from legbench.drives.setup.file_edit import edit_file, edited
 from legbench.errors import ConfigError, RecordingError
 from legbench.reading import UnreadableError
 
 ZEROS = (
-    Zero(node="motor1", motor_offset=-6242, link_offset=17),
-    Zero(node="motor2", motor_offset=123456, link_offset=-1),
+    Zero(node="motor1", side=Side.MOTOR, motor_offset=-6242, link_offset=17),
+    Zero(node="motor2", side=Side.MOTOR, motor_offset=123456, link_offset=-1),
 )
 OFFSET = re.compile(rb"offset_counts = [-+\w]+")
 
 
 def offsets(path: Path) -> list[tuple[int, int]]:
-    return [(n.motor.offset_counts, n.link.offset_counts) for n in load_bus(path).nodes]
+    return [
+        (n.motor.offset_counts, n.link.offset_counts)
+        for n in load_bus(path).nodes
+        if n.link is not None
+    ]
 
 
 def bus(folder: Path, text: bytes | None = None) -> Path:

@@ -325,6 +325,7 @@ def test_data_types_have_the_index_and_the_size_of_table_44() -> None:
         (0x05, "UNSIGNED8"): 1,
         (0x06, "UNSIGNED16"): 2,
         (0x07, "UNSIGNED32"): 4,
+        (0x08, "REAL32"): 4,
         (0x09, "VISIBLE_STRING"): None,
         (0x0A, "OCTET_STRING"): None,
         (0x15, "INTEGER64"): 8,

@@ -103,7 +103,7 @@ def test_process_data_that_never_become_regular_end_the_start_after_2000_cycles(
     ):
         it = Drives()
         it.incomplete = incomplete
-        with pytest.raises(DriveError, match=rf"within 2000 cycles; {words}"):
+        with pytest.raises(DriveError, match=rf"within 2000 ms; {words}"):
             it.start_up(cycles=2).settle(it.tick)
         assert it.ticks == 2000
         assert "arm" not in it.done

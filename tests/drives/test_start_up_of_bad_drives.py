@@ -169,7 +169,7 @@ def test_drives_without_regular_data_are_named_after_2000_cycles(tmp_path: Path)
         it.link.open()
         begin_ns = it.network.now_ns
         it.network.inject(FrameFault(kind=FrameFaultKind.DROP, cob_id=0x182))
-        words = "no regular process data within 2000 cycles; missing: knee; look at"
+        words = "no regular process data within 2000 ms; missing: knee; look at"
         with pytest.raises(DriveError, match=words):
             it.link.start()
         # With an answer owed every other tick is silent; the stop has its own cycles.

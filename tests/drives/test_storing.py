@@ -27,7 +27,7 @@ def test_what_the_drives_hold_outlasts_their_power() -> None:
         # All but the command frames, which are stored switched off.
         for node in session.config.nodes:
             left = session.bring_up().differences(node)
-            assert [(one.key, there) for one, there in left] == [
+            assert [(one.parameter.key, one.there) for one in left] == [
                 ((0x1400, 1), 1 << 31 | 0x200 + node.node_id)
             ]
     # The signature is "save", once a drive.

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from legbench.drives.setup.units import AxisUnits, Unwrapper, unwrap, wrap
+from legbench.drives.setup.units import AxisUnits, Unwrapper, wrap
 from legbench.errors import ConfigError
 
 
@@ -20,7 +20,7 @@ def axis(**changes: Any) -> AxisUnits:
         ("gear", (1e-4, 1e4), (0.99e-4, 1.01e4, 0.0, -1.0, math.nan)),
         ("offset_counts", (1 - (1 << 31), (1 << 31) - 1), (-(1 << 31), 1 << 31)),
         ("sign", (-1, 1), (0, 2, -2)),
-        ("bits", (16, 32), (8, 15, 17, 31, 33, 64)),
+        ("bits", (8, 16, 32, 64), (7, 15, 17, 31, 33, 63, 65, 128)),
     ],
 )
 def test_an_axis_takes_its_numbers_up_to_their_ends(
@@ -66,12 +66,13 @@ def test_a_position_object_wraps_at_half_its_range() -> None:
 @pytest.mark.parametrize("bits", [16, 32])
 def test_a_position_is_the_nearest_that_shows_the_same(bits: int) -> None:
     whole, half = 1 << bits, 1 << (bits - 1)
+    nearest = AxisUnits(counts_per_rev=1000, bits=bits).nearest
     for near in (0, 5 * whole + 17, -3 * whole - 4):
         for move in (0, 1, -1, half - 1, -half, 12_345):
             shown = wrap(near + move, bits)
-            assert unwrap(shown, near, bits) == near + move
-            follower = Unwrapper(bits, near)
+            assert nearest(shown, near) == near + move
+            follower = Unwrapper(whole, near)
             assert follower.feed(shown) == near + move == follower.counts
         # Half the range and beyond is nearer from the other side.
-        assert unwrap(wrap(near + half, bits), near, bits) == near - half
-    assert unwrap(-half if bits == 32 else 7, 0) == (-half if bits == 32 else 7)
+        assert nearest(wrap(near + half, bits), near) == near - half
+    assert nearest(-half if bits == 32 else 7, 0) == (-half if bits == 32 else 7)

@@ -22,7 +22,7 @@ from legbench.drives.setup.config import (
     NodeConfig,
     PdoConfig,
 )
-from legbench.drives.setup.units import AxisUnits, unwrap, wrap
+from legbench.drives.setup.units import AxisUnits, wrap
 
 WHO = "drive 'knee' (node 2)"
 NEVER = 1 << 30
@@ -244,7 +244,7 @@ def test_a_frame_of_a_wrong_length_changes_nothing() -> None:
 @pytest.mark.parametrize("turns", [-2000, -1, 0, 1, 2000])
 def test_a_link_is_found_within_half_a_turn_of_its_motor_and_then_followed(turns: int) -> None:
     axis = AxisLink(node(1))
-    motor, link = axis.node.motor, axis.node.link
+    motor, link = axis.node.motor, axis.node.link_units
     motor_counts, link_counts = 0, 0
     for step in range(40):
         angle = 2.0 * math.pi * turns + 0.3 * step
@@ -263,7 +263,7 @@ def test_a_link_is_found_within_half_a_turn_of_its_motor_and_then_followed(turns
     axis.feed(0x182, motor_frame(0x37, -500) + link_frame(0)[:2])
     assert axis.motor_counts == -500
     near = link.to_counts(motor.to_rad(-500))
-    assert axis.link_counts == unwrap(0, near, 16)
+    assert axis.link_counts == link.nearest(0, near)
 
 
 def test_a_target_is_kept_unwrapped_and_sent_wrapped() -> None:

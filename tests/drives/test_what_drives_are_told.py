@@ -25,6 +25,7 @@ from legbench.drives.setup.config import (
 )
 from legbench.drives.setup.configuration import configuration, interpolation_time
 from legbench.drives.setup.eds import BAUD_RATES, dcf_text, eds_text
+from legbench.drives.setup.needs import Need, row_of
 from legbench.errors import ConfigError
 
 Told = list[tuple[str, str, int]]
@@ -51,8 +52,8 @@ USUAL: Told = [
     ("1029:1", "UNSIGNED8", 0),
     ("6007:0", "INTEGER16", 3),
     ("605A:0", "INTEGER16", 2),
-    ("60C2:1", "UNSIGNED8", 1),
     ("60C2:2", "INTEGER8", -3),
+    ("60C2:1", "UNSIGNED8", 1),
     ("60B0:0", "INTEGER32", 0),
     ("60B1:0", "INTEGER32", 0),
     ("60B2:0", "INTEGER16", 0),
@@ -145,8 +146,17 @@ def test_another_bus_is_told_in_other_numbers() -> None:
 
 
 def test_what_a_drive_may_lack_is_what_the_profile_lets_it_lack() -> None:
-    optional = {entry.index for entry in configuration(config(), node(0)) if entry.optional}
-    assert optional == {0x60B0, 0x60B1, 0x60B2, 0x607E, 0x605B, 0x605C, 0x605D, 0x605E}
+    entries = list({one.key: one for one in configuration(config(), node(0))}.values())
+    needs = {need: {one.index for one in entries if row_of(one).need is need} for need in Need}
+    process_data = {0x1400, 0x1600, 0x1A00, *range(0x1800, 0x1804)}
+    may_lack = {0x1005, 0x605A, 0x6060, 0x607E, 0x60B0, 0x60B1, 0x60B2, 0x60C2}
+    assert needs[Need.REQUIRED] == process_data | may_lack
+    assert needs[Need.PROTECTION] == {0x1006, 0x1016, 0x1017, 0x1400, 0x6007, 0x605E}
+    assert needs[Need.OPTIONAL] == {0x1029, 0x1401, 0x1402, 0x1403, 0x605B, 0x605C, 0x605D}
+    for entry in entries:
+        if row_of(entry).need is Need.REQUIRED:
+            spare = entry.index in (0x1801, 0x1802, 0x1803)
+            assert row_of(entry).may_lack == (entry.index in may_lack or spare), entry
 
 
 @pytest.mark.parametrize(

@@ -5,62 +5,94 @@ from pathlib import Path
 import numpy as np
 import pytest
 from exact_leg import exact_design  # pyright: ignore[reportMissingImports]
+from independent import differences, moved  # pyright: ignore[reportMissingImports]
+
+pytest.importorskip("heyoka")
 
 from legbench.design import LegDesign, load_design
-from legbench.design.setup import SetupKind
 from legbench.errors import ConfigError
-from legbench.modes.brake import at_energy, floquet, follow
-from legbench.modes.flow import flow, orbit
+from legbench.modes.carry import Carrier
+from legbench.modes.curve import curve_through
+from legbench.modes.family import Family, at_energy, follow
 from legbench.modes.linear import linear_modes
-from legbench.modes.scene import Scene, make_scene
-from legbench.modes.strict import check, curve_through, radial_line
+from legbench.modes.scene import Holding, Scene, make_scene
+from legbench.modes.strict import check, radial_line
 
 MODELS = Path(__file__).parents[2] / "models"
 EXACT = exact_design()
 PROTOTYPE = load_design(MODELS / "prototype.toml")
-FIXED = [SetupKind.HFTS, SetupKind.VFTS, SetupKind.FFS]
+HELD = [Holding.HFTS, Holding.VFTS, Holding.FFS, Holding.FLIGHT]
 
 
-def scene_of(design: LegDesign, kind: SetupKind = SetupKind.FFS, z2: float = 0.9) -> Scene:
+def scene_of(design: LegDesign, kind: Holding = Holding.FFS, z2: float = 0.9) -> Scene:
     return make_scene(design, kind, z2)
 
 
-@pytest.mark.parametrize("kind", FIXED)
-def test_linear_modes_are_what_small_oscillations_do(kind: SetupKind) -> None:
+def still(posture: np.ndarray) -> np.ndarray:
+    return np.concatenate([posture, [0.0, 0.0]])
+
+
+@pytest.mark.parametrize("kind", HELD)
+def test_linear_modes_are_what_small_oscillations_do(kind: Holding) -> None:
     scene = scene_of(PROTOTYPE, kind)
     for mode in linear_modes(scene).values():
-        start = np.concatenate([np.asarray(scene.rest) + 1e-5 * mode.shape, [0.0, 0.0]])
-        end, _ = flow(scene, start, 1.0 / mode.freq, np.eye(4)[:, :1])
+        start = still(np.asarray(scene.rest) + 1e-5 * mode.shape)
+        end = moved(scene, start, 1.0 / mode.freq)
         assert np.max(np.abs(end[:2] - start[:2])) < 1e-9
 
 
-@pytest.mark.parametrize("kind", FIXED)
-def test_modes_of_the_matched_leg_are_the_modal_axes(kind: SetupKind) -> None:
+@pytest.mark.parametrize("kind", HELD)
+def test_modes_of_the_matched_leg_are_the_modal_axes(kind: Holding) -> None:
     for mode in linear_modes(scene_of(EXACT, kind)).values():
         assert abs(mode.alignment - 1.0) < 1e-12
 
 
-def test_complex_steps_are_the_derivative_of_the_flow() -> None:
-    scene = scene_of(PROTOTYPE)
+@pytest.mark.parametrize("kind", HELD)
+def test_the_flow_and_its_derivative_are_those_of_another_integration(kind: Holding) -> None:
+    scene = scene_of(PROTOTYPE, kind)
+    carrier = Carrier(scene)
     start = np.array([-0.9, 0.8, 0.3, -0.2])
-    _, slope = flow(scene, start, 0.4, np.eye(4))
-    for index in range(4):
+    done = carrier.carry(start, 0.4)
+    assert np.allclose(done.end, moved(scene, start, 0.4), rtol=0.0, atol=1e-10)
+    assert np.allclose(done.by_start, differences(scene, start, 0.4), rtol=1e-6, atol=1e-6)
+    path = carrier.path(start, np.array([0.0, 0.1, 0.4]))
+    assert np.array_equal(path[0], start)
+    assert np.allclose(path[1], moved(scene, start, 0.1), rtol=0.0, atol=1e-10)
+    assert np.allclose(path[2], done.end, rtol=0.0, atol=1e-12)
+
+
+def test_the_derivative_by_dampers_and_motors_is_that_of_differences() -> None:
+    scene = scene_of(PROTOTYPE)
+    start, motor = np.array([-0.9, 0.8, 0.3, -0.2]), np.array([-0.8, 0.9])
+    done = Carrier(scene, (0.01, 0.02)).carry(start, 0.4, extra=0.003, motor=motor)
+    for place, at, step in ((7, 0, 1e-5), (8, 1, 1e-5), (9, 0, 1e-5), (10, 1, 1e-5)):
         ends = []
         for sign in (1.0, -1.0):
-            moved = start.copy()
-            moved[index] += sign * 1e-5
-            ends.append(flow(scene, moved, 0.4, np.eye(4)[:, :1])[0])
-        assert np.allclose((ends[0] - ends[1]) / 2e-5, slope[:, index], rtol=1e-5, atol=1e-5)
+            aside = sign * step * np.eye(2)[at]
+            dampers = np.array([0.013, 0.023]) + (aside if place < 9 else 0.0)
+            held = motor + (aside if place >= 9 else 0.0)
+            damping = (float(dampers[0]), float(dampers[1]))
+            ends.append(moved(scene, start, 0.4, damping=damping, motor=held))
+        slope = (ends[0] - ends[1]) / (2.0 * step)
+        assert np.allclose(done.by_parameters[:, place], slope, rtol=1e-5, atol=1e-6)
 
 
-@pytest.mark.parametrize("kind", FIXED)
-def test_the_matched_leg_is_strict_and_the_prototype_is_not(kind: SetupKind) -> None:
+def test_a_leg_that_runs_away_is_named() -> None:
+    scene = scene_of(EXACT)
+    with pytest.raises(ConfigError, match="cannot be followed for 1 s: it runs away"):
+        Carrier(scene).carry(np.array([0.0, 0.0, 1e9, -1e9]), 1.0)
+
+
+@pytest.mark.parametrize("kind", HELD)
+def test_the_matched_leg_is_strict_and_the_prototype_is_not(kind: Holding) -> None:
     found = [
         check(scene, radial_line(scene, 0.3), 1.0)
         for scene in (scene_of(EXACT, kind), scene_of(PROTOTYPE, kind))
     ]
     for name in ("geodesic", "force", "invariance"):
         assert getattr(found[0], name) < 1e-9, name
+    # Without gravity only inertia and springs are left, and the prototype's springs are equal.
+    for name in ("geodesic", "invariance"):
         assert getattr(found[1], name) > 1e-4, name
 
 
@@ -74,28 +106,29 @@ def test_a_crooked_curve_is_not_strict() -> None:
     assert found.invariance > 0.01
 
 
-@pytest.mark.parametrize("kind", FIXED)
-def test_radial_mode_of_the_matched_leg_is_straight_at_every_energy(kind: SetupKind) -> None:
+@pytest.mark.parametrize("kind", HELD)
+def test_radial_mode_of_the_matched_leg_is_straight_at_every_energy(kind: Holding) -> None:
     family = follow(scene_of(EXACT, kind), "radial", 0.2)
     assert family.largest >= 0.2
     for found in family.orbits:
-        assert found.bend < 1e-9
-        assert abs(found.start.sum()) < 1e-9
+        assert found.bend < 1e-8
+        assert abs(found.start.sum()) < 1e-8
 
 
 @pytest.mark.parametrize("name", ["radial", "polar"])
-def test_brake_orbits_close_and_keep_their_energy(name: str) -> None:
-    scene = scene_of(PROTOTYPE)
+@pytest.mark.parametrize("kind", [Holding.FFS, Holding.FLIGHT])
+def test_brake_orbits_close_and_keep_their_energy(kind: Holding, name: str) -> None:
+    scene = scene_of(PROTOTYPE, kind)
     family = follow(scene, name, 0.15)
     energies = [found.energy for found in family.orbits]
     assert np.all(np.diff(energies) > 0.0)
     linear = 1.0 / family.mode.freq
     assert abs(family.orbits[0].period / linear - 1.0) < 1e-3
-    assert abs(family.orbits[-1].period / linear - 1.0) > 1e-2
     for found in family.orbits[::4]:
-        path = orbit(scene, found.start, found.period, 3)
-        assert np.max(np.abs(path[1] - found.end)) < 1e-7
-        assert np.max(np.abs(path[2] - found.start)) < 1e-7
+        half = moved(scene, still(found.start), 0.5 * found.period)
+        assert np.max(np.abs(half - still(found.end))) < 1e-7
+        whole = moved(scene, still(found.start), found.period)
+        assert np.max(np.abs(whole - still(found.start))) < 1e-7
         assert abs(float(scene.potential(found.end)) - found.energy) < 1e-9
 
 
@@ -106,36 +139,92 @@ def test_polar_mode_bends_and_radial_mode_of_the_prototype_hardly() -> None:
     assert bends["polar"] > 0.05
 
 
+@pytest.mark.parametrize("design", [EXACT, PROTOTYPE], ids=["exact", "prototype"])
+@pytest.mark.parametrize("z2", [0.9, 2.04])
 @pytest.mark.parametrize("name", ["radial", "polar"])
-def test_floquet_multipliers_are_those_of_a_hamiltonian_flow(name: str) -> None:
-    scene = scene_of(EXACT)
-    found = follow(scene, name, 0.1).orbits[-1]
-    values = np.array(floquet(scene, found))
-    assert abs(np.prod(values) - 1.0) < 1e-7
-    assert np.sum(np.abs(values - 1.0) < 1e-3) >= 2
-    for value in values:
-        assert np.min(np.abs(values - 1.0 / value)) < 1e-4
+def test_multipliers_are_those_of_a_conservative_flow(
+    design: LegDesign, z2: float, name: str
+) -> None:
+    scene = scene_of(design, Holding.FFS, z2)
+    found = follow(scene, name, 0.05).orbits[-1]
+    matrix = found.monodromy
+    assert abs(matrix.determinant - 1.0) < 1e-8
+    assert abs(matrix.pair[0] * matrix.pair[1] - 1.0) < 1e-8
+    other = differences(scene, still(found.start), found.period)
+    assert np.allclose(other, matrix.matrix, rtol=0.0, atol=2e-5)
+    # The double eigenvalue one splits by the root of the differences' error.
+    values = np.linalg.eigvals(other)
+    rest = values[np.argsort(np.abs(values - 1.0))[2:]]
+    assert np.allclose(rest.sum().real, matrix.trace, rtol=0.0, atol=1e-3)
 
 
 def test_an_orbit_of_a_given_energy_is_found_or_refused_by_name() -> None:
     scene = scene_of(EXACT)
     family = follow(scene, "polar", 0.1)
-    found = at_energy(scene, family, 0.0625)
+    found = at_energy(family, 0.0625)
     assert abs(found.energy - 0.0625) < 1e-10
     with pytest.raises(ConfigError, match=r"polar mode does not exist at 50 J: it was followed"):
-        at_energy(scene, family, 50.0)
+        at_energy(family, 50.0)
+
+
+@pytest.mark.parametrize("share", [0.5, 1e-3])
+def test_an_orbit_below_the_first_one_is_solved_for(share: float) -> None:
+    scene = scene_of(PROTOTYPE)
+    family = follow(scene, "polar", 0.01)
+    energy = share * family.orbits[0].energy
+    found = at_energy(family, energy)
+    assert found.energy == pytest.approx(energy, rel=1e-9)
+    end = moved(scene, still(found.start), found.period)
+    assert np.max(np.abs(end - still(found.start))) < 1e-9
+    assert found.period == pytest.approx(1.0 / family.mode.freq, rel=1e-3)
+
+
+def test_an_orbit_that_is_the_linear_mode_to_all_digits_is_told() -> None:
+    family = follow(scene_of(PROTOTYPE), "polar", 0.01)
+    with pytest.raises(ConfigError, match=r"amplitude below 1e-05 rad, where the polar mode is"):
+        at_energy(family, 1e-14)
 
 
 def test_a_family_ends_at_the_joint_limits_and_says_so() -> None:
-    family = follow(scene_of(PROTOTYPE), "radial", 5.0)
-    assert family.ended == "a joint reaches its limit"
-    assert family.largest < 5.0
+    scene = scene_of(PROTOTYPE)
+    family = follow(scene, "radial", 5.0)
+    assert family.ended == f"the knee reaches its limit of 0.3 rad beyond {family.largest:.4g} J"
+    knees = [np.array([found.start, found.end]) @ [-1.0, 1.0] for found in family.orbits]
+    assert 0.3 <= np.min(knees) < 0.302
+
+
+def test_a_mode_whose_first_orbit_meets_a_stop_is_refused() -> None:
+    with pytest.raises(ConfigError, match=r"at its smallest, .* J, the knee reaches its limit"):
+        follow(scene_of(EXACT, Holding.HFTS, 0.3001 / np.sqrt(2.0)), "radial", 0.1)
+
+
+def resonant(design: LegDesign, name: str, z2: float = 1.11072) -> Family:
+    return follow(scene_of(design, Holding.FFS, z2), name, 0.1)
+
+
+@pytest.mark.parametrize("z2", [1.09, 1.11072, np.pi / np.sqrt(8.0), 1.13])
+def test_modes_are_told_apart_in_the_one_to_one_resonance(z2: float) -> None:
+    optimal = load_design(MODELS / "optimal.toml")
+    radial, polar = (resonant(optimal, name, z2) for name in ("radial", "polar"))
+    assert all(found.bend < 1e-4 for found in radial.orbits)
+    assert all(abs(found.start.sum()) < 1e-4 for found in radial.orbits)
+    for found in polar.orbits:
+        aside = found.start - np.asarray(polar.shooting.scene.rest)
+        assert abs(aside.sum()) > 3.0 * abs(aside[1] - aside[0])
+    for family in (radial, polar):
+        assert family.warnings[0].startswith("1:1 resonance: the linear frequencies")
+    again = moved(radial.shooting.scene, still(radial.orbits[-1].start), radial.orbits[-1].period)
+    assert np.max(np.abs(again - still(radial.orbits[-1].start))) < 1e-7
+
+
+def test_a_leg_far_from_resonance_is_not_warned_of() -> None:
+    assert follow(scene_of(EXACT), "radial", 0.05).warnings == ()
 
 
 @pytest.mark.parametrize("z2", [2.6, 0.1])
 def test_a_set_point_past_the_limits_is_named(z2: float) -> None:
     with pytest.raises(ConfigError, match=r"design 'prototype' allows .* and \(0.3, 2.9\)"):
-        make_scene(PROTOTYPE, SetupKind.VFTS, z2)
+        make_scene(PROTOTYPE, Holding.VFTS, z2)
 
 
 def test_a_leg_too_soft_to_stand_is_named() -> None:
@@ -149,7 +238,7 @@ def test_a_leg_too_soft_to_stand_is_named() -> None:
         damping=(0.0, 0.0),
     )
     with pytest.raises(ConfigError, match="no stable equilibrium"):
-        make_scene(soft, SetupKind.FFS, 0.9)
+        make_scene(soft, Holding.FFS, 0.9)
 
 
 def test_bad_questions_are_named() -> None:

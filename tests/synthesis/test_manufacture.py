@@ -32,17 +32,20 @@ def test_the_weight_does_what_it_says(light: float, aside: float, slim: float) -
         target, mass=light * target.mass, com=target.com + aside, inertia=slim * target.inertia
     )
     weight = adjust("thigh", measured, target)
-    halves = [
-        (0.5 * weight.mass, weight.position + sign * weight.half_spread, 0.0) for sign in (-1, 1)
-    ]
-    mass, com, inertia = combined([(measured.mass, measured.com, measured.inertia), *halves])
+    lumps = [(lump.mass, lump.position, 0.0) for lump in weight.lumps]
+    mass, com, inertia = combined([(measured.mass, measured.com, measured.inertia), *lumps])
     assert mass == pytest.approx(target.mass, rel=1e-12)
     assert com == pytest.approx(target.com, abs=1e-12)
     assert inertia == pytest.approx(weight.inertia_after, rel=1e-9)
     assert weight.inertia_missing == pytest.approx(target.inertia - inertia, abs=1e-15)
-    if weight.half_spread > 0.0:
-        assert weight.position - weight.half_spread >= -1e-12
-        assert weight.position + weight.half_spread <= target.length + 1e-12
+    if len(lumps) > 1:
+        assert all(-1e-12 <= at <= target.length + 1e-12 for _, at, _ in lumps)
+        assert all(part > 0.0 for part, _, _ in lumps)
+        _, centre, spread = combined(lumps)
+        most = weight.mass * centre * (target.length - centre)
+        assert weight.inertia_missing == pytest.approx(
+            max(0.0, target.inertia - (inertia - spread) - most), abs=1e-15
+        )
 
 
 def test_a_part_that_is_right_needs_nothing() -> None:
@@ -83,7 +86,7 @@ def test_a_leg_whose_parts_all_reach_their_targets_is_matched() -> None:
         sign * weight.inertia_missing
         for sign, weight in zip((-1.0, 1.0, -1.0), adjusted.adjustments, strict=True)
     )
-    assert adjusted.after[0].residual == pytest.approx(-missing, abs=1e-15)
+    assert adjusted.after[0].residual == pytest.approx(missing, abs=1e-15)
 
 
 def test_another_leg_is_refused() -> None:

@@ -16,7 +16,7 @@ from legbench.kinematics import leg_points
 from legbench.metrics import Reference, rate
 from legbench.plant.analytic import AnalyticPlant
 from legbench.plant.start import Start
-from legbench.signals import Floats, Observation
+from legbench.signals import Command, Floats
 from legbench.synthesis.release import KEPT, Ratings, Release, rate_legs, released
 from legbench.synthesis.scatter import scatter
 from legbench.synthesis.tolerance import Tolerances
@@ -46,8 +46,8 @@ def potential(leg: LegDesign, joint_pos: Floats, motor_pos: Floats, support: Sup
 @pytest.mark.parametrize("support", SETUPS)
 def test_legs_are_found_where_their_potential_energy_is_least(support: Support) -> None:
     release = Release(setup=SETUPS[support], z2=1.2, dz2=0.2)
-    _, start = released([LEG] * len(MADE), MADE, release)
-    for leg, joint_pos, motor_pos in zip(MADE, start.joint_pos, start.motor_pos, strict=True):
+    legs = released([LEG] * len(MADE), MADE, release)
+    for leg, joint_pos, motor_pos in zip(MADE, legs.start, legs.held, strict=True):
         least = minimize(
             lambda q, leg=leg, motor=motor_pos: potential(leg, q, motor, support),
             motor_pos,
@@ -60,43 +60,22 @@ def test_legs_are_found_where_their_potential_energy_is_least(support: Support) 
 
 @pytest.mark.parametrize("kind", [SetupKind.FFS, SetupKind.VFTS])
 def test_many_legs_at_once_are_rated_as_one_by_the_equations_of_the_paper(kind: SetupKind) -> None:
-    """MuJoCo's batch against the analytic plant, which shares neither model nor integrator."""
+    """Runge-Kutta on arrays against the analytic plant, which goes from row to row by DOP853."""
     release = Release(setup=kind, z2=1.2, dz2=0.2, duration=0.25, reference=Reference.MOTOR)
     unequal = [replace(leg, stiffness=(1.1 * leg.stiffness[0], leg.stiffness[1])) for leg in MADE]
-    nominal = [LEG] * len(unequal)
-    found = rate_legs(nominal, unequal, release)
+    found = rate_legs([LEG] * len(unequal), unequal, release)
     assert not found.faulted.any()
-    controller, start = released(nominal, unequal, release)
+    legs = released([LEG] * len(unequal), unequal, release)
     for place, leg in enumerate(unequal):
-        begin = Start(joint_pos=start.joint_pos[place], motor_pos=start.motor_pos[place])
-        _, alone = released([LEG], [leg], release)
-        np.testing.assert_array_equal(alone.joint_pos[0], begin.joint_pos)
+        alone = released([LEG], [leg], release)
+        np.testing.assert_array_equal(alone.start[0], legs.start[place])
+        begin = Start(joint_pos=legs.start[place], motor_pos=legs.held[place])
+        command = Command.holding(legs.motor[place])
         with AnalyticPlant(leg, Setup(kind=kind), begin) as plant:
-            seen, rows = plant.reset(), []
-            controller.reset(seen_by_all(seen, len(unequal)))
-            for _ in range(250):
-                command = controller.step(seen_by_all(seen, len(unequal)))
-                target = command.motor_pos[place]
-                seen = plant.step(replace(command, motor_pos=target, phase=command.phase[place]))
-                rows.append(seen.joint_pos - target)
-        assert found.values[place] == pytest.approx(rate(np.array(rows)), abs=2e-3)
+            plant.reset()
+            rows = [plant.step(command).joint_pos - legs.motor[place] for _ in range(250)]
+        assert found.values[place] == pytest.approx(rate(np.array(rows)), abs=1e-5)
     assert float(np.ptp(found.values)) > 1e-3
-
-
-def seen_by_all(seen: Observation, count: int) -> Observation:
-    """An observation of one leg, as often as there are legs."""
-
-    def tiled(values: Floats) -> Floats:
-        return np.tile(values, (count, 1))
-
-    return Observation(
-        time=seen.time,
-        motor_pos=tiled(seen.motor_pos),
-        joint_pos=tiled(seen.joint_pos),
-        joint_vel=tiled(seen.joint_vel),
-        spring_torque=tiled(seen.spring_torque),
-        applied_pos=tiled(seen.applied_pos),
-    )
 
 
 def test_the_yield_is_the_share_that_keeps_its_mode() -> None:

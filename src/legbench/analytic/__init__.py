@@ -1,10 +1,16 @@
 """The leg on paper: equations of motion, impact and hybrid integration, without a simulator."""
 
-from legbench.analytic.hybrid import HybridLeg, land
+from typing import TYPE_CHECKING
+
+from legbench.analytic.contact import land
 from legbench.analytic.model import LegModel
-from legbench.analytic.smooth import Accuracy, Method
 from legbench.analytic.state import LegState, Regime, Transition, energy, flying, standing
 from legbench.analytic.terms import Bars, FloatingTerms, PairTerms, floating_terms, stance_terms
+from legbench.lazily import lazy_names
+
+if TYPE_CHECKING:
+    from legbench.analytic.hybrid import HybridLeg
+    from legbench.analytic.smooth import Accuracy, Method
 
 __all__ = [
     "Accuracy",
@@ -24,3 +30,13 @@ __all__ = [
     "stance_terms",
     "standing",
 ]
+
+# scipy alone takes several times as long to import as NumPy, and the compiled leg needs none of it.
+__getattr__ = lazy_names(
+    __name__,
+    {
+        "Accuracy": "legbench.analytic.smooth",
+        "HybridLeg": "legbench.analytic.hybrid",
+        "Method": "legbench.analytic.smooth",
+    },
+)

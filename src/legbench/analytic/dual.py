@@ -6,11 +6,12 @@ control law or an equation differentiates itself.
 """
 
 import math
-from typing import Self
+from dataclasses import fields, is_dataclass, replace
+from typing import Any, Self
 
 import numpy as np
 
-from legbench.analytic.equations import Ops
+from legbench.analytic.equations import SCALAR, Ops, Pair
 from legbench.signals import Floats
 
 
@@ -86,3 +87,26 @@ def _sqrt(value: float) -> Dual:
 
 
 DUAL = Ops(sin=_sin, cos=_cos, sqrt=_sqrt)
+
+
+def without_gradients(value: Any) -> Any:
+    """Constants as plain floats, computing with plain functions.
+
+    Args:
+        value: a number, or tuples and frozen dataclasses of numbers.
+    """
+    if isinstance(value, Ops):
+        return SCALAR
+    if isinstance(value, Dual):
+        return float(value)
+    if isinstance(value, tuple):
+        return tuple(without_gradients(part) for part in value)
+    if is_dataclass(value) and not isinstance(value, type):
+        parts = {part.name: getattr(value, part.name) for part in fields(value)}
+        return replace(value, **{name: without_gradients(part) for name, part in parts.items()})
+    return value
+
+
+def floats(pair: Pair) -> Pair:
+    """A pair without gradients."""
+    return float(pair[0]), float(pair[1])

@@ -68,6 +68,18 @@ def pair_solve(ops: Ops, terms: PairTerms, q: Pair, right: Pair) -> Pair:
     )
 
 
+def pair_share(ops: Ops, terms: PairTerms, q: Pair, along: Pair) -> Pair:
+    """Accelerations that a torque `along` gives, per acceleration `along` itself [-].
+
+    `M^-1 n / (n . M^-1 n)`, where the determinant of M drops out.
+    """
+    (i1, i2), mixed = terms.inertia, terms.coupling
+    cosine = mixed * ops.cos(q[0] - q[1])
+    first, second = i2 * along[0] - cosine * along[1], i1 * along[1] - cosine * along[0]
+    whole = along[0] * first + along[1] * second
+    return first / whole, second / whole
+
+
 def pair_acceleration(ops: Ops, terms: PairTerms, q: Pair, v: Pair, torque: Pair) -> Pair:
     """Eq. (1) solved for the accelerations: `M^-1 (tau - C qdot - g)` [rad/s^2]."""
     bias = pair_bias(ops, terms, q, v)

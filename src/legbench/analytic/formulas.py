@@ -1,130 +1,133 @@
 """The equations of one regime as formulas for the Taylor integrator, and its events."""
 
-from enum import IntEnum
 from typing import Any
 
 from legbench.analytic._heyoka import SYMBOLS
 from legbench.analytic._heyoka import heyoka as hy
 from legbench.analytic.equations import (
     Pair,
-    contact_force,
-    free_foot_acceleration,
+    damped,
     pair_acceleration,
-    pair_solve,
+    pair_share,
+    spring_torque,
     sweep,
+    sweep_acceleration,
 )
-from legbench.analytic.model import LegModel
-from legbench.analytic.state import Regime
+from legbench.analytic.places import (
+    ALONG,
+    COUPLING,
+    DAMPING,
+    FREE_COUPLING,
+    FREE_INERTIA,
+    FREE_PUSHES,
+    FRICTION,
+    GAIN,
+    GRAVITY,
+    HEIGHT,
+    INERTIA,
+    LEVEL,
+    MOMENT,
+    MOTOR,
+    PROBE,
+    PUSHES,
+    SHARPNESS,
+    SPEED,
+    STIFFNESS,
+    Event,
+    Kind,
+)
+from legbench.analytic.stops import HIP, KNEE, TIME_CONSTANT, Stop
 from legbench.analytic.terms import PairTerms
+from legbench.design.statics import GRAVITY as EARTH
 
-RISING, FALLING = hy.event_direction.positive, hy.event_direction.negative
-EITHER = hy.event_direction.any
-MOTOR, FALL, UPPER, LOWER, TURNS, STOPS = 0, 2, 4, 5, 6, 7
-"""Places of the parameters: two motor positions, height and rise of the falling centre of mass,
-two levels, whether turning counts (of a leg at rest the probe would turn all the time), and for
-each stop whether its joint is beyond the limit and whether it pushes."""
-FORCE = 0
-"""Place of the event that the contact force vanishes, first of the two conditions of lift-off."""
+STATE = hy.make_vars("q1", "q2", "v1", "v2")
+"""Angles and their rates."""
 
 
-class Watched(IntEnum):
-    """What can end an integration."""
-
-    CONTACT = 0
-    """Touchdown or lift-off."""
-    RISE = 1
-    """The probe rises through the upper level."""
-    FALL = 2
-    """The probe falls through the lower level."""
-    TURN = 3
-    """The probe turns round."""
-    STOP = 4
-    """A joint meets or leaves a limit, or its stop begins or ends to push."""
+def pair_at(place: int) -> Pair:
+    """Two parameters side by side."""
+    return hy.par[place], hy.par[place + 1]
 
 
-def steady_point(model: LegModel, regime: Regime) -> tuple[Pair, float]:
-    """First moments per mass of the point that moves steadily, seen from the hip [m], and its fall
-    [m/s^2].
+def smooth_system(*, friction: bool) -> list[tuple[Any, Any]]:
+    """The equations of motion of two angles, without stops.
+
+    Friction is Coulomb's, `-f_i tanh(s v_i)`, smooth for the sake of the series.
     """
-    match regime:
-        case Regime.FLIGHT:
-            mass, first = model.floating.mass, model.floating.first
-            return (first[0] / mass, first[1] / mass), model.floating.gravity
-        case Regime.STANCE:
-            return (model.floating.reach, model.floating.reach), 0.0
-        case _:
-            return (0.0, 0.0), 0.0
+    q, v = STATE[:2], STATE[2:]
+    torque = _torque(q, v)
+    if friction:
+        rubbing, sharpness = pair_at(FRICTION), hy.par[SHARPNESS]
+        torque = (
+            torque[0] - rubbing[0] * hy.tanh(sharpness * v[0]),
+            torque[1] - rubbing[1] * hy.tanh(sharpness * v[1]),
+        )
+    a = pair_acceleration(SYMBOLS, _terms(), q, v, torque)
+    return [(STATE[0], v[0]), (STATE[1], v[1]), (STATE[2], a[0]), (STATE[3], a[1])]
 
 
-def terms_of(model: LegModel, regime: Regime) -> PairTerms:
-    """How the angles turn about the steady point."""
-    match regime:
-        case Regime.FLIGHT:
-            return model.falling
-        case Regime.STANCE:
-            return model.stance
-        case _:
-            return model.hanging
+def stopped_system() -> tuple[list[tuple[Any, Any]], list[Any]]:
+    """The equations of motion with the stops that push, and what each stop's law asks for."""
+    q, v = STATE[:2], STATE[2:]
+    a = pair_acceleration(SYMBOLS, _terms(), q, v, _torque(q, v))
+    a, pushes = _pushed(_terms(), q, v, a, (PUSHES, PUSHES + 2))
+    return [(STATE[0], v[0]), (STATE[1], v[1]), (STATE[2], a[0]), (STATE[3], a[1])], pushes
 
 
-def equations_of(
-    model: LegModel, regime: Regime, q: Any, v: Any
-) -> tuple[Pair, list[Any], list[Any]]:
-    """Accelerations of the angles, events of the contact, events of the stops.
-
-    Lift-off has two conditions, and the event of either may come last (see `hybrid`).
-    """
-    torque = model.torque((hy.par[MOTOR], hy.par[MOTOR + 1]), q, v)
-    floating = model.floating
-    a, stops = _stopped(model, terms_of(model, regime), q, v, torque)
-    ground: list[Any] = []
-    if regime is Regime.FLIGHT:
-        (first, second), gravity = steady_point(model, regime)
-        foot = sweep(SYMBOLS, q, (floating.reach - first, floating.reach - second))[1]
-        fallen = hy.par[FALL + 1] * hy.time - 0.5 * gravity * (hy.time * hy.time)
-        ground = [(Watched.CONTACT, hy.par[FALL] + fallen + foot, FALLING)]
-    elif regime is Regime.STANCE:
-        force = contact_force(SYMBOLS, floating, q, v, a)[1]
-        free = _let_go(model, q, v, torque)
-        released = free_foot_acceleration(SYMBOLS, floating, q, v, free)[1]
-        ground = [(Watched.CONTACT, force, FALLING), (Watched.CONTACT, released, RISING)]
-    return a, ground, stops
-
-
-def _stopped(
-    model: LegModel, terms: PairTerms, q: Any, v: Any, torque: Pair
-) -> tuple[Pair, list[Any]]:
-    """Accelerations with the stops that push (`analytic.stops.pushes`), and the stops' events."""
-    a = pair_acceleration(SYMBOLS, terms, q, v, torque)
-    events = []
-    for index, stop in enumerate(model.stops):
-        beyond, pushing = (hy.par[STOPS + 2 * index + place] for place in (0, 1))
-        answer = pair_solve(SYMBOLS, terms, q, stop.normal)
-        push = stop.push(q, v, a, answer)
-        a = a[0] + pushing * push * answer[0], a[1] + pushing * push * answer[1]
-        events += [
-            (Watched.STOP, stop.depth(q), EITHER),
-            (Watched.STOP, beyond * push + (1.0 - beyond), EITHER),
-        ]
-    return a, events
-
-
-def _let_go(model: LegModel, q: Any, v: Any, torque: Pair) -> Pair:
-    """Accelerations that the standing leg would have in the air; there other stops may push."""
-    a = pair_acceleration(SYMBOLS, model.falling, q, v, torque)
-    for index, stop in enumerate(model.stops):
-        answer = pair_solve(SYMBOLS, model.falling, q, stop.normal)
-        push = hy.par[STOPS + 2 * index] * hy.relu(stop.push(q, v, a, answer))
-        a = a[0] + push * answer[0], a[1] + push * answer[1]
-    return a
-
-
-def probed(probe: Pair, q: Any, v: Any) -> list[Any]:
-    """Events of a probe: through its upper level, through its lower level, turning round."""
+def events(kind: Kind, a: Pair, pushes: list[Any]) -> dict[Event, Any]:
+    """Event functions of a regime whose angles accelerate by `a`; each counts when it rises."""
+    q, v = STATE[:2], STATE[2:]
+    probe = pair_at(PROBE)
     reading, rate = (probe[0] * x[0] + probe[1] * x[1] for x in (q, v))
-    turning = hy.par[TURNS] * rate + (1.0 - hy.par[TURNS])
-    return [
-        (Watched.RISE, reading - hy.par[UPPER], RISING),
-        (Watched.FALL, reading - hy.par[LOWER], FALLING),
-        (Watched.TURN, turning, EITHER),
-    ]
+    lean, knee = q[0] + q[1], q[1] - q[0]
+    readings: list[Any] = [reading, reading, rate, lean, lean, knee, knee, q[0], q[0], *pushes]
+    readings += _ground(kind, q, v, a)
+    return {
+        event: hy.par[GAIN + event] * value - hy.par[LEVEL + event]
+        for event, value in zip(Event, readings, strict=False)
+    }
+
+
+def _ground(kind: Kind, q: Any, v: Any, a: Pair) -> list[Any]:
+    """Height of the foot in flight; force and acceleration of the released foot in stance."""
+    along, gravity = pair_at(ALONG), hy.par[GRAVITY]
+    if kind is Kind.FLIGHT:
+        fallen = hy.par[SPEED] * hy.time - 0.5 * gravity * (hy.time * hy.time)
+        return [hy.par[HEIGHT] + fallen + sweep(SYMBOLS, q, along)[1]]
+    force = (sweep_acceleration(SYMBOLS, q, v, a, along)[1] + gravity) / EARTH
+    if kind is Kind.STANCE:
+        return [force]
+    if kind is Kind.HELD:
+        free = PairTerms(
+            inertia=pair_at(FREE_INERTIA), coupling=hy.par[FREE_COUPLING], moment=(0.0, 0.0)
+        )
+        bare = pair_acceleration(SYMBOLS, free, q, v, _torque(q, v))
+        let_go, pushes = _pushed(free, q, v, bare, (FREE_PUSHES, FREE_PUSHES + 1))
+        released = -(sweep_acceleration(SYMBOLS, q, v, let_go, along)[1] + gravity) / EARTH
+        return [released, force, *pushes]
+    return []
+
+
+def _terms() -> PairTerms:
+    return PairTerms(inertia=pair_at(INERTIA), coupling=hy.par[COUPLING], moment=pair_at(MOMENT))
+
+
+def _torque(q: Any, v: Any) -> Pair:
+    return damped(spring_torque(pair_at(STIFFNESS), pair_at(MOTOR), q), pair_at(DAMPING), v)
+
+
+def _pushed(
+    terms: PairTerms, q: Any, v: Any, a: Pair, switches: tuple[int, int]
+) -> tuple[Pair, list[Any]]:
+    """`analytic.stops.pushes`, switched by parameters instead of comparisons.
+
+    Of a joint's two stops one acts at most, and the sign of its law cancels in what it adds.
+    """
+    found = []
+    for on, place, limit in zip((KNEE, HIP), switches, (PUSHES + 1, PUSHES + 3), strict=True):
+        stop = Stop(sign=1.0, limit=hy.par[limit], on=on)
+        turn, share = stop.turn(q, v, a), pair_share(SYMBOLS, terms, q, stop.normal)
+        pushed = hy.par[place] * turn
+        a = a[0] + pushed * share[0], a[1] + pushed * share[1]
+        found.append(TIME_CONSTANT**2 * turn)
+    return a, found

@@ -7,6 +7,7 @@ from enum import StrEnum
 import numpy as np
 from scipy.integrate import DOP853, RK45, OdeSolver
 
+from legbench.analytic.contact import MIN_PHASE
 from legbench.errors import ConfigError, PlantFault
 from legbench.signals import Floats
 
@@ -42,7 +43,7 @@ class Accuracy:
     """Absolute error per step [rad, rad/s, m, m/s]."""
     max_step: float = 0.005
     """Longest step: an event function crosses zero at most once in an eighth of it [s]."""
-    min_phase: float = 2e-4
+    min_phase: float = MIN_PHASE
     """Stance and flight last at least this long after an event, so that none repeats [s]."""
     fixed_step: float | None = None
     """Take steps of this length whatever the error; for measuring the order [s]."""

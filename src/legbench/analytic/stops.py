@@ -21,6 +21,11 @@ TIME_CONSTANT = 0.01
 IMPEDANCE = 0.95
 """Share of the acceleration that is the stop's, not the leg's own [-]."""
 
+KNEE: Pair = (-1.0, 1.0)
+"""How the knee's angle is made of q1 and q2."""
+HIP: Pair = (1.0, 0.0)
+"""How the hip's angle is made of q1 and q2."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stop:
@@ -46,25 +51,34 @@ class Stop:
         """Rate of the depth [rad/s]."""
         return -self.sign * (self.on[0] * v[0] + self.on[1] * v[1])
 
-    def push(self, q: Pair, v: Pair, a: Pair, answer: Pair) -> Term:
-        """Torque that the law asks for, of a joint beyond its limit; below zero there is none.
+    def turn(self, q: Pair, v: Pair, a: Pair) -> Term:
+        """Acceleration that the law asks for beyond that of the leg itself, away from the limit.
+
+        Below zero the stop would have to pull, and does nothing [rad/s^2].
 
         Args:
             q: angles [rad].
             v: their rates [rad/s].
             a: their accelerations without this stop [rad/s^2].
-            answer: `M^-1 normal`, what a unit push adds to them [rad/s^2 / N m].
         """
         n1, n2 = self.normal
         back = 2.0 / TIME_CONSTANT * self.speed(v) + self.depth(q) / TIME_CONSTANT**2
-        return (back - IMPEDANCE * (n1 * a[0] + n2 * a[1])) / (n1 * answer[0] + n2 * answer[1])
+        return back - IMPEDANCE * (n1 * a[0] + n2 * a[1])
+
+    def push(self, q: Pair, v: Pair, a: Pair, answer: Pair) -> Term:
+        """Torque that the law asks for, of a joint beyond its limit; below zero there is none.
+
+        `answer` is `M^-1 normal`, what a unit push adds to the accelerations [rad/s^2 / N m].
+        """
+        n1, n2 = self.normal
+        return self.turn(q, v, a) / (n1 * answer[0] + n2 * answer[1])
 
 
 def make_stops(limits: Limits) -> tuple[Stop, ...]:
     """Stops of knee and hip, lower and upper end each."""
     joints: tuple[tuple[Pair, tuple[float, float]], ...] = (
-        ((-1.0, 1.0), limits.knee),
-        ((1.0, 0.0), limits.hip),
+        (KNEE, limits.knee),
+        (HIP, limits.hip),
     )
     return tuple(
         Stop(sign=sign, limit=limit, on=on)

@@ -1,64 +1,99 @@
-"""How the end of an integration moves with its beginning: heyoka's variational equations.
+"""How the end of a piece moves with its beginning: heyoka's variational equations.
 
-Along the way the compiled integrator carries the derivative of the state by the state at the
-start. At the end comes what a shift of the end's time adds: an event happens where its function
-vanishes, so the function's own derivatives say by how much the event shifts. Chained over events
-this is the product of transition and saltation matrices.
+Along the way an integrator of its own carries the derivative of the state by the state at the
+start and by the parameters of the leg. At the end comes what a shift of the end's time adds: an
+event happens where its function vanishes, and the function, run on dual numbers, says by how much
+the event shifts (`Course`). Chained over events this is the product of transition and saltation
+matrices.
 """
 
-from typing import Any, final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 
-from legbench.analytic._heyoka import heyoka as hy
+from legbench.analytic.compiled import parameters_of, varied_integrator
 from legbench.analytic.dual import Dual, gradient
+from legbench.analytic.equations import SCALAR, Pair
+from legbench.analytic.places import HEIGHT, MOTOR, PROBE, SMOOTH, SPEED
+from legbench.analytic.readings import read
 from legbench.signals import Floats
+
+if TYPE_CHECKING:
+    from legbench.analytic.course import Course
+
+STATES = 4
+"""Two angles and their rates [-]."""
 
 
 @final
 class Variation:
-    """Derivatives along one compiled integrator of n states, of any number of seeds m."""
+    """Derivatives along the pieces of a course, by any number of seeds m.
 
-    def __init__(self, integrator: Any, system: list[Any], events: list[Any], pars: int) -> None:
-        self._integrator, self._size, self._pars = integrator, len(system), pars
-        time = hy.make_vars("t")
-        variables = [*(variable for variable, _ in system), time]
-        sources = [*variables, *(hy.par[index] for index in range(pars))]
-        timed = [hy.subs(event, {hy.time: time}) for event in events]
-        slopes = [hy.diff(event, source) for event in timed for source in sources]
-        self._slopes = hy.cfunc([rate for _, rate in system] + slopes, vars=variables)
-        self._start: list[float] = []
-        self._levels: list[float] = []
+    Seeds may be in the state, in the levels of events, and in the parameters of the leg.
+    """
 
-    def begin(self, start: list[float]) -> None:
-        """Differentiate from here on; the numbers of `start` may be dual."""
-        self._start = start
-        self._integrator.state[self._size :] = np.eye(self._size).ravel()
+    def __init__(self, tolerance: float) -> None:
+        self._integrator = varied_integrator(tolerance)
 
-    def set(self, pars: list[float]) -> None:
-        """Parameters of the events, which may be dual; motors may not."""
-        self._levels = pars
+    def carry(self, course: "Course", q: Pair, v: Pair, until: float, event: int | None) -> None:
+        """Carry the derivatives of a course through a piece, and begin the next one at its end.
 
-    def end(self, elapsed: float, event: int | None) -> tuple[Dual, list[Dual]]:
-        """Time since the beginning and state there, both dual.
-
-        `elapsed` is when the integration was to end, unless an event ended it.
+        Args:
+            course: dual numbers at the beginning of the piece.
+            q: angles at the end [rad].
+            v: rates at the end [rad/s].
+            until: time at which the piece was to end [s].
+            event: the event that ended it, if one did.
         """
-        integrator, size = self._integrator, self._size
-        state, time = integrator.state[:size], float(integrator.time)
-        values = self._slopes(np.append(state, time), pars=integrator.pars)
-        rates, slopes = values[:size], values[size:].reshape(-1, size + 1 + self._pars)
-        moved = integrator.state[size:].reshape(size, size) @ _gradients(self._start)
+        watch, plain = course.watch, course.plain
+        time = float(watch.integrator.time)
+        varied = parameters_of(course.model, course.regime, course.probe)[:MOTOR]
+        start = [*course.q, *course.v]
+        moved = self._moved(start, watch.pars, time, [*varied, *course.motor])
+        torque = plain.torque(course.plain_motor, q, v)
+        a = course.bumpers.turns(SCALAR, course.terms, torque, q, v)[1]
+        values, rates = [*q, *v], np.array([*v, *a])
         if event is None:
-            shift = gradient(elapsed)
+            shift = gradient(until - course.began)
         else:
-            by_state, by_time, by_pars = np.split(slopes[event], (size, size + 1))
-            change = by_state @ moved + by_pars[: len(self._levels)] @ _gradients(self._levels)
-            shift = -change / (by_state @ rates + by_time[0])
-        ends = moved + np.multiply.outer(rates, shift)
-        return Dual(time, shift), [
-            Dual(x, row) for x, row in zip(state.tolist(), ends, strict=True)
-        ]
+            gain, level = watch.gain[event], watch.level[event]
+            reading = read(course, event, _duals(values, moved), time)
+            change = gradient(gain * reading - level)
+            timed, elapsed = _duals(values, rates[:, np.newaxis]), Dual(time, np.ones(1))
+            reading = read(course, event, timed, elapsed, plain=True)
+            shift = -change / (gain * gradient(reading)[0])
+        q1, q2, v1, v2 = _duals(values, moved + np.multiply.outer(rates, shift))
+        course.q, course.v = (q1, q2), (v1, v2)
+        course.time = until if event is None else course.began + Dual(time, shift)
+        if watch.flies:
+            course.point, course.drift = course.centre()
+            watch.pars[HEIGHT], watch.pars[SPEED] = course.point[1], course.drift[1]
+        course.began = course.time
+        watch.integrator.time = 0.0
+
+    def _moved(self, start: list[float], pars: Floats, time: float, varied: list[float]) -> Floats:
+        """How the state at a fixed time moves with the seeds (4, m).
+
+        Args:
+            start: state at the beginning of the piece (4,), which may be dual.
+            pars: parameters of the integrator that has gone through the piece.
+            time: length of the piece [s].
+            varied: the first `SMOOTH` of the parameters, which may be dual.
+        """
+        integrator = self._integrator
+        integrator.time = 0.0
+        integrator.state[:STATES] = start
+        integrator.state[STATES:] = np.eye(STATES, STATES + SMOOTH).ravel()
+        integrator.pars[:] = pars[:PROBE]
+        integrator.propagate_until(time)
+        slope = integrator.state[STATES:].reshape(STATES, STATES + SMOOTH)
+        by_state, by_pars = np.split(slope, (STATES,), axis=1)
+        return by_state @ _gradients(start) + by_pars @ _gradients(varied)
+
+
+def _duals(values: list[float], slopes: Floats) -> list[Dual]:
+    """Numbers with their gradients, one a row (n, m)."""
+    return [Dual(value, row) for value, row in zip(values, slopes, strict=True)]
 
 
 def _gradients(values: list[float]) -> Floats:

@@ -11,6 +11,7 @@ from legbench.cli.parse import parse
 from legbench.design import LegDesign, load_design
 from legbench.design.matching import TOLERANCE, Parameters, check_conditions, standing_angle
 from legbench.design.mending import mends
+from legbench.design.realisable import reaches
 from legbench.errors import ConfigError
 from legbench.strict_json import null_for_nan
 
@@ -45,7 +46,7 @@ class CheckArguments:
 
 def main(arguments: list[str]) -> int:
     """Run `legbench check`: print the verdict on each condition."""
-    from legbench.synthesis.report import condition_lines
+    from legbench.synthesis.report import condition_lines, reach_lines
 
     chosen = parse(CheckArguments, "check", arguments)
     if not chosen.tolerance >= 0.0:
@@ -71,6 +72,10 @@ def main(arguments: list[str]) -> int:
             for condition in conditions
         },
     }
+    lines += reach_lines(design)
+    content["reaches"] = [
+        {**asdict(reach), "realisable": reach.realisable} for reach in reaches(design)
+    ]
     agrees = True
     if chosen.model:
         agrees = _model(design, content, lines)

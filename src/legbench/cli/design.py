@@ -1,7 +1,7 @@
 """`legbench design`: from requirements to a leg that can be built."""
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -41,6 +41,8 @@ class DesignArguments:
     """Limit of evaluations; by default 20000, with --tolerances 800."""
     trace: Path | None = None
     """File that keeps every evaluation; a search whose file exists is continued."""
+    overhang: float | None = None
+    """Largest reach of mass beyond both joints of its segment [m]; the paper does not ask."""
     cross_check: bool = True
     """Whether to search by differential evolution as well, and compare."""
     tolerances: str | None = None
@@ -96,12 +98,17 @@ def main(arguments: list[str]) -> int:
 
 
 def requirements_of(chosen: DesignArguments) -> Requirements:
-    """Requirements of the preset or the file that the flags name.
+    """Requirements of the preset or file that the flags name, with the constraint of a flag.
 
     Raises:
         DesignError: a file or a body mass that makes no sense.
         ConfigError: a preset without its mass, or a mass without its preset.
     """
+    found = _named(chosen)
+    return found if chosen.overhang is None else replace(found, overhang=chosen.overhang)
+
+
+def _named(chosen: DesignArguments) -> Requirements:
     if chosen.requirements == "quadruped":
         if chosen.mass is None:
             raise ConfigError("preset 'quadruped' needs the body's --mass [kg]; the paper's is 4")

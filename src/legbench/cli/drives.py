@@ -10,6 +10,7 @@ from legbench.cli import (
     drives_reading,
     drives_service,
     drives_serving,
+    drives_sheets,
     drives_timing,
 )
 from legbench.cli.drives_reading import Bench
@@ -64,6 +65,14 @@ class DrivesArguments:
         | Annotated[
             drives_reading.Budget,
             subcommand("budget", description="what the schedule takes of the wire at worst"),
+        ]
+        | Annotated[
+            drives_sheets.Learn,
+            subcommand("learn", description="a vendor's data sheet to a bus file to begin with"),
+        ]
+        | Annotated[
+            drives_sheets.Check,
+            subcommand("check", description="a bus file against its drives' data sheets"),
         ]
         | Annotated[
             drives_serving.Emulate,

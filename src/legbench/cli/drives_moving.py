@@ -30,16 +30,28 @@ class Configure:
         """Print the differences; 1 if there are any left."""
         from legbench.commissioning.configure import differences, write
 
-        written = 0
+        written = None
         with bench.session(leads=self.write) as session:
             if self.write:
                 written = write(session)
-            different = differences(session)
+            known = frozenset[tuple[str, str]]() if written is None else written.held
+            different = [
+                entry for entry in differences(session) if (entry.node, entry.object) not in known
+            ]
+        lines = () if written is None else written.lines
         if bench.json:
-            print_json({"written": written, "differences": [asdict(entry) for entry in different]})
+            print_json(
+                {
+                    "written": 0 if written is None else written.objects,
+                    "not_protected": list(lines),
+                    "differences": [asdict(entry) for entry in different],
+                }
+            )
         else:
-            if self.write:
-                print(f"wrote {written} objects, read every one back")
+            if written is not None:
+                print(f"wrote {written.objects} objects, read every one back")
+            for line in lines:
+                print(line)
             for entry in different:
                 print(f"{entry.node}: {entry.object} holds {entry.holds}, wanted {entry.wanted}")
             print(f"{len(different)} objects differ from {bench.bus}")

@@ -1,8 +1,10 @@
 """`legbench drives scan|status|budget`: looking, never enabling."""
 
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from legbench.cli.output import note, print_json
 from legbench.cli.waived import tell_waived
@@ -13,6 +15,9 @@ from legbench.drives.setup.config import BusConfig
 from legbench.errors import ConfigError
 from legbench.plant.can_choice import CanChoice
 from legbench.plant.can_open import open_session
+
+if TYPE_CHECKING:
+    from legbench.drives.setup.wire import LoadEntry
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,7 +85,8 @@ class Scan:
             for node in found:
                 print(
                     f"node {node.node_id:3d}  vendor {node.vendor:#010x}  product "
-                    f"{node.product:#010x}  serial {node.serial}  revision {node.revision}  "
+                    f"{_told(node.product, '#010x')}  serial {_told(node.serial)}  revision "
+                    f"{_told(node.revision)}  "
                     f"{node.verdict}"
                 )
         double = [node for node in found if node.answers > 1]
@@ -116,10 +122,10 @@ class Status:
             print(f"{node.name} (node {node.node_id}): {node.statusword}")
             homed = {None: "", True: ", homed", False: ", NOT HOMED"}[node.homed]
             print(f"  mode {node.mode}, error {node.error}{heat}{homed}")
-            print(
-                f"  motor {node.motor_pos:+.4f} rad ({node.motor_counts} counts), "
-                f"link {node.link_pos:+.4f} rad ({node.link_counts} counts)"
-            )
+            second = ", no second encoder"
+            if node.link_pos is not None:
+                second = f", link {node.link_pos:+.4f} rad ({node.link_counts} counts)"
+            print(f"  {node.side} {node.motor_pos:+.4f} rad ({node.motor_counts} counts){second}")
         return 0
 
 
@@ -132,18 +138,18 @@ class Budget:
     """
 
     def run(self, bench: Bench) -> int:
-        """Print every frame; raises ConfigError above 80 %, or where the files do not fit."""
+        """Print every frame; raises ConfigError where a channel or the files do not fit."""
+        from legbench.commissioning.learn import known_means
         from legbench.drives.setup.checks import check_together
-        from legbench.drives.setup.master_watch import means_of
-        from legbench.drives.setup.wire import MAX_LOAD, bus_load, check_load, schedule
+        from legbench.drives.setup.exchange import check_budget, exchanges
+        from legbench.drives.setup.wire import MAX_LOAD, bus_load, schedule
         from legbench.plants import LIMITS_NAME, joint_ranges, limits_for
 
         config = bench.config().at(bench.bitrate)
         limits = limits_for(bench.limits or bench.bus.parent / LIMITS_NAME, bench.leg())
-        means = {
-            node.name: means_of(config, node, speed=limits.command_speed) for node in config.nodes
-        }
-        entries, load = schedule(config), bus_load(config)
+        means = known_means(config, speed=limits.command_speed)
+        entries = [entry for one in config.channels for entry in schedule(config, one)]
+        load = max(bus_load(config, one) for one in config.channels)
         if bench.json:
             print_json(
                 {
@@ -151,6 +157,9 @@ class Budget:
                     "load": load,
                     "limit": MAX_LOAD,
                     "frames": [asdict(entry) for entry in entries],
+                    "exchanges": [asdict(one) for one in exchanges(config)],
+                    "deadline_us": config.deadline_us,
+                    "period_us": config.period_us,
                     "master_watch": {
                         name: [asdict(one) | {"stop_ms": one.stop_ms} for one in found]
                         for name, found in means.items()
@@ -158,19 +167,35 @@ class Budget:
                 }
             )
         else:
-            for entry in entries:
-                share = entry.bits * entry.rate / config.bitrate
-                print(
-                    f"{entry.what:<24} {entry.bits:4d} bits  {entry.rate:7.1f} /s  "
-                    f"{100 * share:5.1f} %"
-                )
-            print(
-                f"{'worst load':<24} {100 * load:.1f} % of {config.bitrate} bit/s, the limit is "
-                f"{100 * MAX_LOAD:.0f} %"
-            )
+            _print_budget(config, entries, load)
             for name, found in means.items():
                 texts = [f"{one.stop_ms:.0f} ms by {one.name}" for one in found]
                 print(f"without master, {name} stands after {' or '.join(texts) or 'no time'}")
-        check_load(config)
+        check_budget(config)
         check_together(config, limits, stops=joint_ranges(bench.leg()))
         return 0
+
+
+def _told(number: int | None, form: str = "d") -> str:
+    """A number of the identity object, or that a drive tells none."""
+    return "not told" if number is None else format(number, form)
+
+
+def _print_budget(config: BusConfig, entries: "Sequence[LoadEntry]", load: float) -> None:
+    """Print what every frame takes of its wire, and when the last ones come."""
+    from legbench.drives.setup.exchange import exchanges
+    from legbench.drives.setup.wire import MAX_LOAD
+
+    for entry in entries:
+        share = entry.bits * entry.rate / config.bitrate
+        print(f"{entry.what:<24} {entry.bits:4d} bits  {entry.rate:7.1f} /s  {100 * share:5.1f} %")
+    print(
+        f"{'worst load':<24} {100 * load:.1f} % of {config.bitrate} bit/s, the limit is "
+        f"{100 * MAX_LOAD:.0f} %"
+    )
+    for one in exchanges(config):
+        where = f"exchange {one.channel or ''}".strip()
+        print(
+            f"{where:<24} last answer {one.answers_us:.0f} us after SYNC, the deadline is "
+            f"{config.deadline_us}; last command {one.commands_us:.0f} of {config.period_us} us"
+        )

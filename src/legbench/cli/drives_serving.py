@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from legbench.cli.drives_reading import Bench
-from legbench.cli.output import note, print_json
+from legbench.cli.output import note, print_json, report_error
 from legbench.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -38,6 +38,21 @@ def only(config: "BusConfig", name: str) -> "BusConfig":
     return replace(config, nodes=nodes)
 
 
+def _wearing(config: "BusConfig", eds: Path | None) -> "BusConfig":
+    """Give all nodes of a bus one data sheet, if there is one."""
+    if eds is None:
+        return config
+    return replace(config, nodes=tuple(replace(node, eds=eds) for node in config.nodes))
+
+
+def _tell_problems(config: "BusConfig") -> None:
+    """Say which drives cannot be used as the bus file says; they are served all the same."""
+    from legbench.commissioning.learn import problems_of
+
+    for problem in problems_of(config):
+        report_error(problem)
+
+
 def _print_state(as_json: bool, at: float, node: str, state: str) -> None:
     """Print the new state of a drive, `at` so many seconds after the start."""
     if as_json:
@@ -62,6 +77,8 @@ class Emulate:
     """Whether the shafts are bare, so that MuJoCo is not needed."""
     only: str | None = None
     """Name of the only drive of the bus file on this bus, bare, such as for `drives node-id`."""
+    eds: Path | None = None
+    """Data sheet (EDS) whose dictionary all drives wear; else those that the bus file names."""
     patience: int = 5
     """Number of periods without SYNC or target that fault a drive; more on a busy machine."""
     seconds: float = math.inf
@@ -79,12 +96,14 @@ class Emulate:
 
         _check_time("seconds", self.seconds)
         self._check_way(bench)
-        config = _at_bitrate(bench.config(), bench.bitrate)
+        config = _wearing(_at_bitrate(bench.config(), bench.bitrate), self.eds)
         start_pos, body = self._leg(bench)
         if self.only is not None:
             config, start_pos = only(config, self.only), (0.0,)
         end = time.monotonic() + self.seconds
         where = None if bench.channel is None else Path(bench.channel)
+
+        _tell_problems(config)
 
         def serve_at(network: Network) -> Server:
             if self.serve == SLCAN:

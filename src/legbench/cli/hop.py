@@ -1,4 +1,4 @@
-"""`legbench hop`: the apex return map of a leg, its periodic hops and their basin."""
+"""`legbench hop`: the apex return map of a leg, its periodic hops, their families and basin."""
 
 import math
 from dataclasses import asdict, dataclass, field
@@ -10,20 +10,24 @@ import tyro
 
 from legbench.analytic import LegModel
 from legbench.analytic.taylor import TaylorLeg
-from legbench.cli.output import note, print_json, progress, write_json
+from legbench.cli.hop_tables import (
+    cycle_content,
+    cycle_lines,
+    family_content,
+    family_lines,
+    hop_lines,
+)
+from legbench.cli.output import make_folder, note, print_json, progress, write_json
 from legbench.cli.parse import parse
 from legbench.control import JumpConfig
 from legbench.design import LegDesign, load_design
-from legbench.design.statics import Support
 from legbench.errors import ConfigError
-from legbench.kinematics import half_angle
 from legbench.modes.basin import Axis, Fate, Question, map_basin
-from legbench.modes.drive import JumpLaw, Passive
-from legbench.modes.fixed_point import FixedPoint, fixed_point
+from legbench.modes.cycles import LONGEST, Cycle, end_of, find_cycle, repeats
+from legbench.modes.drive import JumpLaw
 from legbench.modes.hop import Apex, Ending, return_map, settle
-from legbench.modes.passive import FreeHop, depths, free_hop
-from legbench.modes.scene import make_scene
-from legbench.modes.slip import Slip, leg_groups, slip_groups
+from legbench.modes.hop_family import HopFamily, follow_hop
+from legbench.modes.hop_setting import Setting, tools_at
 from legbench.signals import Ints
 
 WHY = {
@@ -33,10 +37,12 @@ WHY = {
     "a longer --touchdown-time",
 }
 """Advice for each way in which a leg fails to come to its next apex."""
-MATCHED = 1e-5
-"""Polar set point of the motors that is smaller than a count of most encoders [rad]."""
-DROPS = (0.02, 0.05, 0.1)
-"""Heights of fall at which leg and template are compared [m]."""
+LARGE = 250_000
+"""Cells of a basin map beyond which it is asked whether that was meant [-]."""
+CELL_TIME = 0.004
+"""Time that one cell takes one process, about [s]."""
+ENDING_HOPS = 400
+"""Number of hops after which one that is not stable should have come to its end [-]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,16 +60,24 @@ class HopArguments:
     """Apex of the centre of mass to start from [m]; none: 30 mm over standing."""
     hops: int = 60
     """Number of hops after which the leg should be periodic."""
+    period: int | None = None
+    """Number of hops after which the motion is to repeat; none: as it settles."""
+    family: Setting | None = None
+    """Setting over which the periodic hop is followed, from its present value to --to."""
+    to: float | None = None
+    """Value of that setting at which the family ends [rad, or a factor]."""
     basin: int = 0
     """Number of points on each side of the basin map; 0 makes none."""
     across: str = "z1"
     """Coordinate that varies to the right in the basin map."""
-    across_span: float = 0.3
-    """Range of that coordinate to either side."""
-    up: str = "height"
+    across_span: float = 0.6
+    """Range of that coordinate to either side, in metres, radians and seconds."""
+    up: str = "speed"
     """Coordinate that varies upwards in the basin map."""
-    up_span: float = 0.08
-    """Range of that coordinate to either side."""
+    up_span: float = 2.5
+    """Range of that coordinate to either side, in metres, radians and seconds."""
+    large: bool = False
+    """Whether to map a basin of more than 250 000 cells all the same."""
     workers: int = 2
     """Number of processes that compute the basin map."""
     out: Path | None = None
@@ -77,9 +91,18 @@ def main(arguments: list[str]) -> int:
     flags = parse(HopArguments, "hop", arguments)
     _check(flags)
     design = load_design(flags.design)
-    content = _passive(flags, design) if flags.passive else _driven(flags, design)
+    if flags.out is not None:
+        make_folder(flags.out)
+    if flags.passive:
+        from legbench.cli.hop_passive import answer
+
+        content, lines = answer(design, flags.rest)
+    else:
+        content, lines = _driven(flags, design)
     if flags.json:
         print_json(content)
+    else:
+        print("\n".join(lines))
     if flags.out is not None:
         _save(flags.out, content)
     return 0
@@ -91,6 +114,16 @@ def _check(flags: HopArguments) -> None:
         raise ConfigError(f"hops is {flags.hops}; it must be 1 or more")
     if flags.height is not None and not 0.0 < flags.height < math.inf:
         raise ConfigError(f"height is {flags.height:g} m; an apex lies above the ground")
+    for name, span in ((flags.across, flags.across_span), (flags.up, flags.up_span)):
+        Axis(name=name, low=-span, high=span, count=max(flags.basin, 2))
+    if flags.across == flags.up:
+        raise ConfigError(f"both axes are {flags.up}; a map needs two different ones")
+    if flags.period is not None and not 1 <= flags.period <= LONGEST:
+        raise ConfigError(f"period is {flags.period} hops; it must be 1 to {LONGEST}")
+    if (flags.family is None) != (flags.to is None):
+        raise ConfigError("a family needs both --family, what is varied, and --to, how far")
+    if flags.passive and (flags.family is not None or flags.period is not None):
+        raise ConfigError("--family and --period are for driven hops; leave --passive away")
     if flags.basin == 0:
         return
     if flags.basin < 2:
@@ -104,168 +137,141 @@ def _check(flags: HopArguments) -> None:
         )
     if flags.workers < 1:
         raise ConfigError(f"workers is {flags.workers}; a map needs 1 process or more")
-    for name, span in ((flags.across, flags.across_span), (flags.up, flags.up_span)):
-        Axis(name=name, low=-span, high=span, count=flags.basin)
-
-
-def _driven(flags: HopArguments, design: LegDesign) -> dict[str, Any]:
-    model, law = LegModel.of(design), JumpLaw(flags.jump, design)
-    leg = TaylorLeg(model, probe=law.probe)
-    z2 = flags.jump.z2 + flags.jump.dz2
-    q = (-z2 * math.sqrt(0.5), z2 * math.sqrt(0.5))
-    standing = model.mass_centre_from_hip(q)[1] - model.foot_from_hip(q)[1]
-    height = standing + 0.03 if flags.height is None else flags.height
-    start = Apex(height=height, speed=0.0, z1=0.0, z2=z2, dz1=0.0, dz2=0.0)
-    apexes = settle(leg, law, start, flags.hops)
-    if len(apexes) <= flags.hops:
-        ending = return_map(leg, law, apexes[-1]).ending
+    if flags.basin**2 > LARGE and not flags.large:
+        hours = flags.basin**2 * CELL_TIME / flags.workers / 3600.0
         raise ConfigError(
-            f"the leg stops hopping after {len(apexes) - 1} of {flags.hops} hops from an apex of "
-            f"{height:.4g} m: {WHY[ending]}"
+            f"basin is {flags.basin} x {flags.basin} = {flags.basin**2} cells, some {hours:.2g} h "
+            f"with {flags.workers} processes; take up to {math.isqrt(LARGE)} points a side, or say "
+            "--large"
         )
-    point = fixed_point(leg, law, apexes[-1])
+
+
+def _driven(flags: HopArguments, design: LegDesign) -> tuple[dict[str, Any], list[str]]:
+    """Hops under the jump controller, as JSON and as lines."""
+    law = JumpLaw(flags.jump, design)
+    if flags.family is not None and flags.to is not None:
+        tools_at(design, flags.jump, flags.family, flags.to)
+    leg = TaylorLeg(LegModel.of(design), probe=law.probe)
+    apexes = _hopped(leg, law, _start(flags, leg.model), flags.hops)
+    cycles = _cycles(leg, law, apexes)
+    chosen = _chosen(cycles, flags.period)
     content: dict[str, Any] = {
         "design": design.name,
         "drive": "jump",
         "jump": asdict(flags.jump),
         "apexes": [asdict(apex) for apex in apexes],
-        "fixed_points": [_point(point)],
+        "fixed_points": [cycle_content(cycle) for cycle in cycles],
     }
-    if not flags.json:
-        print(f"{design.name} under the jump controller (continuous time)")
-        print("\nhop   apex height [m]   speed [m/s]   z1 [rad]")
-        for index in range(0, len(apexes), max(1, len(apexes) // 12)):
-            apex = apexes[index]
-            print(f"{index:3d} {apex.height:17.5f} {apex.speed:13.5f} {apex.z1:10.5f}")
-        _print_point(point)
+    lines = hop_lines(design, apexes)
+    for cycle in cycles:
+        lines += cycle_lines(cycle)
+    if flags.family is not None and flags.to is not None:
+        family = follow_hop(design, flags.jump, flags.family, chosen, flags.to, progress=progress)
+        content["family"] = family_content(family)
+        lines += family_lines(family)
+        if flags.out is not None:
+            _plot_family(flags.out, design, family)
     if flags.out is not None:
-        _plot_return(flags.out, design, apexes, point)
-    if flags.basin and not point.stable:
+        _plot_return(flags.out, design, apexes, chosen)
+    if flags.basin and not chosen.stable:
         note(
             f"no basin: the periodic hop is not stable, its largest multiplier is "
-            f"{abs(point.multipliers[0]):.4g}; no start stays there"
+            f"{abs(chosen.multipliers[0]):.4g}; no start stays there"
         )
     elif flags.basin and flags.out is not None:
-        fates = _basin(flags, design, point, flags.out)
-        content["basin"] = _share(fates)
-        if not flags.json:
-            print("\nbasin   " + ", ".join(f"{k} {v:.1%}" for k, v in _share(fates).items()))
-    return content
+        share = _share(_basin(flags, design, chosen, flags.out))
+        content["basin"] = share
+        lines += ["", "basin   " + ", ".join(f"{k} {v:.1%}" for k, v in share.items())]
+    return content, lines
 
 
-def _passive(flags: HopArguments, design: LegDesign) -> dict[str, Any]:
-    from legbench.design.setup import SetupKind
+def _start(flags: HopArguments, model: LegModel) -> Apex:
+    """The apex to begin with: relaxed and upright, by default 30 mm over standing."""
+    z2 = flags.jump.z2 + flags.jump.dz2
+    q = (-z2 * math.sqrt(0.5), z2 * math.sqrt(0.5))
+    standing = model.mass_centre_from_hip(q)[1] - model.foot_from_hip(q)[1]
+    height = standing + 0.03 if flags.height is None else flags.height
+    return Apex(height=height, speed=0.0, z1=0.0, z2=z2, dz1=0.0, dz2=0.0)
 
-    scene = make_scene(design, SetupKind.JUMP, flags.rest)
-    half = float(half_angle(np.array(scene.motor)))
-    leg = TaylorLeg(LegModel.of(design, undamped=True), probe=Passive.probe)
-    hops = []
-    for depth in depths(leg, half, np.linspace(scene.rest[1], 0.5 * design.limits.knee[1], 150)):
-        found = free_hop(leg, half, depth)
-        if found is None:
-            note(
-                f"no hop without impact near a stance folded to {depth:.3f} rad: a joint meets "
-                "its stop on the way, or the leg is too far from matched"
+
+def _hopped(leg: TaylorLeg, law: JumpLaw, start: Apex, hops: int) -> list[Apex]:
+    """Apexes of so many hops in a row, the start first; tells how many are done.
+
+    Raises:
+        ConfigError: the leg stops hopping before.
+    """
+    apexes = [start]
+    progress(0, hops)
+    for done in range(hops):
+        after = settle(leg, law, apexes[-1], 1)[1:]
+        if not after:
+            ending = return_map(leg, law, apexes[-1]).ending
+            raise ConfigError(
+                f"the leg stops hopping after {done} of {hops} hops from an apex of "
+                f"{start.height:.4g} m: {WHY[ending]}"
             )
+        apexes += after
+        progress(done + 1, hops)
+    return apexes
+
+
+def _cycles(leg: TaylorLeg, law: JumpLaw, apexes: list[Apex]) -> list[Cycle]:
+    """The periodic hop near the last ones, and, if it is not stable, the one it ends in."""
+    period = repeats(apexes) or 1
+    found = [find_cycle(leg, law, apexes[-period:])]
+    if not found[0].stable:
+        way, end = end_of(leg, law, found[0], ENDING_HOPS)
+        if end is not None:
+            found.append(end)
+        elif len(way) <= ENDING_HOPS:
+            note(f"nudged off the periodic hop, the leg stops hopping after {len(way) - 1} hops")
         else:
-            hops.append(found)
-    slip = Slip.of(leg.model, half)
-    compared = [
-        {"drop": drop, "leg": asdict(leg_groups(leg, slip, half, drop))}
-        | {"slip": asdict(slip_groups(slip, drop))}
-        for drop in DROPS
-    ]
-    if not flags.json:
-        print(f"{design.name}, motors held around half angle {half:.4f} rad, undamped")
-        _print_free(hops)
-        _print_slip(slip, compared)
-    return {
-        "design": design.name,
-        "drive": "passive",
-        "support": str(Support.FOOT),
-        "motor_half": half,
-        "fixed_points": [_free(found) for found in hops],
-        "slip": asdict(slip) | {"firmness": slip.firmness},
-        "compared": compared,
-    }
+            note(f"nudged off the periodic hop, the leg does not repeat within {LONGEST} hops")
+    return found
 
 
-def _print_free(hops: list[FreeHop]) -> None:
-    print(f"\nhops without impact: {len(hops)}")
-    if any(abs(found.motor_z1) > MATCHED for found in hops):
-        print(
-            "This leg is not quite matched: x1 = 0 does not stay, and a hop without impact needs\n"
-            "the motors at a polar set point z1 of its own; at z1 = 0 there is none."
-        )
-    for found in hops:
-        _print_point(found.point, "indication only, the map is not smooth here")
-        print(
-            f"  motors at z1 {found.motor_z1:+.6f} rad; at z1 = 0 the hop from there loses "
-            f"{1e3 * found.symmetric_loss:.3g} mJ"
-        )
+def _chosen(cycles: list[Cycle], period: int | None) -> Cycle:
+    """The cycle that was asked for.
 
-
-def _free(found: FreeHop) -> dict[str, Any]:
-    return _point(found.point) | {
-        "motor": list(found.motor),
-        "motor_z1": found.motor_z1,
-        "symmetric_loss": found.symmetric_loss,
-    }
-
-
-def _print_slip(slip: Slip, compared: list[dict[str, Any]]) -> None:
-    print(
-        f"\ntemplate: m = {slip.mass:.4g} kg, k = {slip.stiffness:.4g} N/m, "
-        f"l = {slip.length:.4g} m, k l / m g = {slip.firmness:.3f}"
+    Raises:
+        ConfigError: none has that period.
+    """
+    if period is None:
+        return cycles[0]
+    for cycle in cycles:
+        if cycle.period == period:
+            return cycle
+    found = " and ".join(str(cycle.period) for cycle in cycles)
+    raise ConfigError(
+        f"no hop of period {period} is found: there is one of period {found}; take another "
+        "--height, more --hops, or settings beyond a change of stability (--family)"
     )
-    names = list(compared[0]["leg"])
-    print("            " + " ".join(f"{name:>13}" for name in names))
-    for entry in compared:
-        for who in ("leg", "slip"):
-            print(f"{who:<12}" + " ".join(f"{entry[who][name]:13.4f}" for name in names))
 
 
-def _print_point(point: FixedPoint, verdict: str = "") -> None:
-    apex, done = point.apex, point.hop
-    flight = done.duration - (done.liftoff - done.touchdown)
-    sizes = ", ".join(f"{abs(value):.4g}" for value in point.multipliers)
-    print(
-        f"\nperiodic hop   apex {apex.height:.5f} m, speed {apex.speed:+.5f} m/s, "
-        f"z1 {apex.z1:+.5f} rad, z2 {apex.z2:.5f} rad"
-    )
-    print(
-        f"  period {done.duration:.5f} s, flight {flight:.5f} s, impact {1e3 * done.impact:.3g} mJ"
-    )
-    print(f"  multipliers {sizes}: {verdict or ('stable' if point.stable else 'not stable')}")
-
-
-def _point(point: FixedPoint) -> dict[str, Any]:
-    return {
-        "apex": asdict(point.apex),
-        "period": point.hop.duration,
-        "touchdown": point.hop.touchdown,
-        "liftoff": point.hop.liftoff,
-        "impact": point.hop.impact,
-        "multipliers": [[value.real, value.imag] for value in point.multipliers],
-        "residual": point.residual,
-    }
-
-
-def _plot_return(out: Path, design: LegDesign, apexes: list[Apex], point: FixedPoint) -> None:
-    from legbench.viz.print.modes import plot_return
+def _plot_return(out: Path, design: LegDesign, apexes: list[Apex], cycle: Cycle) -> None:
+    from legbench.viz.print.hops import plot_return
 
     heights = np.array([apex.height for apex in apexes])
     pairs = np.stack([heights[:-1], heights[1:]], axis=-1)
     title = f"{design.name}: apex return map"
-    plot_return(pairs, point.apex.height, title, out / "return.png")
+    around = np.array([apex.height for apex in cycle.apexes])
+    fixed = np.stack([around, np.roll(around, -1)], axis=-1)
+    plot_return(pairs, fixed, title, out / "return.png")
     note(f"wrote {out / 'return.png'}")
 
 
-def _basin(flags: HopArguments, design: LegDesign, point: FixedPoint, out: Path) -> Ints:
-    from legbench.viz.print.modes import plot_basin
+def _plot_family(out: Path, design: LegDesign, family: HopFamily) -> None:
+    from legbench.viz.print.hops import plot_family
+
+    plot_family(family, f"{design.name}: periodic hops over {family.setting}", out / "family.png")
+    note(f"wrote {out / 'family.png'}")
+
+
+def _basin(flags: HopArguments, design: LegDesign, cycle: Cycle, out: Path) -> Ints:
+    from legbench.viz.print.hops import plot_basin
 
     def axis(name: str, span: float) -> Axis:
-        middle = getattr(point.apex, name, 0.0)
+        middle = getattr(cycle.apexes[0], name, 0.0)
         return Axis(name=name, low=middle - span, high=middle + span, count=flags.basin)
 
     question = Question(
@@ -273,7 +279,7 @@ def _basin(flags: HopArguments, design: LegDesign, point: FixedPoint, out: Path)
         jump=flags.jump,
         motor=(0.0, 0.0),
         undamped=False,
-        centre=point.apex,
+        centre=cycle.apexes[0],
         across=axis(flags.across, flags.across_span),
         up=axis(flags.up, flags.up_span),
     )

@@ -8,6 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from legbench.errors import ConfigError
 from legbench.strict_json import null_for_nan
 
 
@@ -43,6 +44,22 @@ def write_json(path: Path, content: Mapping[str, Any]) -> None:
     from legbench.writing import save_whole
 
     save_whole(path, json.dumps(null_for_nan(content), indent=1, allow_nan=False) + "\n")
+
+
+def make_folder(path: Path) -> None:
+    """Make the folder that results are to be written to, before they are computed.
+
+    Raises:
+        ConfigError: it cannot be made.
+    """
+    from legbench.writing import reason
+
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError(
+            f"cannot write {path}: {reason(error)}; name a folder that you can write"
+        ) from error
 
 
 def progress(done: int, total: int) -> None:

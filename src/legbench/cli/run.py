@@ -23,6 +23,20 @@ def plays_alone(experiment: Experiment) -> bool:
     return isinstance(experiment.plant, CanChoice) and experiment.plant.interface == EMULATED
 
 
+def period_of(experiment: Experiment) -> float:
+    """Period of the cycles of an experiment, on drives that of their bus file [s].
+
+    Raises:
+        ConfigError: that file is none.
+    """
+    from legbench.drives.setup.bus_file import load_bus
+    from legbench.plant.start import PERIOD
+    from legbench.plants import CanChoice
+
+    plant = experiment.plant
+    return load_bus(plant.bus).period if isinstance(plant, CanChoice) else PERIOD
+
+
 @dataclass(slots=True)
 class Watching:
     """Live view of a run, if there is one."""
@@ -65,14 +79,14 @@ def main(arguments: list[str]) -> int:
     from legbench.clock import WallClock
     from legbench.experiment.running import record
     from legbench.interrupts import stop_on_interrupt
-    from legbench.plant.start import PERIOD
 
     chosen, experiment = asked.arguments, asked.experiment
     tell_waived_of(experiment.plant)
     watched = chosen.view or chosen.serve
     watching = Watching(serve=chosen.serve)
     paced = watched or chosen.real_time
-    clock = WallClock(PERIOD) if paced and plays_alone(experiment) else None
+    alone = paced and plays_alone(experiment)
+    clock = WallClock(period_of(experiment)) if alone else None
     with stop_on_interrupt(raises=True) as stop:
         finished = record(
             experiment,
@@ -80,6 +94,7 @@ def main(arguments: list[str]) -> int:
             clock=clock,
             stop=stop,
             progress=progress,
+            on_note=report_error,
             on_started=watching.start if watched else None,
         )
     watching.stop()

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from legbench.drives.master.session import Session
-from legbench.drives.protocol.objects import name_of
+from legbench.drives.setup.taken import check_taken, unprotected
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -12,7 +12,8 @@ class Difference:
 
     node: str
     object: str
-    holds: int
+    holds: int | None
+    """Value there; none where the drive has no such object."""
     wanted: int
 
 
@@ -23,22 +24,35 @@ def differences(session: Session) -> list[Difference]:
     return [
         Difference(
             node=node.name,
-            object=name_of(parameter.index, parameter.sub),
-            holds=there,
-            wanted=parameter.value,
+            object=entry.name,
+            holds=entry.there,
+            wanted=entry.parameter.value,
         )
         for node in session.config.nodes
-        for parameter, there in up.differences(node)
+        for entry in up.differences(node)
     ]
 
 
-def write(session: Session) -> int:
-    """Write the configuration and read every object back; how many. No drive is enabled.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Written:
+    """What became of a configuration that was written."""
+
+    objects: int
+    """Number of objects that hold what was wanted, or what does the same."""
+    lines: tuple[str, ...]
+    """What the drives lack or hold otherwise, and what takes its place."""
+    held: frozenset[tuple[str, str]]
+    """Node and object of those that a drive holds otherwise for good."""
+
+
+def write(session: Session) -> Written:
+    """Write the configuration and read every object back. No drive is enabled.
 
     Raises:
         BusError: the channel has a master.
         PlantFault: somebody else leads these drives; nothing has been written since it was heard.
-        DriveError: a drive is another one, or does not take a value.
+        DriveError: a drive is another one, does not take what is required, or would not be
+            protected.
     """
     session.hold()
     up = session.bring_up()
@@ -46,4 +60,11 @@ def write(session: Session) -> int:
     up.identify()
     up.glance()
     up.pre_operational()
-    return sum(up.configure(node) for node in session.config.nodes)
+    outcomes = {node.name: up.configure(node) for node in session.config.nodes}
+    check_taken(session.config, outcomes)
+    entries = [(name, entry) for name, found in outcomes.items() for entry in found]
+    return Written(
+        objects=sum(entry.agrees for _, entry in entries),
+        lines=unprotected(outcomes),
+        held=frozenset((name, entry.name) for name, entry in entries if not entry.agrees),
+    )

@@ -270,7 +270,7 @@ def _with_encoders(config: BusConfig, servo: ServoConfig) -> BusConfig:
         replace(
             node,
             motor=replace(node.motor, counts_per_rev=counts, gear=1.0),
-            link=replace(node.link, counts_per_rev=min(counts, 1 << 16)),
+            link=node.link and replace(node.link, counts_per_rev=min(counts, 1 << 16)),
             parameters=(),
         )
         for node in config.nodes

@@ -17,6 +17,8 @@ from legbench.onlooker import Onlooker
 
 Server = UnixServer | SlcanServer | BusServer
 """Server through which the drives are reached."""
+BODY_PERIOD_NS = 1_000_000
+"""Period of the leg on the shafts, whatever that of the cycle is [ns]."""
 Report = Callable[[float, str, str], None]
 """Called with time since the start [s], node and its new state."""
 
@@ -53,7 +55,7 @@ def serve(
     behaviours = _behaviours(config, start_pos, patience)
     # A master on the same processor goes first, as it would on one of its own.
     ask(priority=PRIORITY - 1)
-    network = emulate(config, behaviours, body=body)
+    network = emulate(config, behaviours, body=body, body_period_ns=BODY_PERIOD_NS)
     # A terminal that is closed must not take the drives from a master that leads them.
     reporting = Onlooker("report", report)
     shown: dict[str, DriveState] = {}

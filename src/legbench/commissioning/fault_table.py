@@ -27,6 +27,9 @@ class Trial:
     faults: tuple[Fault, ...] = ()
     cause: str | None = None
     """Cause that has to end the run; none: the run has to bridge the fault."""
+    or_cause: str | None = None
+    """Cause that may end the run first, where two come in one cycle and the delays of the answers
+    decide."""
     gone: bool = False
     """The master itself stops without a word, as by SIGKILL or SIGSTOP."""
     interrupted: bool = False
@@ -107,7 +110,12 @@ TRIALS = (
         cause=EMERGENCY,
     ),
     Trial(name="bits of answers flipped", faults=(_frame(_F.BAD_BITS, 0x181),), cause=LOST),
-    Trial(name="bits of commands flipped", faults=(_frame(_F.BAD_BITS, 0x201),), cause="bus off"),
+    Trial(
+        name="bits of commands flipped",
+        faults=(_frame(_F.BAD_BITS, 0x201),),
+        cause="bus off",
+        or_cause=EMERGENCY,
+    ),
     Trial(name="a node babbles, wire full", faults=(_babble(100),), cause=LOST),
     Trial(name="a node babbles, 1 frame/ms", faults=(_babble(1000),)),
     Trial(name="drive bus-off", faults=(_node(_N.BUS_OFF, 1),), cause=LOST),

@@ -108,7 +108,7 @@ def try_fault(
         outcome = _viewed(trial, opened, chosen, writer, start_view)
         strike_ns = network.now_ns if trial.gone or trial.interrupted else STRIKE_NS
         ticks = outcome.cycles + opened.events()["bus"]["skipped_cycles"]
-        reaction_ns = round(1e9 * _can(opened).began) + ticks * MS
+        reaction_ns = round(1e9 * _can(opened).began) + ticks * config.period_ns
         if trial.gone:
             reaction_ns = _wait_for_drives(network)
         opened.plant.close()
@@ -121,7 +121,7 @@ def try_fault(
         name=trial.name,
         status="gone" if trial.gone else outcome.status,
         cause=outcome.cause,
-        cycles=(reaction_ns - strike_ns) // MS + 1 if ended else None,
+        cycles=(reaction_ns - strike_ns) // config.period_ns + 1 if ended else None,
         drives=tuple(drive.axis.power.state for drive in network.drives),
         excess=excess_of(writer.path / BUS_LOG, config, limits),
         intact=intact and found.manifest["cause"] == outcome.cause,

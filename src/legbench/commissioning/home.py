@@ -29,6 +29,7 @@ from legbench.drives.protocol.nmt import NmtCommand, NmtState, heartbeat_frame, 
 from legbench.drives.protocol.objects import name_of
 from legbench.drives.setup.config import NodeConfig
 from legbench.drives.setup.master_watch import check_master_watch
+from legbench.drives.setup.taken import check_taken
 from legbench.errors import ConfigError
 from legbench.interrupts import shielded
 
@@ -96,7 +97,7 @@ def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20
     up.unpower()
     up.glance()
     up.pre_operational()
-    up.configure(node)
+    check_taken(session.config, {node.name: up.configure(node)}, speed=FASTEST, commands=False)
     sdo = up.sdo(node)
     if method not in IN_PLACE:
         _check_speed(sdo, node, method)
@@ -113,7 +114,7 @@ def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20
         master.await_end(timeout)
     up.lookout.rest()
     sdo.put(0x6060, 0, I8, Mode.CYCLIC_SYNCHRONOUS_POSITION)
-    after = sdo.get_int(0x6064, 0, I32)
+    after = up.position(node)
     _check_shown(up, node)
     return Homed(node=node.name, method=method, before_counts=before, after_counts=after)
 

@@ -64,15 +64,17 @@ def jog(
     up.identify()
     _check_range(session, limits, names.index(name), by)
     with session.link(limits, stiffness) as link:
-        start = link.start().motor_pos
+        link.start()
+        start = link.led_pos
         target = [value + (by if names[axis] == name else 0.0) for axis, value in enumerate(start)]
         there = link.move_to(target, speed)
+        after = link.led_pos
         if back:
             link.move_to(start, speed)
     return Jogged(
         node=name,
         before_pos=start,
-        after_pos=there.motor_pos,
+        after_pos=after,
         link_pos=there.link_pos,
         spring_torque=there.spring_torque,
     )

@@ -45,8 +45,9 @@ class Watched:
         if not self.frames:
             return f"{head} no process data {self.emergency}".rstrip()
         axis = self.axis
+        second = "" if self.node.link is None else f"link {axis.link_pos:+.4f} rad, "
         return (
-            f"{head} motor {axis.motor_pos:+.4f} rad, link {axis.link_pos:+.4f} rad, "
+            f"{head} {self.node.side} {axis.motor_pos:+.4f} rad, {second}"
             f"{describe_statusword(axis.statusword)} {self.emergency}"
         ).rstrip()
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from legbench.commissioning.scan import PROBE_MS, Found, scan
 from legbench.drives.errors import DriveError, NoAnswerError, SdoAbortError
+from legbench.drives.master.identification import read_identity
 from legbench.drives.master.lss_port import LssPort
 from legbench.drives.master.sdo_port import SdoPort
 from legbench.drives.master.session import Session
@@ -120,7 +121,7 @@ def _select(session: Session, lss: LssPort, found: list[Found]) -> tuple[LssAddr
             )
         one = found[0]
         _refuse_powered(session, one.node_id)
-        address = (one.vendor, one.product, one.revision, one.serial)
+        address = (one.vendor, one.product or 0, one.revision or 0, one.serial or 0)
         lss.select(address)
         before = one.node_id
     there = lss.node_id()
@@ -161,10 +162,11 @@ def _restart(
         if message.arbitration_id == HEARTBEAT_BASE + node_id:
             break
     sdo = SdoPort(port, node_id, timeout_ms=session.config.sdo_timeout_ms)
-    there = tuple(sdo.get_int(0x1018, sub, DataType.UNSIGNED32) for sub in range(1, 5))
-    if there != address:
+    there = read_identity(sdo)
+    words = (there.vendor, there.product or 0, there.revision or 0, there.serial or 0)
+    if words != address:
         raise DriveError(
-            f"node {node_id} is another drive, serial {there[3]}, than the one that was given this "
+            f"node {node_id} is another drive, serial {words[3]}, than the one that was given this "
             f"node id, serial {address[3]}: two drives have it now; disconnect one"
         )
     if before not in (None, node_id) and _answers(session, before or 0):

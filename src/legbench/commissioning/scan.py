@@ -6,11 +6,12 @@ from dataclasses import dataclass
 from legbench.drives.errors import DriveError, NoAnswerError
 from legbench.drives.master.doubles import count_answers
 from legbench.drives.master.first_contact import first_contact
+from legbench.drives.master.identification import read_identity
 from legbench.drives.master.sdo_port import SdoPort
 from legbench.drives.master.session import Session
 from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.frame import LAST_NODE
-from legbench.drives.setup.config import BusConfig
+from legbench.drives.setup.config import BusConfig, Identity
 
 PROBE_MS = 15
 """Patience with a node that may not be there, asked twice; a booted drive answers within 5 ms."""
@@ -24,9 +25,10 @@ class Found:
     device_type: int
     """1000h."""
     vendor: int
-    product: int
-    revision: int
-    serial: int
+    product: int | None
+    revision: int | None
+    serial: int | None
+    """None where the drive tells none."""
     answers: int
     """Number of drives that answer under this node id; each has to have one of its own."""
     verdict: str
@@ -50,19 +52,17 @@ def scan(session: Session, last: int = LAST_NODE) -> Iterator[Found]:
                 continue
             found += 1
             sdo = SdoPort(port, node_id, timeout_ms=config.sdo_timeout_ms)
-            vendor, product, revision, serial = (
-                sdo.get_int(0x1018, sub, DataType.UNSIGNED32) for sub in range(1, 5)
-            )
+            there = read_identity(sdo)
             answers = count_answers(port, node_id, 0x1018, 4)
             yield Found(
                 node_id=node_id,
                 device_type=device,
-                vendor=vendor,
-                product=product,
-                revision=revision,
-                serial=serial,
+                vendor=there.vendor,
+                product=there.product,
+                revision=there.revision,
+                serial=there.serial,
                 answers=answers,
-                verdict=_verdict(config, node_id, (vendor, product, serial))
+                verdict=_verdict(config, node_id, there)
                 if answers < 2
                 else f"{answers} drives answer with this node id",
             )
@@ -70,10 +70,12 @@ def scan(session: Session, last: int = LAST_NODE) -> Iterator[Found]:
             raise NoAnswerError(f"no node up to {last} answers")
 
 
-def _verdict(config: BusConfig, node_id: int, there: tuple[int, int, int]) -> str:
+def _verdict(config: BusConfig, node_id: int, there: Identity) -> str:
     for node in config.nodes:
         wanted = node.identity
-        same = (wanted.vendor, wanted.product) == there[:2] and wanted.serial in (None, there[2])
+        same = wanted.vendor == there.vendor
+        same = same and wanted.product in (None, there.product)
+        same = same and wanted.serial in (None, there.serial)
         if node.node_id == node_id and same:
             return f"'{node.name}' of the bus file"
         if node.node_id == node_id:

@@ -10,8 +10,9 @@ from legbench.drives.errors import DriveError
 from legbench.drives.master.preparation import check_homed
 from legbench.drives.master.session import Session
 from legbench.drives.setup.config import NodeConfig
+from legbench.drives.setup.encoders import Side
 from legbench.drives.setup.file_edit import Place, edit_file
-from legbench.drives.setup.units import AxisUnits, wrap
+from legbench.drives.setup.units import AxisUnits
 from legbench.errors import ConfigError, RecordingError
 from legbench.writing import reason
 
@@ -26,10 +27,12 @@ class Zero:
     """Offsets of one node."""
 
     node: str
+    side: Side
+    """Side of the encoder of the position loop, whose table in the bus file has its name."""
     motor_offset: int
-    """[counts]"""
-    link_offset: int
-    """[counts]"""
+    """Offset of the encoder of the position loop [counts]."""
+    link_offset: int | None
+    """Offset of the second encoder, none without one [counts]."""
 
 
 def measure(session: Session, posture: Sequence[float]) -> list[Zero]:
@@ -56,19 +59,26 @@ def measure(session: Session, posture: Sequence[float]) -> list[Zero]:
 def _node(session: Session, node: NodeConfig, angle: float) -> Zero:
     reads = [read_counts(session, node) for _ in range(READS)]
     offsets = []
-    for place, (axis, units) in enumerate((("motor", node.motor), ("link", node.link))):
-        shown = sorted(read[place] for read in reads)
+    for place, (axis, units) in enumerate(((node.side.value, node.motor), ("link", node.link))):
+        if units is None:
+            continue
+        shown = sorted(count for read in reads if (count := read[place]) is not None)
         if shown[-1] - shown[0] > STILL_COUNTS:
             raise DriveError(
                 f"{axis} encoder of '{node.name}' moves by {shown[-1] - shown[0]} counts while it "
                 f"is read, the limit is {STILL_COUNTS}; hold the leg still"
             )
         offsets.append(_offset(units, shown[READS // 2], angle))
-    return Zero(node=node.name, motor_offset=offsets[0], link_offset=offsets[1])
+    return Zero(
+        node=node.name,
+        side=node.side,
+        motor_offset=offsets[0],
+        link_offset=offsets[1] if offsets[1:] else None,
+    )
 
 
 def _offset(units: AxisUnits, shown: int, angle: float) -> int:
-    return wrap(shown - replace(units, offset_counts=0).to_counts(angle), units.bits)
+    return units.nearest(shown - replace(units, offset_counts=0).to_counts(angle), 0)
 
 
 def write(path: Path, zeros: Sequence[Zero], out: Path | None = None) -> Path:
@@ -87,8 +97,10 @@ def write(path: Path, zeros: Sequence[Zero], out: Path | None = None) -> Path:
     """
     changes: dict[Place, int] = {}
     for number, zero in enumerate(zeros):
-        changes["node", number, "motor", "offset_counts"] = zero.motor_offset
-        changes["node", number, "link", "offset_counts"] = zero.link_offset
+        # A drive with one encoder has the table of its side alone.
+        changes["node", number, zero.side.value, "offset_counts"] = zero.motor_offset
+        if zero.link_offset is not None:
+            changes["node", number, "link", "offset_counts"] = zero.link_offset
     try:
         return edit_file(path, changes, out)
     except OSError as error:

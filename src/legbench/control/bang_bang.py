@@ -63,6 +63,7 @@ class BangBangConfig:
     kind: ClassVar[str] = "bang-bang"
     usual_setup: ClassVar[SetupKind] = SetupKind.FFS
     batched: ClassVar[bool] = True
+    needs: ClassVar[tuple[str, ...]] = ("motor_pos", "spring_torque")
     z2: float = 1.0
     """Set point in the middle, where the leg rests at first [rad]."""
     dz2: float = 0.08

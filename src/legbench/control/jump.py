@@ -30,6 +30,7 @@ class JumpConfig:
     kind: ClassVar[str] = "jump"
     usual_setup: ClassVar[SetupKind] = SetupKind.JUMP
     batched: ClassVar[bool] = True
+    needs: ClassVar[tuple[str, ...]] = ("motor_pos", "spring_torque")
     z2: float = 0.45
     """Middle of the two set points [rad]."""
     dz2: float = 0.15

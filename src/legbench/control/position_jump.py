@@ -35,6 +35,7 @@ class PositionJumpConfig:
     kind: ClassVar[str] = "position-jump"
     usual_setup: ClassVar[SetupKind] = SetupKind.FFS
     batched: ClassVar[bool] = True
+    needs: ClassVar[tuple[str, ...]] = ("motor_pos",)
     z2: float = 1.0
     """Set point after the jump [rad]."""
     dz2: float = 0.3

@@ -18,6 +18,7 @@ import numpy as np
 
 from legbench.design.leg import LegDesign, Segment
 from legbench.design.matching import Inertial, inertia_terms, upright_terms
+from legbench.design.realisable import largest_inertia
 from legbench.design.requirements import Requirements
 from legbench.signals import Bools, Floats
 
@@ -32,8 +33,12 @@ MARGINS = (
     "a positive foot mass",
     "a positive thigh inertia, condition (5)",
     "upright stability, condition (10)",
+    "a thigh inertia within reach of the overhang",
+    "a shank inertia within reach of the overhang",
+    "a foot inertia within reach of the overhang",
 )
-"""Names of the margins, which have to be positive besides the bounds."""
+"""Names of the margins, which have to be positive besides the bounds; the last three only where
+an overhang is bounded."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,7 +104,10 @@ def objective(requirements: Requirements, candidates: Candidates) -> Floats:
 
 
 def margins(requirements: Requirements, candidates: Candidates) -> Floats:
-    """`MARGINS` of candidates (..., 5), dimensionless; a leg exists where all are positive."""
+    """`MARGINS` of candidates (..., n), dimensionless; a leg exists where all are positive.
+
+    n is 8 where the requirements bound the overhang of masses, else 5.
+    """
     leg = candidates.leg
     share = leg.mass / requirements.leg_mass
     inertia = leg.inertia[..., 0] / (requirements.leg_mass * leg.length[..., 1] ** 2)
@@ -108,7 +116,11 @@ def margins(requirements: Requirements, candidates: Candidates) -> Floats:
         leg, np.asarray(candidates.trunk_mass), pair, candidates.relaxed_angle
     ).sum(axis=-1)
     stability = stands / (2.0 * candidates.stiffness)
-    return np.concatenate((share, inertia[..., np.newaxis], stability[..., np.newaxis]), axis=-1)
+    found = [share, inertia[..., np.newaxis], stability[..., np.newaxis]]
+    if requirements.overhang is not None:
+        spare = largest_inertia(leg, requirements.overhang) - leg.inertia
+        found.append(spare / (requirements.leg_mass * leg.length[..., 1:2] ** 2))
+    return np.concatenate(found, axis=-1)
 
 
 def cost(requirements: Requirements, free: Floats) -> Floats:
@@ -123,7 +135,7 @@ def cost(requirements: Requirements, free: Floats) -> Floats:
 
 
 def shortfall(margin: Floats) -> Floats:
-    """Sum (...) of what is missing from margins (..., 5): zero where all are positive [-]."""
+    """Sum (...) of what is missing from margins (..., n): zero where all are positive [-]."""
     missing: Bools = ~(margin > 0.0)
     size = np.where(np.isfinite(margin), np.abs(margin), 1e3)
     return np.where(missing, size + 1e-9, 0.0).sum(axis=-1)

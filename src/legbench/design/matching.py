@@ -5,7 +5,7 @@ are kept apart, because their size is the scale on which a residual is small or 
 
 With `l2 = l1 + l3` and x1 = 0 the task-space coupling is, in the paper's symbols,
 
-    inertia    M_x[1, 0] = -t8 (2 t1 l3 + t5 + t7 - t6)                            eq. (20) = (5)
+    inertia    M_x[1, 0] = -t8 (2 t1 l3 + t5 + t7 - t6)                            eq. (20) = -(5)
     elastic    tau_x[0] = k1 (qd1 - q1) + k2 (qd2 - q2), zero for all x2 iff k1 = k2   eq. (6), (7)
     damping    the same with d1, d2
     gravity    g_x[0] = -g sin(q1) (t1 + t3) - g sin(q2) t2, zero iff t1 + t3 = t2     eq. (8), (9)
@@ -56,7 +56,10 @@ def _split(values: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def inertia_terms(leg: Inertial) -> Floats:
-    """Terms of eq. (5), as printed (..., 11) [kg m^2]; the trunk's mass cancels."""
+    """Terms of eq. (5), as printed (..., 11) [kg m^2]; the trunk's mass cancels.
+
+    Their sum is that of eq. (20), `2 t1 l3 + t5 + t7 - t6`, with the other sign.
+    """
     (m1, m2, m3), (l1, _, l3), (c1, c2, c3) = map(_split, (leg.mass, leg.length, leg.com))
     i1, i2, i3 = _split(leg.inertia)
     terms = (
@@ -180,7 +183,7 @@ def check_conditions(
     )
     opposed = np.array([1.0, -1.0])
     return (
-        _condition("inertia", "(5), (20)", inertia_terms(parameters.leg), "kg m^2"),
+        _condition("inertia", "(20), -(5)", -inertia_terms(parameters.leg), "kg m^2"),
         _condition("elastic", "(6), (7)", opposed * parameters.stiffness, "N m/rad"),
         _condition("gravity", "(8), (9) corrected", gravity_terms(parameters.leg), "kg m"),
         _condition("damping", "d1 = d2, Table II", opposed * parameters.damping, "N m s/rad"),

@@ -28,6 +28,8 @@ class Mend:
     """Amount to be added to the parameter."""
     moves: tuple[str, ...]
     """Other conditions that this change alters."""
+    topples: bool
+    """Whether the leg stands before the change and no longer after it, by condition (10)."""
 
     @property
     def share(self) -> float:
@@ -36,7 +38,8 @@ class Mend:
 
 
 def mends(design: LegDesign, condition: Condition, half_angle: float) -> tuple[Mend, ...]:
-    """Every single parameter that can mend `condition`; those that disturb nothing else first.
+    """Every single parameter that can mend `condition`; those that leave the leg standing and
+    disturb nothing else first.
 
     Lengths are not among them: `l2 = l1 + l3` ties two of them. For stability the change reaches
     the border: more than that is needed.
@@ -55,10 +58,17 @@ def mends(design: LegDesign, condition: Condition, half_angle: float) -> tuple[M
             if other.name not in (condition.name, "stability")
             and abs(other.residual - was.residual) > 1e-12 * other.scale
         )
-        found.append(
-            Mend(parameter=name, unit=unit, value=value, change=target - value, moves=moves)
+        topples = before[-1].is_met() and not after[-1].is_met()
+        mend = Mend(
+            parameter=name,
+            unit=unit,
+            value=value,
+            change=target - value,
+            moves=moves,
+            topples=topples and condition.name != "stability",
         )
-    return tuple(sorted(found, key=lambda mend: (len(mend.moves), abs(mend.share))))
+        found.append(mend)
+    return tuple(sorted(found, key=lambda mend: (mend.topples, len(mend.moves), abs(mend.share))))
 
 
 Changed = Callable[[float], Parameters]

@@ -165,12 +165,20 @@ class Requirements:
     weights: Weights = field(default_factory=Weights)
     limits: Limits = field(default_factory=Limits)
     """Joint stops of the finished leg."""
+    overhang: float | None = None
+    """How far mass may reach beyond both joints of its segment [m]: every inertia then stays below
+    `m (c + e) (l - c + e)`. The paper does not ask for it, and no leg is matched with zero."""
 
     def __post_init__(self) -> None:
         for key in LEG_KEYS:
             value = getattr(self, key)
             if not (math.isfinite(value) and (value > 0.0 or (key == "damping" and value == 0.0))):
                 raise DesignError(f"{key} is {value:g}; it must be a positive finite number")
+        if self.overhang is not None and not 0.0 < self.overhang < math.inf:
+            raise DesignError(
+                f"overhang is {self.overhang:g} m; it must be positive and finite: a leg whose "
+                "mass all lies between the joints of its segments cannot meet (5) and (9) together"
+            )
         if not self.leg_mass < self.total_mass:
             raise DesignError(
                 f"leg_mass is {self.leg_mass:g} kg of a total_mass of {self.total_mass:g} kg; the "
@@ -187,14 +195,14 @@ def requirements_from_mapping(content: Mapping[str, Any]) -> Requirements:
     Raises:
         DesignError: an unknown key or unit, or a value that no leg can have.
     """
-    known = ("units", "leg", "bounds", "weights", "limits")
+    known = ("units", "leg", "bounds", "weights", "limits", "constraints")
     unknown = set(content) - {"name", *known}
     if unknown:
         raise DesignError(
             f"unknown entries: {', '.join(sorted(unknown))}; there are {', '.join(known)}"
         )
     per_si = units_per_si(content.get("units", {}), REQUIREMENT_UNITS) | {"ratio": 1.0}
-    leg, bounds, weights, limits = (
+    leg, bounds, weights, limits, constraints = (
         Table(name, content.get(name, {}), per_si) for name in known[1:]
     )
     values: dict[str, Any] = {
@@ -208,6 +216,7 @@ def requirements_from_mapping(content: Mapping[str, Any]) -> Requirements:
         bounds=replace(PAPER.bounds, **ranges),
         weights=_weights(weights),
         limits=_limits(limits),
+        overhang=_overhang(constraints),
         **values,
     )
 
@@ -236,11 +245,20 @@ def _limits(table: Table) -> Limits:
     return replace(PAPER.limits, **given)
 
 
+def _overhang(table: Table) -> float | None:
+    value = table.number("overhang", "length") if "overhang" in table.content else None
+    table.finish()
+    return value
+
+
 def requirements_to_mapping(requirements: Requirements) -> dict[str, Any]:
-    """The tables of a requirements file, in SI; `requirements_from_mapping` inverts it exactly."""
+    """The tables of a requirements file, in SI; `requirements_from_mapping` inverts it exactly.
+
+    A constraint that is not asked for is left out, so that older files and traces keep their name.
+    """
     content = asdict(requirements)
     ranges = {name: list(content["bounds"][name].values()) for name in VARIABLES}
-    return {
+    tables: dict[str, Any] = {
         "name": requirements.name,
         "units": {quantity: next(iter(units)) for quantity, units in REQUIREMENT_UNITS.items()},
         "leg": {key: content[key] for key in LEG_KEYS},
@@ -251,6 +269,9 @@ def requirements_to_mapping(requirements: Requirements) -> dict[str, Any]:
         },
         "limits": {name: list(pair) for name, pair in content["limits"].items()},
     }
+    if requirements.overhang is not None:
+        tables["constraints"] = {"overhang": requirements.overhang}
+    return tables
 
 
 def load_requirements(path: Path) -> Requirements:

@@ -106,7 +106,7 @@ class LegGroup:
         self.cycles = int(self._wanted.max())
         self._runs = [
             MemoryRun(
-                manifest_of(each, self._start_of(leg), None, {}, None),
+                manifest_of(each, self._start_of(leg), None, PERIOD, {}, None),
                 name=f"{each.controller.kind}-{each.design.name}",
             )
             for leg, each in enumerate(experiments)

@@ -14,7 +14,7 @@ from legbench.experiment.data import Experiment
 from legbench.experiment.tables import write_tables
 from legbench.guests import Registry, source_of
 from legbench.mjcf import xml_hash
-from legbench.plant.start import PERIOD, Start
+from legbench.plant.start import Start
 from legbench.plants import PLANTS
 from legbench.recording.controller_table import controller_table
 
@@ -67,6 +67,7 @@ def manifest_of(
     experiment: Experiment,
     start: Start,
     xml: str | None,
+    period: float,
     facts: Mapping[str, Any],
     folder: Path | None,
 ) -> dict[str, Any]:
@@ -76,6 +77,7 @@ def manifest_of(
         experiment: what is to happen.
         start: the state that it begins in.
         xml: the model; None: its text was not made, and its hash is left out.
+        period: time between two commands [s].
         facts: what the opened plant has to say.
         folder: the run folder, or one beside it; paths are told relative to it. None: the run is
             kept in memory, files are left out, and guests are called by their kind alone.
@@ -101,7 +103,7 @@ def manifest_of(
                 for guest in guests
             },
         },
-        "period": PERIOD,
+        "period": period,
         "initial_state": {
             "joint_pos": start.joint_pos.tolist(),
             "motor_pos": start.motor_pos.tolist(),

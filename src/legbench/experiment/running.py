@@ -8,6 +8,7 @@ from typing import Any
 
 from legbench.clock import AbstractClock
 from legbench.control import AbstractController, make_controller
+from legbench.control.needs import needs_of, run_on
 from legbench.errors import ConfigError, RecordingError
 from legbench.experiment.data import Experiment
 from legbench.experiment.manifest import guests_of, manifest_of
@@ -16,7 +17,8 @@ from legbench.interrupts import StopFlag, shielded
 from legbench.loop import Outcome, Progress, run
 from legbench.mjcf import model_text
 from legbench.onlooker import Onlooker
-from legbench.plant.start import PERIOD, Start
+from legbench.plant.opening import Needs
+from legbench.plant.start import Start
 from legbench.plants import Leg, OpenPlant, open_plant
 from legbench.recording.memory import MemoryRun
 from legbench.recording.reader import Recording
@@ -50,7 +52,8 @@ class Prepared:
 
     def manifest(self, folder: Path | None) -> dict[str, Any]:
         """Manifest of the run in `folder`; raises as `manifest_of`."""
-        return manifest_of(self.experiment, self.start, self.xml, self.opened.facts, folder)
+        period = self.opened.plant.period
+        return manifest_of(self.experiment, self.start, self.xml, period, self.opened.facts, folder)
 
 
 def record(
@@ -61,6 +64,7 @@ def record(
     stop: StopFlag | None = None,
     progress: Progress | None = None,
     on_started: Callable[[Path], None] | None = None,
+    on_note: Callable[[str], None] | None = None,
 ) -> Finished:
     """Run an experiment, in virtual time by default, and leave a run folder under `out`.
 
@@ -76,6 +80,7 @@ def record(
         progress: told now and then how far the run is.
         on_started: told the run folder before the first cycle. Neither can end the run: the first
             failure of each is an event of the run, and it is not called again.
+        on_note: called with each line that a person should know before anything moves.
 
     Raises:
         ConfigError: settings that the leg or the plant refuses; nothing is written.
@@ -86,12 +91,15 @@ def record(
             written by then stays readable.
     """
     watching, starting = Onlooker("progress", progress), Onlooker("on_started", on_started)
+    noting = Onlooker("on_note", on_note)
     with _prepared(experiment) as ready:
+        for line in ready.opened.notes:
+            noting(line)
         manifest, realtime = ready.manifest(out / "run"), ready.opened.realtime
         with _recording(out, manifest, ready.name, realtime=realtime) as writer:
             _begin(writer, ready)
             starting(writer.path)
-            outcome = _driven(ready, writer, (starting, watching), clock, stop)
+            outcome = _driven(ready, writer, (noting, starting, watching), clock, stop)
     return Finished(path=writer.path, outcome=outcome)
 
 
@@ -130,6 +138,11 @@ def _prepared(experiment: Experiment) -> Iterator[Prepared]:
         servo=experiment.servo,
         imperfections=experiment.imperfections,
         seed=experiment.seed,
+        needs=Needs(
+            controller=experiment.controller.kind,
+            signals=needs_of(experiment.controller),
+            run_on=run_on,
+        ),
     )
     controller = make_controller(experiment.controller, targets_of(experiment))
     imperfections = experiment.imperfections
@@ -155,7 +168,7 @@ def _driven(
         outcome = run(
             opened.plant,
             ready.controller,
-            round(ready.experiment.duration / PERIOD),
+            max(1, round(ready.experiment.duration / opened.plant.period)),
             clock=clock or opened.clock,
             sink=writer,
             stop=stop,
@@ -163,7 +176,7 @@ def _driven(
         )
     except BaseException as error:
         opened.plant.close()
-        _tell(writer, opened, onlookers, writer.rows * PERIOD)
+        _tell(writer, opened, onlookers, writer.rows * opened.plant.period)
         _add_trouble(error, opened.trouble())
         raise
     return _end(writer, opened, onlookers, outcome)

@@ -10,6 +10,9 @@ from legbench.limits.plausibility import LinkWatch, MotorWatch
 from legbench.limits.safety import START_TOLERANCE, UNLIMITED, SafetyLimits
 from legbench.limits.shortfall import Shortfall
 
+ALL = frozenset(("motor_pos", "joint_pos", "spring_torque"))
+"""Names of the signals of an axis that limits look at."""
+
 
 @final
 class Guard:
@@ -20,8 +23,28 @@ class Guard:
         shortfall: which wishes were let through otherwise than wished.
     """
 
-    def __init__(self, limits: SafetyLimits, period: float) -> None:
+    def __init__(
+        self,
+        limits: SafetyLimits,
+        period: float,
+        *,
+        known: Sequence[frozenset[str]] = (ALL, ALL),
+        two_encoders: bool = True,
+    ) -> None:
+        """Watch over a leg.
+
+        Args:
+            limits: what it may do.
+            period: of the cycles [s].
+            known: names of the signals that are known of each axis: motor_pos, joint_pos,
+                spring_torque. Limits of others do not act.
+            two_encoders: every axis has an encoder on both sides of its spring, without which
+                their readings cannot be held against each other.
+        """
         self._limits = limits
+        self._loads = tuple("spring_torque" in names for names in known)
+        self._shown = tuple("joint_pos" in names for names in known)
+        self._two_encoders = two_encoders
         self._step_max = limits.command_speed * period
         self._knee = None if limits.motor_knee_range == UNLIMITED else limits.motor_knee_range
         self._wish: tuple[float, ...] | None = None
@@ -155,6 +178,7 @@ class Guard:
         temperature: Sequence[float | None] = (),
         fresh: Sequence[bool] = (True, True),
         elapsed: int = 1,
+        led_pos: Sequence[float] | None = None,
     ) -> None:
         """Look at what a cycle showed.
 
@@ -166,6 +190,7 @@ class Guard:
             temperature: of each drive, None if it is not known [deg C].
             fresh: which drives have told something new in this cycle.
             elapsed: periods since the cycle before.
+            led_pos: positions that the drives' loops lead; by default those of the motors [rad].
 
         Raises:
             PlantFault: a limit is exceeded.
@@ -173,7 +198,7 @@ class Guard:
         limits = self._limits
         self._check_joints(joint_pos)
         for axis, value in enumerate(spring_torque, start=1):
-            if not abs(value) <= limits.spring_torque:
+            if not abs(value) <= limits.spring_torque and self._loads[axis - 1]:
                 raise PlantFault(
                     "spring torque",
                     f"spring {axis} carries {value:.3f} N m, the limit is "
@@ -187,19 +212,20 @@ class Guard:
                     f"{limits.temperature:g} deg C; let it cool down",
                 )
         if expected_pos is not None:
-            self._check_encoders(motor_pos, joint_pos, expected_pos, fresh, elapsed)
+            led = motor_pos if led_pos is None else led_pos
+            self._check_encoders(led, joint_pos, expected_pos, fresh, elapsed)
 
     def _check_joints(self, joint_pos: Sequence[float]) -> None:
         for axis, (value, (low, high)) in enumerate(
             zip(joint_pos, self._limits.joint_range, strict=True), start=1
         ):
-            if not low <= value <= high:
+            if not low <= value <= high and self._shown[axis - 1]:
                 raise PlantFault(
                     "joint range",
                     f"joint {axis} is at {value:.3f} rad, the limits are [{low:g}, {high:g}] rad",
                 )
         low, high = self._limits.joint_knee_range
-        if (low, high) != UNLIMITED and not low <= knee_of(joint_pos) <= high:
+        if (low, high) != UNLIMITED and all(self._shown) and not low <= knee_of(joint_pos) <= high:
             raise PlantFault(
                 "joint range",
                 f"q2 - q1 is at {knee_of(joint_pos):.3f} rad, the limits are [{low:g}, {high:g}] "
@@ -217,7 +243,9 @@ class Guard:
         found = None
         for axis, watch in enumerate(self._motors):
             found = watch.see(axis + 1, motor_pos[axis], expected_pos[axis]) or found
-        doubt = self._links.see(motor_pos, joint_pos, expected_pos, fresh, elapsed)
+        doubt = None
+        if self._two_encoders:
+            doubt = self._links.see(motor_pos, joint_pos, expected_pos, fresh, elapsed)
         if found is None and doubt is not None:
             # A motor that is not where it should be makes the springs sway, too: it is the cause.
             suspects = [watch.suspicion for watch in self._motors if watch.suspicion is not None]

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, final
 
-STANDING_CYCLES = 20
-"""A link that stands for so long while the other one swings is dead."""
+STANDING_TIME = 0.02
+"""A link that stands for so long while the other one swings is dead [s]."""
 STANDING_BAND = 0.002
 """A link within this band stands: more than one count of an encoder of 4 096 a turn [rad]."""
 SWAY_CYCLES = 4
@@ -117,6 +117,7 @@ class LinkWatch:
         self._forget = bounds.period / MEMORY
         self._fade = 1.0 - bounds.period / SWAY_MEMORY
         self._delay = round(SWAY_DELAY / bounds.period)
+        self._standing_cycles = max(2, round(STANDING_TIME / bounds.period))
         self._watches_standing = math.isfinite(bounds.standing)
         self._restart()
 
@@ -126,8 +127,11 @@ class LinkWatch:
         self._sway_age = 0
         self._sway_rest = self._led_rest = self._led = self._swayed = 0.0
         self._young = deque[float]()
-        self._links = (_window(), _window())
-        self._springs = (_window(), _window())
+        self._links = (self._window(), self._window())
+        self._springs = (self._window(), self._window())
+
+    def _window(self) -> deque[float]:
+        return deque(maxlen=self._standing_cycles)
 
     def start(self) -> None:
         """Begin anew with whatever is shown next."""
@@ -211,7 +215,7 @@ class LinkWatch:
         for place in (0, 1):
             self._links[place].append(joint_pos[place])
             self._springs[place].append(joint_pos[place] - motor_pos[place])
-        if len(self._links[0]) < STANDING_CYCLES:
+        if len(self._links[0]) < self._standing_cycles:
             return None
         limit = self._bounds.standing + self._widening
         if all(abs(shown[-1] - shown[0]) > STANDING_BAND for shown in self._links):
@@ -226,15 +230,11 @@ class LinkWatch:
                 return Doubt(
                     "joint encoder",
                     f"joint {place + 1} stands at {joint_pos[place]:.3f} rad for "
-                    f"{STANDING_CYCLES} cycles, in which the other one moved by {moved:.3f} rad; "
-                    f"the limit is {limit:.3f} rad: its encoder is dead, or the "
+                    f"{self._standing_cycles} cycles, in which the other one moved by "
+                    f"{moved:.3f} rad; the limit is {limit:.3f} rad: its encoder is dead, or the "
                     "link is blocked",
                 )
         return None
-
-
-def _window() -> deque[float]:
-    return deque(maxlen=STANDING_CYCLES)
 
 
 def _range(values: deque[float]) -> float:

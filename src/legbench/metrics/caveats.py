@@ -1,7 +1,10 @@
 """Caveats of a run in words: what it does not show although its reader may look for it."""
 
+import numpy as np
+
 from legbench.metrics.analysis import Analysis
 from legbench.metrics.roles import STATES, resting
+from legbench.signals import MEASURED
 
 
 def warnings_of(run: Analysis) -> list[str]:
@@ -21,6 +24,14 @@ def warnings_of(run: Analysis) -> list[str]:
             f" {described.controller} names no phase but rest: it is taken to act from"
             f" {run.time[run.first_action]:g} s on, where its command first moves"
         )
+    unknown = [name for name in MEASURED if not np.isfinite(run[name]).any()]
+    if unknown:
+        found.append(
+            f"{' and '.join(unknown)} are not known in any row, as of drives with one encoder that "
+            "send no torque: what follows from them is null"
+        )
+    if "joint_pos" in unknown:
+        return found
     rated = run.ratings.chosen
     if described.jumps and not run.has_truth and not _tells_stance(run):
         found.append(

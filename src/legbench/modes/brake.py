@@ -1,203 +1,158 @@
-"""Nonlinear normal modes as brake orbits: oscillations that stop at both ends.
+"""Brake orbits: oscillations that stop at both ends, the nonlinear modes of an undamped leg.
 
 A brake orbit starts at rest at q and is at rest again half a period later; by time reversal it
 then goes back the way it came. Shooting solves `v(T/2; q) = 0` for (q1, q2, T/2): two equations,
-three unknowns, so the solutions form curves, one out of each linear mode. Pseudo-arclength
-continuation follows such a curve through turning points, energy growing along it.
+three unknowns, so the solutions form curves, one out of each linear mode.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from typing import final
 
 import numpy as np
-from scipy.optimize import root_scalar
 
 from legbench.errors import ConfigError
-from legbench.modes.flow import flow, orbit
-from legbench.modes.linear import LinearMode, linear_modes
+from legbench.modes.carry import Carrier
+from legbench.modes.continuation import Solution, correct
+from legbench.modes.monodromy import Monodromy, monodromy
+from legbench.modes.roots import bracketed
 from legbench.modes.scene import Scene
 from legbench.signals import Floats
 
-FIRST = 0.01
-"""Amplitude at which a family starts, where the linear mode is near enough [rad]."""
-STEP = 0.05
-"""First arc length between two orbits; [rad], half periods count in units of the linear one."""
-RESIDUAL = 1e-9
+RESIDUAL = 1e-10
 """Speed left at the far end of a closed orbit [rad/s]."""
-NEWTON = 12
-"""Iterations until a step is given up and halved."""
-SHORTEST = 1e-4
-"""Arc length below which a family has ended."""
+NEARLY = 1e-4
+"""Speed left at the far end of an orbit next to a branch point [rad/s]: a leg that is matched to
+nine digits has no straight orbit there, but one that is straight to four."""
+SOFT = 0.01
+"""Share of the largest singular value below which a direction is left alone there [-]."""
+SAMPLES = 65
+"""Postures of half an orbit at which its bend and the joint limits are looked at [-]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BrakeOrbit:
-    """One oscillation of a mode."""
+    """One oscillation of a mode, which stops at both ends."""
 
     start: Floats
     """Posture at one end (2,) [rad]."""
     end: Floats
     """Posture at the other end (2,) [rad]."""
     period: float
-    """[s]"""
+    """Duration until the leg is back at its start [s]."""
     energy: float
     """Energy above rest [J]."""
     bend: float
     """Largest |z1| on the way for the radial mode, of z2's excursion from rest for the polar
     one [rad]: distance from the straight line that the mode would be."""
-    multipliers: tuple[complex, ...] = ()
-    """Floquet multipliers; two are one, the other two off the unit circle when unstable."""
+    monodromy: Monodromy
+    """Motion of its neighbours in one period, to first order."""
+    outside: str
+    """Joint that is beyond its limit somewhere on the way, and where; empty if none is."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Family:
-    """A mode's orbits by growing amplitude: backbone and generator curve."""
+@final
+class BrakeShooting:
+    """The equations of the brake orbits of one leg, scaled.
 
-    mode: LinearMode
-    orbits: tuple[BrakeOrbit, ...]
-    ended: str
-    """Why there are no more."""
+    Unknowns are (q1, q2, half the period over `unit`) [rad, rad, -].
 
-    @property
-    def largest(self) -> float:
-        """Energy up to which the mode was followed [J]."""
-        return max(orbit.energy for orbit in self.orbits)
-
-
-def _residual(scene: Scene, unknown: Floats, unit: float) -> tuple[Floats, Floats, Floats]:
-    """Speed and posture after half a period, and the speed's derivative by the unknowns."""
-    start = np.concatenate([unknown[:2], [0.0, 0.0]])
-    end, slope = flow(scene, start, unknown[2] * unit, np.eye(4)[:, :2])
-    last = np.array([value.real for value in scene.rates(end.tolist())])[2:] * unit
-    return end[2:], end[:2], np.column_stack([slope[2:], last])
-
-
-def _correct(
-    scene: Scene, guess: Floats, unit: float, row: Floats, value: float
-) -> tuple[Floats, Floats] | None:
-    """Newton's method on the orbit with `row . unknown = value`; unknowns and the far end."""
-    unknown = guess.copy()
-    for _ in range(NEWTON):
-        speed, end, slope = _residual(scene, unknown, unit)
-        wrong = np.concatenate([speed, [row @ unknown - value]])
-        if np.max(np.abs(wrong)) < RESIDUAL:
-            return unknown, end
-        change = np.linalg.solve(np.vstack([slope, row]), wrong)
-        if not np.all(np.isfinite(change)) or np.max(np.abs(change)) > 0.5:
-            return None
-        unknown = unknown - change
-    return None
-
-
-def _tangent(scene: Scene, unknown: Floats, unit: float, along: Floats) -> Floats:
-    _, _, slope = _residual(scene, unknown, unit)
-    tangent = np.linalg.svd(slope)[2][-1]
-    return tangent * np.sign(tangent @ along)
-
-
-def _describe(scene: Scene, unknown: Floats, end: Floats, unit: float, name: str) -> BrakeOrbit:
-    path = orbit(scene, unknown[:2], unknown[2] * unit, 60)
-    off = path.sum(axis=-1) if name == "radial" else np.diff(path - scene.rest, axis=-1)
-    return BrakeOrbit(
-        start=unknown[:2].copy(),
-        end=end.copy(),
-        period=2.0 * float(unknown[2]) * unit,
-        energy=float(scene.potential(unknown[:2])),
-        bend=float(np.max(np.abs(off)) / np.sqrt(2.0)),
-    )
-
-
-def follow(
-    scene: Scene,
-    name: str,
-    energy: float,
-    *,
-    most: int = 60,
-    progress: Callable[[int, int], None] | None = None,
-) -> Family:
-    """Continue the `radial` or `polar` mode from rest up to an energy [J], at most `most` orbits.
-
-    Raises:
-        ConfigError: an energy that is not positive, or a mode that is neither.
+    Args:
+        scene: the leg, how it is held, and where it rests.
+        name: mode that the orbits are taken to belong to, for their bend.
+        unit: half a period of the linear mode [s].
     """
-    modes = linear_modes(scene)
-    if name not in modes:
-        raise ConfigError(f"mode '{name}' is unknown; there are {', '.join(modes)}")
-    if not energy > 0.0:
-        raise ConfigError(f"energy is {energy:g} J; it must be positive")
-    mode = modes[name]
-    unit = 0.5 / mode.freq
-    along = np.concatenate([mode.shape, [0.0]])
-    unknown = np.concatenate([scene.rest, [1.0]]) + FIRST * along
-    solved = _correct(scene, unknown, unit, along, float(along @ unknown))
-    if solved is None:
-        raise ConfigError(f"the {name} mode does not exist at small amplitude: resonance")
-    unknown, end = solved
-    orbits = [_describe(scene, unknown, end, unit, name)]
-    step, ended = STEP, f"{most} orbits"
-    while len(orbits) < most:
-        along = _tangent(scene, unknown, unit, along)
-        solved = _correct(scene, unknown + step * along, unit, along, float(along @ unknown) + step)
+
+    def __init__(self, scene: Scene, name: str, unit: float) -> None:
+        self.scene, self.carrier = scene, Carrier(scene)
+        self.name, self.unit = name, unit
+
+    def equations(self, unknown: Floats) -> tuple[Floats, Floats]:
+        """Speed (2,) half a period after rest, and its derivative by the unknowns (2, 3)."""
+        done = self.carrier.carry(self.state(unknown), float(unknown[2]) * self.unit)
+        slope = np.column_stack([done.by_start[2:, :2], done.rate[2:] * self.unit])
+        return done.end[2:], slope
+
+    def state(self, unknown: Floats) -> Floats:
+        """State at rest (4,) where the orbit of some unknowns begins."""
+        return np.concatenate([unknown[:2], [0.0, 0.0]])
+
+    def correct(self, guess: Floats, row: Floats) -> Solution | None:
+        """The orbit near `guess` (3,) with the same component along `row` (3,), if there is one."""
+        return correct(self.equations, guess, row, float(row @ guess), RESIDUAL)
+
+    def energy(self, unknown: Floats) -> float:
+        """Energy above rest [J]."""
+        return float(self.scene.potential(unknown[:2]))
+
+    def orbit(self, unknown: Floats) -> BrakeOrbit:
+        """The orbit of solved unknowns (3,)."""
+        start, half = self.state(unknown), float(unknown[2]) * self.unit
+        path = self.carrier.path(start, np.linspace(0.0, half, SAMPLES))[:, :2]
+        rest = np.asarray(self.scene.rest)
+        off = path.sum(axis=-1) if self.name == "radial" else np.diff(path - rest, axis=-1)
+        return BrakeOrbit(
+            start=unknown[:2].copy(),
+            end=path[-1].copy(),
+            period=2.0 * half,
+            energy=self.energy(unknown),
+            bend=float(np.max(np.abs(off)) / np.sqrt(2.0)),
+            monodromy=monodromy(self.carrier, start, 2.0 * half),
+            outside=beyond_limits(self.scene, path),
+        )
+
+    def unknown_of(self, orbit: BrakeOrbit) -> Floats:
+        """Unknowns (3,) of an orbit."""
+        return np.array([*orbit.start, 0.5 * orbit.period / self.unit])
+
+    def between(self, first: Floats, last: Floats, share: float) -> Floats:
+        """Unknowns (3,) of the orbit that lies at a share of the way from one to another.
+
+        Raises:
+            ConfigError: there is none.
+        """
+        guess = first + share * (last - first)
+        solved = self.correct(guess, _unit(last - first))
         if solved is None:
-            step *= 0.5
-            if step < SHORTEST:
-                ended = "the family ends: no orbit continues it"
-                break
-            continue
-        unknown, end = solved
-        found = _describe(scene, unknown, end, unit, name)
-        if not (scene.inside(found.start) and scene.inside(found.end)):
-            ended = "a joint reaches its limit"
-            break
-        orbits.append(found)
-        step = min(1.3 * step, STEP)
-        if progress is not None:
-            progress(min(len(orbits), most - 1), most)
-        if found.energy >= energy:
-            ended = "the energy asked for"
-            break
-    return Family(mode=mode, orbits=tuple(orbits), ended=ended)
-
-
-def at_energy(scene: Scene, family: Family, energy: float) -> BrakeOrbit:
-    """The orbit of a family that has just this energy [J].
-
-    Raises:
-        ConfigError: the mode does not exist at that energy; the message says up to which it does.
-    """
-    name, unit = family.mode.name, 0.5 / family.mode.freq
-    for before, after in zip(family.orbits, family.orbits[1:], strict=False):
-        if before.energy <= energy <= after.energy:
-            first, last = (
-                np.array([*found.start, 0.5 * found.period / unit]) for found in (before, after)
+            raise ConfigError(
+                f"the {self.name} mode is lost near {self.energy(guess):.4g} J: no orbit between "
+                "two that were found"
             )
-            row = last - first
+        return solved.unknown
 
-            def corrected(
-                share: float, first: Floats = first, row: Floats = row
-            ) -> tuple[Floats, Floats]:
-                guess = first + share * row
-                solved = _correct(scene, guess, unit, row, float(row @ guess))
-                if solved is None:
-                    raise ConfigError(f"the {name} mode is lost near {energy:.4g} J")
-                return solved
+    def nearly(self, first: Floats, last: Floats, share: float) -> Floats:
+        """Unknowns (3,) as of `between`, but closed to `NEARLY` only, where a branch point is near.
 
-            share = root_scalar(
-                lambda s: float(scene.potential(corrected(s)[0][:2])) - energy,
-                bracket=(0.0, 1.0),
-                xtol=1e-13,
-            ).root
-            unknown, end = corrected(float(share))
-            return _describe(scene, unknown, end, unit, name)
-    raise ConfigError(
-        f"the {name} mode does not exist at {energy:.4g} J: it was followed from "
-        f"{family.orbits[0].energy:.2g} to {family.largest:.4g} J, where {family.ended}"
-    )
+        Raises:
+            ConfigError: there are none.
+        """
+        guess, row = first + share * (last - first), _unit(last - first)
+        value = float(row @ guess)
+        solved = correct(self.equations, guess, row, value, NEARLY, stiff=SOFT)
+        if solved is None:
+            raise ConfigError(f"the {self.name} mode is lost near {self.energy(guess):.4g} J")
+        return solved.unknown
+
+    def with_energy(self, first: Floats, last: Floats, energy: float) -> BrakeOrbit:
+        """The orbit of an energy [J] that lies between those of two unknowns (3,)."""
+        share = bracketed(
+            lambda share: self.energy(self.between(first, last, share)) - energy, 0.0, 1.0, 1e-13
+        )
+        return self.orbit(self.between(first, last, share))
 
 
-def floquet(scene: Scene, found: BrakeOrbit) -> tuple[complex, ...]:
-    """Floquet multipliers of an orbit: eigenvalues of the flow's derivative over a period."""
-    start = np.concatenate([found.start, [0.0, 0.0]])
-    _, monodromy = flow(scene, start, found.period, np.eye(4))
-    values = np.linalg.eigvals(monodromy)
-    return tuple(complex(value) for value in values[np.argsort(-np.abs(values))])
+def _unit(vector: Floats) -> Floats:
+    return vector / np.linalg.norm(vector)
+
+
+def beyond_limits(scene: Scene, path: Floats) -> str:
+    """Joint that a path of postures (n, 2) takes furthest beyond its limit; empty if none."""
+    limits = scene.design.limits
+    worst, said = 0.0, ""
+    for joint, angle, (low, high) in (
+        ("knee", path[:, 1] - path[:, 0], limits.knee),
+        ("hip", path[:, 0], limits.hip),
+    ):
+        for over, limit in ((low - np.min(angle), low), (np.max(angle) - high, high)):
+            if over > worst:
+                worst, said = float(over), f"the {joint} reaches its limit of {limit:g} rad"
+    return said

@@ -86,13 +86,14 @@ class JumpLaw(AbstractDrive):
     threshold of the controller is a level of y, and every extreme one of its turns.
 
     Raises:
-        ConfigError: a set point that the leg cannot reach.
+        ConfigError: settings that the controller itself refuses for this leg.
     """
 
     def __init__(self, config: JumpConfig, design: LegDesign) -> None:
         targets = LegTargets(
             designs=design, support=Support.FOOT, convention=ModalConvention.ORTHONORMAL
         )
+        config.build(targets)
         self._exits, self._turn = phase_exits(config), config.apex_turn
         k1, k2 = design.stiffness
         self._k = min(k1, k2)
@@ -106,6 +107,7 @@ class JumpLaw(AbstractDrive):
         torque = np.asarray(design.stiffness) * (folded - rest)
         self._standing = -float(targets.radial(torque))
         self._extreme, self._loaded = 0.0, False
+        self._levels: Levels | None = None
         self._enter(JumpPhase.FLIGHT)
 
     def restart(self) -> None:
@@ -113,7 +115,12 @@ class JumpLaw(AbstractDrive):
         self._enter(JumpPhase.FLIGHT)
 
     def levels(self) -> Levels:
-        """The transitions out of the phase."""
+        """The transitions out of the phase; the same object as long as they are the same."""
+        if self._levels is None:
+            self._levels = self._new_levels()
+        return self._levels
+
+    def _new_levels(self) -> Levels:
         match self.phase:
             case JumpPhase.FLIGHT if self._loaded:
                 return Levels(lower=self._at_load())
@@ -128,6 +135,7 @@ class JumpLaw(AbstractDrive):
 
     def happen(self, what: Watched, value: float, time: float) -> None:
         """Advance the phases."""
+        self._levels = None
         match (self.phase, what):
             case (JumpPhase.FLIGHT, Watched.RISE):
                 self._load(time)
@@ -148,6 +156,7 @@ class JumpLaw(AbstractDrive):
 
     def ring(self, value: float, time: float) -> None:
         """The release is over, or a load has lasted."""
+        self._levels = None
         if self._loaded:
             self._leave(value)
             return
@@ -175,7 +184,7 @@ class JumpLaw(AbstractDrive):
     def _enter(self, phase: JumpPhase) -> None:
         self.phase, self._exit = phase, self._exits[phase]
         self.motor = self._stretched if phase is JumpPhase.PUSH else self._folded
-        self.alarm, self._loaded = math.inf, False
+        self.alarm, self._loaded, self._levels = math.inf, False, None
 
     def _at_load(self) -> float:
         """The y of the load that ends the phase, at the present motor position."""

@@ -40,8 +40,8 @@ Derivative = Callable[[TaylorLeg, AbstractDrive, Apex], Floats]
 """Function that gives the map's derivative at an apex (6, 6), in `UNITS`."""
 
 
-def derivative(leg: TaylorLeg, drive: AbstractDrive, at: Apex) -> Floats:
-    """Exact derivative of the map from the variational equations (6, 6), in `UNITS`.
+def tangent_map(leg: TaylorLeg, drive: AbstractDrive, at: Apex) -> tuple[Floats, Floats]:
+    """The next apex (6,), and its exact derivative by this one (6, 6), both in `UNITS`.
 
     The hop is followed on dual numbers; the drive must make its levels and alarms of what it is
     told by sums and products. Not for a touchdown without speed, where the map is not smooth.
@@ -53,8 +53,18 @@ def derivative(leg: TaylorLeg, drive: AbstractDrive, at: Apex) -> Floats:
     done = return_map(leg.varied, drive, start)
     if done.after is None:
         raise _lost(at, done)
-    rows = [gradient(getattr(done.after, name)) for name in NAMES]
-    return np.stack(rows) * UNITS / UNITS[:, np.newaxis]
+    values = [getattr(done.after, name) for name in NAMES]
+    slope = np.stack([gradient(value) for value in values])
+    return np.array([float(value) for value in values]) / UNITS, slope * UNITS / UNITS[:, None]
+
+
+def derivative(leg: TaylorLeg, drive: AbstractDrive, at: Apex) -> Floats:
+    """Exact derivative of the map from the variational equations (6, 6), in `UNITS`.
+
+    Raises:
+        ConfigError: the hop does not return to an apex.
+    """
+    return tangent_map(leg, drive, at)[1]
 
 
 def differences(leg: TaylorLeg, drive: AbstractDrive, at: Apex) -> Floats:

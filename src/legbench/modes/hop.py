@@ -5,14 +5,13 @@ changes nothing, so six numbers say where the leg is (`Apex`), and a hop maps si
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 
-from legbench.analytic.equations import Pair
-from legbench.analytic.hybrid import switch
+from legbench.analytic.course import Course
+from legbench.analytic.equations import Pair, pair_kinetic
 from legbench.analytic.model import LegModel
 from legbench.analytic.state import LegState, Regime, flying
 from legbench.analytic.taylor import TaylorLeg, Watched
@@ -68,14 +67,33 @@ class Apex:
         """Inverse of `vector`."""
         return cls(**dict(zip(NAMES, vector.tolist(), strict=True)))
 
+    @classmethod
+    def at(cls, height: float, speed: float, q: Pair, v: Pair) -> "Apex":
+        """The apex of a leg with these angles [rad] and rates [rad/s]."""
+        (q1, q2), (v1, v2) = q, v
+        return cls(
+            height=height,
+            speed=speed,
+            z1=SCALE * (q1 + q2),
+            z2=SCALE * (q2 - q1),
+            dz1=SCALE * (v1 + v2),
+            dz2=SCALE * (v2 - v1),
+        )
+
+    def angles(self) -> tuple[Pair, Pair]:
+        """Angles q1, q2 [rad] and their rates [rad/s]."""
+        return (
+            (SCALE * (self.z1 - self.z2), SCALE * (self.z1 + self.z2)),
+            (SCALE * (self.dz1 - self.dz2), SCALE * (self.dz1 + self.dz2)),
+        )
+
     def state(self, model: LegModel) -> LegState:
         """The leg there, at time zero.
 
         Raises:
             ConfigError: the foot would be below the ground.
         """
-        q = (SCALE * (self.z1 - self.z2), SCALE * (self.z1 + self.z2))
-        v = (SCALE * (self.dz1 - self.dz2), SCALE * (self.dz1 + self.dz2))
+        q, v = self.angles()
         centre = model.mass_centre_from_hip(q)
         moved = model.mass_centre_vel_from_hip(q, v)
         trunk = (-centre[0], self.height - centre[1])
@@ -84,15 +102,9 @@ class Apex:
 
 def apex_of(model: LegModel, state: LegState) -> Apex:
     """The section's numbers of a leg in flight."""
-    (q1, q2), (v1, v2) = state.q, state.v
-    return Apex(
-        height=state.trunk_pos[1] + model.mass_centre_from_hip(state.q)[1],
-        speed=state.trunk_vel[0] + model.mass_centre_vel_from_hip(state.q, state.v)[0],
-        z1=SCALE * (q1 + q2),
-        z2=SCALE * (q2 - q1),
-        dz1=SCALE * (v1 + v2),
-        dz2=SCALE * (v2 - v1),
-    )
+    height = state.trunk_pos[1] + model.mass_centre_from_hip(state.q)[1]
+    speed = state.trunk_vel[0] + model.mass_centre_vel_from_hip(state.q, state.v)[0]
+    return Apex.at(height, speed, state.q, state.v)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,72 +124,95 @@ class Hop:
     """Energy lost to the ground [J]."""
 
 
-Observer = Callable[[LegState], None]
-"""Called with every state at which the integration paused."""
+def hop(leg: TaylorLeg, drive: AbstractDrive, start: Apex) -> Hop:
+    """Follow a leg from an apex through stance to its next apex.
 
-
-def hop(
-    leg: TaylorLeg, drive: AbstractDrive, start: LegState, observer: Observer | None = None
-) -> Hop:
-    """Follow a leg in flight, from wherever in it, through stance to its next apex."""
-    model, state, first = leg.model, start, start.time
+    Raises:
+        ConfigError: a start below the ground.
+    """
+    course = leg.course
+    _launch(course, start)
     touchdown = liftoff = math.nan
-    lost, ending = 0.0, Ending.STANDS
+    lost, ending = 0.0, None
     try:
         for _ in range(CALLS):
-            until, at_apex = min(first + HORIZON, drive.alarm), False
-            if state.regime is Regime.FLIGHT and not math.isnan(liftoff):
-                apex = state.time + _rise_time(model, state)
-                if state.time < apex <= until:
-                    until, at_apex = apex, True
-            state, what = leg.watch(state, until, drive.motor, drive.levels())
-            if observer is not None:
-                observer(state)
-            if abs(state.q[0] + state.q[1]) > 2.0 * FALLEN:
-                ending = Ending.FELL
+            what, ending = _pause(course, drive, flew=not math.isnan(liftoff))
+            if ending is not None:
                 break
-            if what is Watched.CONTACT:
-                after = switch(model, state)
-                if after.regime is Regime.STANCE:
-                    lost += _kinetic(model, state) - _kinetic(model, after)
-                    touchdown = state.time if math.isnan(touchdown) else touchdown
-                else:
-                    liftoff = state.time
-                state = after
-            elif what is not None:
-                drive.happen(what, _probe(drive, state.q), state.time)
-            elif state.time >= drive.alarm:
-                drive.ring(_probe(drive, state.q), state.time)
-            elif at_apex:
-                ending = Ending.APEX if drive.settled else Ending.FAULT
-                break
+            if what is Watched.CONTACT and course.regime is Regime.FLIGHT:
+                lost += _kinetic(course)
+                course.switch()
+                lost -= _kinetic(course)
+                touchdown = course.time if math.isnan(touchdown) else touchdown
+            elif what is Watched.CONTACT:
+                course.switch()
+                liftoff = course.time
+            elif what is None:
+                drive.ring(_probe(drive, course.q), course.time)
             else:
-                break
-        else:
-            ending = Ending.FAULT
+                drive.happen(what, _probe(drive, course.q), course.time)
     except PlantFault:
         ending = Ending.FAULT
     return Hop(
-        ending=ending,
-        after=apex_of(model, state) if ending is Ending.APEX else None,
-        duration=state.time - first,
-        touchdown=touchdown - first,
-        liftoff=liftoff - first,
+        ending=ending or Ending.FAULT,
+        after=_reached(course) if ending is Ending.APEX else None,
+        duration=course.time,
+        touchdown=touchdown,
+        liftoff=liftoff,
         impact=lost,
     )
 
 
-def _rise_time(model: LegModel, state: LegState) -> float:
-    moved = model.mass_centre_vel_from_hip(state.q, state.v)[1]
-    return (state.trunk_vel[1] + moved) / model.floating.gravity
+def _pause(
+    course: Course, drive: AbstractDrive, *, flew: bool
+) -> tuple[Watched | None, Ending | None]:
+    """Go on to the next event, alarm or ending; `flew` if the leg has let go of the ground."""
+    until, apex = min(HORIZON, drive.alarm), math.inf
+    if flew and course.regime is Regime.FLIGHT:
+        apex = course.apex_time()
+        if course.time <= apex <= until:
+            until = apex
+    course.hold(drive.motor)
+    what = course.go(until, drive.levels())
+    if what is Watched.FELL:
+        return what, Ending.FELL
+    if what is not None or course.time >= drive.alarm:
+        return what, None
+    if until == apex:
+        return what, Ending.APEX if drive.settled else Ending.FAULT
+    return what, Ending.STANDS
+
+
+def _launch(course: Course, start: Apex) -> None:
+    """Put a leg at an apex.
+
+    Raises:
+        ConfigError: the foot would be below the ground.
+    """
+    q, v = start.angles()
+    if start.height + course.foot_from_centre(q)[1] < 0.0:
+        start.state(course.model)  # says so
+    course.fly(q, v, (0.0, start.height), (start.speed, 0.0), 2.0 * FALLEN)
+
+
+def _reached(course: Course) -> Apex:
+    """The section's numbers of a leg at its apex."""
+    (_, height), (speed, _) = course.centre()
+    return Apex.at(height, speed, course.q, course.v)
+
+
+def _kinetic(course: Course) -> float:
+    """Kinetic energy of a leg in flight or stance [J]."""
+    model, ops = course.model, course.model.ops
+    if course.regime is not Regime.FLIGHT:
+        return pair_kinetic(ops, model.stance, course.q, course.v)
+    dx, dz = course.centre()[1]
+    own = 0.5 * model.floating.mass * (dx * dx + dz * dz)
+    return own + pair_kinetic(ops, model.falling, course.q, course.v)
 
 
 def _probe(drive: AbstractDrive, q: Pair) -> float:
     return drive.probe[0] * q[0] + drive.probe[1] * q[1]
-
-
-def _kinetic(model: LegModel, state: LegState) -> float:
-    return model.floating_energy(0.0, state.trunk_vel, state.q, state.v)[1]
 
 
 def return_map(leg: TaylorLeg, drive: AbstractDrive, start: Apex) -> Hop:
@@ -187,18 +222,15 @@ def return_map(leg: TaylorLeg, drive: AbstractDrive, start: Apex) -> Hop:
         ConfigError: a start below the ground.
     """
     drive.restart()
-    return hop(leg, drive, start.state(leg.model))
+    return hop(leg, drive, start)
 
 
 def settle(leg: TaylorLeg, drive: AbstractDrive, start: Apex, hops: int) -> list[Apex]:
     """Apexes of up to `hops` hops in a row, the start first; fewer when the leg stops hopping."""
-    drive.restart()
-    apexes, state = [start], start.state(leg.model)
+    apexes = [start]
     for _ in range(hops):
-        done = hop(leg, drive, state)
+        done = return_map(leg, drive, apexes[-1])
         if done.after is None:
             break
         apexes.append(done.after)
-        drive.restart()
-        state = done.after.state(leg.model)
     return apexes

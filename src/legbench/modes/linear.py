@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import eigh
 
 from legbench.modes.scene import Scene
 from legbench.signals import Floats
@@ -29,7 +28,10 @@ class LinearMode:
 def linear_modes(scene: Scene) -> dict[str, LinearMode]:
     """Solve `K w = omega^2 M w` at rest; keys `radial` and `polar`."""
     rest = np.asarray(scene.rest)
-    values, vectors = eigh(scene.stiffness(rest), scene.mass(rest))
+    # In coordinates in which the inertia is one, the stiffness is symmetric still.
+    unit = np.linalg.inv(np.linalg.cholesky(scene.mass(rest)))
+    values, vectors = np.linalg.eigh(unit @ scene.stiffness(rest) @ unit.T)
+    vectors = unit.T @ vectors
     shapes = (vectors / np.linalg.norm(vectors, axis=0)).T
     radial = int(np.argmax(np.abs(shapes @ RADIAL)))
     modes = {}

@@ -15,21 +15,23 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import root, root_scalar
 
+from legbench.analytic.contact import switch
 from legbench.analytic.equations import Pair
-from legbench.analytic.hybrid import switch
 from legbench.analytic.state import standing
 from legbench.analytic.taylor import SILENT, TaylorLeg, Watched
 from legbench.modes.drive import Passive
 from legbench.modes.fixed_point import UNITS, FixedPoint, differences
 from legbench.modes.hop import SCALE, Apex, apex_of, return_map
+from legbench.modes.roots import bracketed, solved
 from legbench.signals import Floats
 
 STANCE = 2.0
 """Longest [s]."""
 STILL = 1e-9
 """Speeds left at the apex of a solved hop [m/s, rad/s]."""
+CLOSE = 1e-12
+"""Speeds at which the solution ends [m/s, rad/s]."""
 CLOSED = 1e-5
 """Distance between an apex and the next one of a hop without impact, in `UNITS` [-]."""
 NUDGE = 1e-10
@@ -88,7 +90,7 @@ def depths(leg: TaylorLeg, half: float, halves: Floats) -> list[float]:
         halves[:-1], halves[1:], values[:-1], values[1:], strict=True
     ):
         if before * after < 0.0:
-            depth = float(root_scalar(still, bracket=(low, high), xtol=1e-14).root)
+            depth = bracketed(still, float(low), float(high), 1e-14)
             if abs(still(depth)) < 1e-6:  # else a jump, not a zero
                 found.append(depth)
     return found
@@ -107,15 +109,17 @@ def free_hop(leg: TaylorLeg, half: float, depth: float) -> FreeHop | None:
         folded, lean, z1 = unknown.tolist()
         return rebound(leg, motor_of(z1), (lean - folded, lean + folded))
 
-    def moving(unknown: Floats) -> list[float]:
+    def moving(unknown: Floats) -> Floats:
         apex = let_go(unknown)
-        return [math.nan] * 3 if apex is None else [apex.dz1, apex.dz2, 10.0 * apex.speed]
+        if apex is None:
+            return np.full(3, math.nan)
+        return np.array([apex.dz1, apex.dz2, 10.0 * apex.speed])
 
-    solved = root(moving, [depth, 0.0, 0.0], tol=1e-13)
-    apex = let_go(solved.x)
-    if apex is None or not np.max(np.abs(moving(solved.x))) < STILL:
+    found = solved(moving, np.array([depth, 0.0, 0.0]), CLOSE)
+    apex = let_go(found)
+    if apex is None or not np.max(np.abs(moving(found))) < STILL:
         return None
-    motor = motor_of(float(solved.x[2]))
+    motor = motor_of(float(found[2]))
     point = _closed(leg, Passive(motor), apex)
     if point is None:
         return None

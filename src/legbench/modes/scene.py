@@ -2,24 +2,42 @@
 
 import math
 from dataclasses import dataclass
+from enum import StrEnum
 
 import numpy as np
 
 from legbench.analytic import LegModel, PairTerms, equations
 from legbench.analytic.matrices import pair_gravity, pair_mass
 from legbench.design import LegDesign
-from legbench.design.setup import SetupKind
 from legbench.design.statics import GRAVITY, Support, equilibrium, motor_holding
 from legbench.errors import ConfigError, DesignError
 from legbench.kinematics import modal_to_joint
 from legbench.signals import Floats
 
+
+class Holding(StrEnum):
+    """How the leg is held while it oscillates."""
+
+    HFTS = "hfts"
+    """Trunk fixed, no gravity."""
+    VFTS = "vfts"
+    """Trunk fixed, the leg hangs."""
+    FFS = "ffs"
+    """Foot pinned."""
+    JUMP = "jump"
+    """The stance of a jump: foot pinned."""
+    FLIGHT = "flight"
+    """Nothing held: the angles turn about the falling centre of mass."""
+
+
 SUPPORTED = {
-    SetupKind.HFTS: Support.NONE,
-    SetupKind.VFTS: Support.TRUNK,
-    SetupKind.FFS: Support.FOOT,
-    SetupKind.JUMP: Support.FOOT,
+    Holding.HFTS: Support.NONE,
+    Holding.VFTS: Support.TRUNK,
+    Holding.FFS: Support.FOOT,
+    Holding.JUMP: Support.FOOT,
+    Holding.FLIGHT: Support.NONE,
 }
+"""What carries the leg's weight."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,7 +45,7 @@ class Scene:
     """Two angles, their springs at fixed motors, and the posture in which they rest."""
 
     design: LegDesign
-    kind: SetupKind
+    kind: Holding
     model: LegModel
     terms: PairTerms
     motor: tuple[float, float]
@@ -72,7 +90,7 @@ class Scene:
         return bool(low and limits.knee[0] <= q[1] - q[0] <= limits.knee[1])
 
 
-def make_scene(design: LegDesign, kind: SetupKind, z2: float) -> Scene:
+def make_scene(design: LegDesign, kind: Holding, z2: float) -> Scene:
     """The leg at rest at the radial set point z2 (orthonormal, of the link) [rad].
 
     Raises:
@@ -80,7 +98,7 @@ def make_scene(design: LegDesign, kind: SetupKind, z2: float) -> Scene:
     """
     if not math.isfinite(z2):
         raise ConfigError(f"set point z2 is {z2:g} rad; it must be a number")
-    gravity = 0.0 if kind is SetupKind.HFTS else GRAVITY
+    gravity = 0.0 if kind in (Holding.HFTS, Holding.FLIGHT) else GRAVITY
     model = LegModel.of(design, gravity=gravity, stops=False, undamped=True)
     support = SUPPORTED[kind]
     rest = modal_to_joint(np.array([0.0, z2]))
@@ -98,7 +116,7 @@ def make_scene(design: LegDesign, kind: SetupKind, z2: float) -> Scene:
         design=design,
         kind=kind,
         model=model,
-        terms=model.stance if support is Support.FOOT else model.hanging,
+        terms=_terms(model, kind),
         motor=(float(motor[0]), float(motor[1])),
         rest=(float(rest[0]), float(rest[1])),
     )
@@ -115,3 +133,13 @@ def make_scene(design: LegDesign, kind: SetupKind, z2: float) -> Scene:
             f"{limits.knee}"
         )
     return scene
+
+
+def _terms(model: LegModel, kind: Holding) -> PairTerms:
+    match kind:
+        case Holding.FLIGHT:
+            return model.falling
+        case Holding.FFS | Holding.JUMP:
+            return model.stance
+        case _:
+            return model.hanging

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from legbench.analytic.hybrid import switch
+from legbench.analytic.contact import switch
 from legbench.analytic.model import LegModel
 from legbench.analytic.state import LegState, Regime
 from legbench.analytic.taylor import Levels, TaylorLeg, Watched

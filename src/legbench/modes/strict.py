@@ -8,10 +8,9 @@ an acceleration by M^-1, is tangent to it, so that nothing pushes the leg off.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from legbench.analytic.matrices import pair_coriolis
-from legbench.modes.flow import orbit
+from legbench.modes.carry import Carrier
 from legbench.modes.linear import RADIAL
 from legbench.modes.scene import Scene
 from legbench.signals import Floats
@@ -61,15 +60,6 @@ def radial_line(scene: Scene, reach: float) -> Curve:
     return Curve(points=points, tangent=tangent, bend=np.zeros(points.shape))
 
 
-def curve_through(points: Floats) -> Curve:
-    """A smooth curve through points (n, 2) in order, no two the same."""
-    steps = np.linalg.norm(np.diff(points, axis=0), axis=-1)
-    at = np.concatenate([[0.0], np.cumsum(steps)])
-    spline = CubicSpline(at, points)
-    knots = np.linspace(0.0, at[-1], KNOTS)
-    return Curve(points=spline(knots), tangent=spline(knots, 1), bend=spline(knots, 2))
-
-
 def check(scene: Scene, curve: Curve, seconds: float) -> Strictness:
     """Measure both conditions along the curve, and their consequence by integration."""
     norm = np.linalg.norm(curve.tangent, axis=-1, keepdims=True)
@@ -90,7 +80,8 @@ def check(scene: Scene, curve: Curve, seconds: float) -> Strictness:
 
 
 def _strays(scene: Scene, curve: Curve, seconds: float) -> float:
-    path = orbit(scene, curve.points[-1], seconds, 400)
+    start = np.concatenate([curve.points[-1], [0.0, 0.0]])
+    path = Carrier(scene).path(start, np.linspace(0.0, seconds, 400))[:, :2]
     first, last = curve.points[:-1], curve.points[1:]
     way = last - first
     share = np.einsum("nki,ki->nk", path[:, np.newaxis] - first, way) / np.sum(way**2, axis=-1)

@@ -8,8 +8,9 @@ import numpy as np
 from legbench.drives.master.link import Link, LinkState, Sample
 from legbench.drives.master.session import Session
 from legbench.plant.abstract import AbstractPlant
+from legbench.plant.can_needs import known_of
 from legbench.plant.gone_drive import gone_drive
-from legbench.plant.landing import Landing, land
+from legbench.plant.landing import PATIENCE, Landing, land
 from legbench.plant.start import Start
 from legbench.plant.velocity import VelocityEstimate
 from legbench.signals import Command, Floats, Observation
@@ -18,10 +19,10 @@ VELOCITY_BANDWIDTH = 200.0
 """Corner frequency of the velocity estimate [Hz]."""
 STILL_SPEED = 0.05
 """Speed below which a leg counts as at rest [rad/s]."""
-STILL_CYCLES = 100
-"""Number of cycles for which the leg must rest before a run begins."""
-STILL_PATIENCE = 5000
-"""Number of cycles after which a run begins anyway; a leg that swings for long is no fault."""
+STILL_TIME_MS = 100
+"""Time for which the leg must rest before a run begins [ms]."""
+STILL_PATIENCE_MS = 5000
+"""Time after which a run begins anyway [ms]; a leg that swings for long is no fault."""
 
 
 @final
@@ -35,7 +36,9 @@ class CanPlant(AbstractPlant):
     the encoders' difference over the time between two SYNCs behind a first-order low-pass of
     200 Hz, 0.8 ms late; a drive whose answer is missing keeps its velocity. `applied_pos` is what
     the limits let through; in read-only, where nothing is commanded, it is where the motors are.
-    There is no truth. A command is seen two observations later: one cycle more than in `SimPlant`.
+    There is no truth. What a drive with one encoder does not tell is not a number, see
+    `drives.setup.encoders`. A command is seen two observations later: one cycle more than in
+    `SimPlant`.
 
     Attributes:
         link: the cyclic link.
@@ -91,11 +94,11 @@ class CanPlant(AbstractPlant):
         if not self._read_only:
             sample = self.link.move_to(self._start.motor_pos.tolist(), self._speed)
         self._velocity.reset(sample.time_ns, sample.link_pos)
-        still = 0
-        for _ in range(STILL_PATIENCE):
+        still, cycles_in = 0, self._session.config.cycles_in
+        for _ in range(cycles_in(STILL_PATIENCE_MS)):
             seen = self._observe(self._exchange(self._start.motor_pos))
             still = still + 1 if np.max(np.abs(seen.joint_vel)) < STILL_SPEED else 0
-            if still >= STILL_CYCLES:
+            if still >= cycles_in(STILL_TIME_MS):
                 break
         sample = self._exchange(self._start.motor_pos)
         self.link.shortfall.restart()
@@ -130,6 +133,11 @@ class CanPlant(AbstractPlant):
             period=self.period,
             interrupted=interrupted,
         )
+        if landing.trouble is not None and "joint_pos" not in known_of(self._session.config):
+            return (
+                "whether the leg rests is not known, as a link has no encoder; its power went "
+                f"{PATIENCE:g} s after it had been led to its rest posture"
+            )
         return landing.trouble
 
     def _lead(self, motor_pos: Sequence[float]) -> tuple[Sequence[float], Sequence[float]]:

@@ -16,6 +16,8 @@ def bus_events(plant: CanPlant) -> dict[str, dict[str, Any]]:
         events[LOG_FAILED] = {"error": log.error}
     if link.listener_error is not None:
         events["onlooker failed"] = {"who": "listener", "error": link.listener_error}
+    if link.unprotected:
+        events["not protected"] = {"lines": list(link.unprotected)}
     if link.stopped is not None and link.stopped != StopReport():
         events["stop"] = asdict(link.stopped)
     if plant.landing is not None:

@@ -1,27 +1,30 @@
 """Opening servo drives on a CAN bus as a plant, with what a run on them logs and tells."""
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any, final
 
 from legbench.clock import AbstractClock
 from legbench.drives.emulated.behaviour import Behaviour
-from legbench.drives.emulated.build import emulate, on_bench
+from legbench.drives.emulated.build import emulate, emulate_channels, on_bench
 from legbench.drives.emulated.bus import LockstepBus
+from legbench.drives.emulated.channels_bus import ChannelsBus
 from legbench.drives.emulated.network import Network
 from legbench.drives.master.session import Session
 from legbench.drives.setup.bus_file import load_bus
+from legbench.drives.setup.bus_numbers import RUN_PERIODS_US
 from legbench.drives.setup.checks import check_together
 from legbench.drives.setup.config import BusConfig
+from legbench.drives.setup.exchange import check_budget
 from legbench.drives.setup.waivers import describe_waivers
-from legbench.drives.setup.wire import check_load
-from legbench.drives.transport.lock import ChannelLock
-from legbench.drives.transport.open_bus import adapter_of, open_bus
+from legbench.drives.transport.open_channels import adapters_of, open_channels
 from legbench.drives.transport.realtime import Granted
 from legbench.errors import ConfigError
 from legbench.limits.safety import SafetyLimits
 from legbench.plant.can import CanPlant
 from legbench.plant.can_choice import BUS_LOG, EMULATED, LIMITS_NAME, CanChoice
 from legbench.plant.can_events import bus_events
+from legbench.plant.can_needs import check_needs
 from legbench.plant.design_limits import joint_ranges, limits_events, limits_within
 from legbench.plant.emulated_leg import EmulatedLeg
 from legbench.plant.gone_drive import gone_drive
@@ -31,6 +34,8 @@ from legbench.plant.opening import Leg, OpenPlant
 from legbench.plant.start import PERIOD
 from legbench.servo import ServoConfig
 
+LEG_PERIOD_NS = round(1e9 * PERIOD)
+"""Period of the leg on the shafts of emulated drives [ns]."""
 IDLE_POS = (-0.3, 0.3)
 """Motors of emulated drives that nothing hangs on: a knee that every leg can have [rad]."""
 
@@ -58,29 +63,7 @@ def open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
         BusError: the interface is not there, is down, or has a master.
         DriveError: a drive is missing, is another one, or refuses its configuration.
     """
-    if leg.servo != ServoConfig():
-        raise ConfigError(
-            "servo settings describe a simulated servo; on the can plant the drives decide: leave "
-            "slew_rate, bandwidth, delay_cycles and encoder_counts out"
-        )
-    config = load_bus(choice.bus)
-    if not (leg.imperfections.perfect or choice.is_virtual(config)):
-        raise ConfigError(
-            "imperfections describe an emulated leg; the leg on the bench has its own: leave them "
-            f"out, or give --interface {EMULATED}"
-        )
-    if len(config.nodes) != 2:
-        raise ConfigError(f"{choice.bus}: {len(config.nodes)} nodes; a leg has 2")
-    if config.period != PERIOD:
-        raise ConfigError(f"{choice.bus}: period_us is {config.period_us}; runs need 1000")
-    check_load(config.at(choice.bitrate))
-    if choice.limits is None:
-        limits = limits_for(choice.bus.parent / LIMITS_NAME, leg.design)
-    else:
-        limits = limits_within(choice.limits, leg.design)
-    check_together(config, limits, stops=joint_ranges(leg.design), leads=not choice.read_only)
-    if not choice.is_virtual(config):
-        limits.require_complete()
+    config, limits = _checked(choice, leg)
     session = open_session(config, choice, leg, leads=not choice.read_only)
     try:
         granted = session.be_punctual()
@@ -97,12 +80,50 @@ def open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
         plant=plant,
         clock=CanClock(plant),
         facts=_facts(choice, config, limits, granted),
+        notes=link.unprotected,
         start_log=lambda writer: session.log_to(writer.log(BUS_LOG)),
         events=lambda: limits_events(waived, link.shortfall) | bus_events(plant),
         realtime=not session.virtual,
         gone=lambda: gone_drive(link),
         trouble=lambda: None if link.stopped is None else link.stopped.trouble,
     )
+
+
+def _checked(choice: CanChoice, leg: Leg) -> tuple[BusConfig, SafetyLimits]:
+    """The bus file and the limits of a choice, held against each other and against the leg.
+
+    Raises:
+        ConfigError: they make no sense, or do not fit.
+    """
+    if leg.servo != ServoConfig():
+        raise ConfigError(
+            "servo settings describe a simulated servo; on the can plant the drives decide: leave "
+            "slew_rate, bandwidth, delay_cycles and encoder_counts out"
+        )
+    config = load_bus(choice.bus)
+    if not (leg.imperfections.perfect or choice.is_virtual(config)):
+        raise ConfigError(
+            "imperfections describe an emulated leg; the leg on the bench has its own: leave them "
+            f"out, or give --interface {EMULATED}"
+        )
+    if len(config.nodes) != 2:
+        raise ConfigError(f"{choice.bus}: {len(config.nodes)} nodes; a leg has 2")
+    if config.period_us not in RUN_PERIODS_US:
+        raise ConfigError(
+            f"{choice.bus}: period_us is {config.period_us} us; a run needs "
+            f"{', '.join(map(str, RUN_PERIODS_US))} us"
+        )
+    if not choice.read_only:
+        check_needs(config, leg.needs)
+    check_budget(config.at(choice.bitrate))
+    if choice.limits is None:
+        limits = limits_for(choice.bus.parent / LIMITS_NAME, leg.design)
+    else:
+        limits = limits_within(choice.limits, leg.design)
+    check_together(config, limits, stops=joint_ranges(leg.design), leads=not choice.read_only)
+    if not choice.is_virtual(config):
+        limits.require_complete()
+    return config, limits
 
 
 def _facts(
@@ -113,7 +134,7 @@ def _facts(
         "bus": {
             "file": str(choice.bus),
             "interface": choice.interface or config.interface,
-            "channel": choice.channel or config.channel,
+            "channel": choice.channel or "+".join(filter(None, config.channels)) or None,
             "bitrate": choice.bitrate or config.bitrate,
             "read_only": choice.read_only,
             "end": choice.end.value,
@@ -133,9 +154,6 @@ def open_session(
 ) -> Session:
     """Open the bus of a choice; with interface `legbench` the emulated leg in this process.
 
-    The channel is locked before its adapter is touched: opening a serial one resets it under a
-    program that uses it. Whoever only reads locks no channel that others may share.
-
     Args:
         config: the bus file.
         choice: which bus.
@@ -146,38 +164,50 @@ def open_session(
         BusError: the interface is not there, is down, or has a master.
     """
     if not choice.is_virtual(config):
-        adapter = adapter_of(config, interface=choice.interface, channel=choice.channel)
-        lock = ChannelLock.of_channel(adapter.interface, adapter.channel)
-        if leads or not adapter.shared:
-            lock.acquire()
-        try:
-            bus = open_bus(config.at(choice.bitrate), adapter)
-        except BaseException:
-            lock.release()
-            raise
+        adapters = adapters_of(config, interface=choice.interface, channel=choice.channel)
+        bus, lock = open_channels(config.at(choice.bitrate), adapters, leads=leads)
         return Session(bus, config.at(choice.bitrate), lock=lock)
-    network = _emulated(config, choice, leg)
-    bus = LockstepBus("leg", network=network, bitrate=choice.bitrate)
+    networks = _emulated(config, choice, leg)
+    if len(networks) > 1:
+        bus = ChannelsBus(tuple(networks), config, choice.bitrate)
+    else:
+        bus = LockstepBus("leg", network=networks[0], bitrate=choice.bitrate)
     return Session(bus, config.at(choice.bitrate))
 
 
-def _emulated(config: BusConfig, choice: CanChoice, leg: Leg | None) -> Network:
+def _emulated(config: BusConfig, choice: CanChoice, leg: Leg | None) -> Sequence[Network]:
     """The emulated leg; its drives run at the bitrate of the bus file, whatever is asked for.
 
     For those who only look its drives have kept their configuration: nobody may write it.
     """
+    several = len(config.channels) > 1
     if leg is None:
         starts = IDLE_POS if len(config.nodes) == len(IDLE_POS) else (0.0,) * len(config.nodes)
         idle = [on_bench(node, start) for node, start in zip(config.nodes, starts, strict=True)]
-        return emulate(config, idle, configured=choice.read_only)
+        if several:
+            return emulate_channels(config, idle, configured=choice.read_only)
+        return [emulate(config, idle, configured=choice.read_only)]
     body = EmulatedLeg(leg.design, leg.options, leg.start, leg.imperfections, leg.seed)
-    return emulate(
+    drives = [_behaviour(leg, body, place) for place in range(len(leg.start.motor_pos))]
+    faults, configured = choice.faults, choice.read_only
+    if several:
+        return emulate_channels(
+            config,
+            drives,
+            body=body,
+            body_period_ns=LEG_PERIOD_NS,
+            faults=faults,
+            configured=configured,
+        )
+    network = emulate(
         config,
-        [_behaviour(leg, body, place) for place in range(len(config.nodes))],
+        drives,
         body=body,
-        faults=choice.faults,
-        configured=choice.read_only,
+        body_period_ns=LEG_PERIOD_NS,
+        faults=faults,
+        configured=configured,
     )
+    return [network]
 
 
 def _behaviour(leg: Leg, body: EmulatedLeg, place: int) -> Behaviour:

@@ -1,6 +1,6 @@
 """Opening of a plant: its leg, its settings, and what belongs to a run on it besides the plant."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
 
@@ -17,6 +17,23 @@ if TYPE_CHECKING:
     from legbench.recording.writer import RunWriter
 
 
+def _nobody(known: Collection[str]) -> tuple[str, ...]:
+    """Nobody runs on a plant whose controllers are not known."""
+    return ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Needs:
+    """What the controller of a run needs of the plant."""
+
+    controller: str = ""
+    """Kind of the controller."""
+    signals: frozenset[str] = frozenset()
+    """Names of the measured signals that it cannot do without."""
+    run_on: Callable[[Collection[str]], tuple[str, ...]] = _nobody
+    """Kinds of the controllers that can run where only some signals are known."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Leg:
     """Leg that the plant is to be."""
@@ -31,6 +48,8 @@ class Leg:
     """What the leg has that its controller does not know of."""
     seed: int = 0
     """Source of all randomness."""
+    needs: Needs = field(default_factory=Needs)
+    """What its controller needs; by default nothing is asked for."""
 
 
 def _no_log(writer: "RunWriter") -> None:
@@ -51,6 +70,8 @@ class OpenPlant:
     """Clock that paces the plant if no other one is asked for."""
     facts: dict[str, Any] = field(default_factory=dict)
     """Entries of a run's manifest about the plant."""
+    notes: tuple[str, ...] = ()
+    """What a person should know before anything moves, such as what does not protect the leg."""
     start_log: Callable[["RunWriter"], None] = _no_log
     """Function that begins a log beside the rows, such as raw frames, see `RunWriter.log`."""
     events: Callable[[], dict[str, dict[str, Any]]] = dict

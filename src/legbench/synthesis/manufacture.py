@@ -9,9 +9,9 @@ import numpy as np
 
 from legbench.design import LegDesign, Segment
 from legbench.design.matching import Condition, Parameters, check_conditions
+from legbench.design.realisable import SEGMENTS, Reach, reaches
 from legbench.errors import ConfigError
 
-SEGMENTS = ("thigh", "shank", "foot")
 LENGTH_APART = 0.05
 """Relative difference of lengths above which a measured segment is another one [-]."""
 SMALLEST_WEIGHT = 1e-5
@@ -30,17 +30,21 @@ class Row:
     unit: str
     shown: str
     """Value in workshop units, as text."""
+    note: str = ""
+    """Remark for the workshop; empty if there is nothing to mind."""
 
 
 def manufacture_table(design: LegDesign) -> tuple[Row, ...]:
     """Every number from which the leg is built, in the units of a workshop."""
     rows = [_row("trunk", "mass", "m_t", design.trunk_mass, "kg")]
-    for index, (name, segment) in enumerate(zip(SEGMENTS, design.segments, strict=True), start=1):
+    parts = zip(reaches(design), design.segments, strict=True)
+    for index, (reach, segment) in enumerate(parts, start=1):
+        name = reach.segment
         rows += [
             _row(name, "mass", f"m_{index}", segment.mass, "kg"),
             _row(name, "length", f"l_{index}", segment.length, "m"),
             _row(name, "centre of mass", f"c_{index}", segment.com, "m"),
-            _row(name, "inertia", f"I_{index}", segment.inertia, "kg m^2"),
+            _row(name, "inertia", f"I_{index}", segment.inertia, "kg m^2", beyond(reach)),
         ]
     for index in range(2):
         number = index + 1
@@ -74,9 +78,37 @@ def shown(value: float, unit: str) -> str:
     return f"{number:.{digits}f} {name}"
 
 
-def _row(part: str, quantity: str, symbol: str, value: float, unit: str) -> Row:
+def _row(part: str, quantity: str, symbol: str, value: float, unit: str, note: str = "") -> Row:
     words = shown(value, unit)
-    return Row(part=part, quantity=quantity, symbol=symbol, value=value, unit=unit, shown=words)
+    return Row(
+        part=part,
+        quantity=quantity,
+        symbol=symbol,
+        value=value,
+        unit=unit,
+        shown=words,
+        note=note,
+    )
+
+
+def beyond(reach: Reach) -> str:
+    """Words for an inertia that mass between the joints cannot have; empty if it can."""
+    if reach.realisable:
+        return ""
+    return (
+        f"needs mass {shown(reach.overhang, 'm')} beyond both joints: between them there can be "
+        f"{shown(reach.most, 'kg m^2')} at most"
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lump:
+    """One piece of a weight, small against the segment."""
+
+    mass: float
+    """Mass of the piece [kg]."""
+    position: float
+    """Distance from the proximal joint towards the distal one [m]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,9 +121,9 @@ class Adjustment:
     position: float
     """Centre of the weight, from the proximal joint towards the distal one [m]; NaN if no single
     weight does it."""
-    half_spread: float
-    """Two halves this far to either side of `position` bring the inertia to its target, or as near
-    as the segment is long [m]; zero where one lump already has as much as wanted or more."""
+    lumps: tuple[Lump, ...]
+    """Pieces into which the weight is split so that the inertia comes to its target, or as near as
+    the segment is long; one piece where that already has as much as wanted or more."""
     mass_after: float
     """[kg]"""
     com_after: float
@@ -108,8 +140,9 @@ def adjust(name: str, measured: Segment, target: Segment) -> Adjustment:
     """The weight that gives `measured` the mass, the centre of mass and, if it can, the inertia of
     `target`.
 
-    A point mass `w = m* - m` at `p = (m* c* - m c) / w` sets mass and centre of mass; two halves at
-    `p +- s` add `w s^2` to the inertia.
+    A point mass `w = m* - m` at `p = (m* c* - m c) / w` sets mass and centre of mass. Two lumps
+    around it, at `p - a` and `p + b` with masses `w b / (a + b)` and `w a / (a + b)`, add `w a b`
+    to the inertia; on the segment that is at most `w p (l - p)`.
     """
     weight = target.mass - measured.mass
     if abs(weight) < SMALLEST_WEIGHT:
@@ -127,11 +160,10 @@ def adjust(name: str, measured: Segment, target: Segment) -> Adjustment:
     shifted = measured.inertia + measured.mass * (measured.com - target.com) ** 2
     lump = shifted + weight * (position - target.com) ** 2
     missing = target.inertia - lump
-    half_spread = 0.0
+    below, above = 0.0, 0.0
     if weight > 0.0 and missing > 0.0 and on_segment:
-        widest = min(position, target.length - position)
-        half_spread = min(math.sqrt(missing / weight), widest)
-    reached = lump + weight * half_spread**2
+        below, above = _spread(missing / weight, position, target.length - position)
+    reached = lump + weight * below * above
     if weight < 0.0:
         note = "too heavy: take this much away there"
     elif not on_segment:
@@ -142,12 +174,36 @@ def adjust(name: str, measured: Segment, target: Segment) -> Adjustment:
         segment=name,
         mass=weight,
         position=position,
-        half_spread=half_spread,
+        lumps=_lumps(weight, position, below, above),
         mass_after=target.mass,
         com_after=target.com,
         inertia_after=reached,
         inertia_missing=target.inertia - reached,
         note=note,
+    )
+
+
+def _spread(product: float, below: float, above: float) -> tuple[float, float]:
+    """Distances a <= `below` and b <= `above` [m] whose product is `product` [m^2], or the largest.
+
+    They are equal where there is room for that: two halves are easier to make than two lumps.
+    """
+    half = math.sqrt(product)
+    if half <= min(below, above):
+        return half, half
+    if product >= below * above:
+        return below, above
+    return (below, product / below) if below < above else (product / above, above)
+
+
+def _lumps(weight: float, position: float, below: float, above: float) -> tuple[Lump, ...]:
+    """One lump, or two whose masses balance about `position`."""
+    if not (below > 0.0 and above > 0.0):
+        return (Lump(mass=weight, position=position),)
+    share = above / (below + above)
+    return (
+        Lump(mass=share * weight, position=position - below),
+        Lump(mass=(1.0 - share) * weight, position=position + above),
     )
 
 
@@ -157,7 +213,7 @@ def _none(name: str, measured: Segment, target: Segment, note: str) -> Adjustmen
         segment=name,
         mass=0.0,
         position=math.nan,
-        half_spread=0.0,
+        lumps=(),
         mass_after=measured.mass,
         com_after=measured.com,
         inertia_after=measured.inertia,

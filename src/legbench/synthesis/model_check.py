@@ -145,7 +145,7 @@ def _inertia(
     """
     inertia, gravity = conditions
     l2 = design.shank.length
-    expected, scale = -inertia.residual, inertia.scale
+    expected, scale = inertia.residual, inertia.scale
     if kind is not SetupKind.FFS:
         expected -= 2.0 * l2 * gravity.residual
         scale += 2.0 * l2 * gravity.scale

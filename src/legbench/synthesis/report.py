@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from legbench.design import LegDesign
 from legbench.design.matching import Condition
 from legbench.design.mending import Mend, mends
+from legbench.design.realisable import reaches
 from legbench.design.requirements import VARIABLES
-from legbench.synthesis.manufacture import Adjusted, Row
+from legbench.synthesis.manufacture import Adjusted, Row, beyond, shown
 from legbench.synthesis.model_check import AGREES, TILT_AGREES, ModelCheck
 from legbench.synthesis.release import KEPT
 from legbench.synthesis.solve import Solution
@@ -41,9 +42,10 @@ def condition_lines(
 def mend_words(mend: Mend) -> str:
     """Return one change in words."""
     moves = f"; moves {', '.join(mend.moves)}" if mend.moves else ""
+    topples = "; the leg then stands no longer, condition (10)" if mend.topples else ""
     return (
         f"{mend.parameter}: {mend.change:+.4g} {mend.unit} ({100.0 * mend.share:+.2g} %) "
-        f"mends it{moves}"
+        f"mends it{moves}{topples}"
     )
 
 
@@ -67,6 +69,15 @@ def model_lines(check: ModelCheck) -> list[str]:
         f"{tilted:.1e} (allowed {TILT_AGREES:g})"
     )
     return lines
+
+
+def reach_lines(design: LegDesign) -> list[str]:
+    """A line for every segment whose inertia mass between its joints cannot have."""
+    return [
+        f"{reach.segment:<10} inertia {shown(reach.inertia, 'kg m^2')}: {beyond(reach)}"
+        for reach in reaches(design)
+        if not reach.realisable
+    ]
 
 
 def solution_lines(solution: Solution) -> list[str]:
@@ -106,8 +117,12 @@ def solution_lines(solution: Solution) -> list[str]:
 
 
 def table_lines(rows: Sequence[Row]) -> list[str]:
-    """The manufacture table."""
-    return [f"{row.part:<9} {row.quantity:<15} {row.symbol:<4} {row.shown}" for row in rows]
+    """The manufacture table, and what a workshop has to mind."""
+    lines = []
+    for row in rows:
+        note = f"  ({row.note})" if row.note else ""
+        lines.append(f"{row.part:<9} {row.quantity:<15} {row.symbol:<4} {row.shown}{note}")
+    return lines
 
 
 def adjustment_lines(adjusted: Adjusted) -> list[str]:
@@ -117,9 +132,9 @@ def adjustment_lines(adjusted: Adjusted) -> list[str]:
         if math.isnan(weight.position):
             what = "nothing to add"
         else:
-            what = f"{1e3 * weight.mass:+.2f} g at {1e3 * weight.position:.1f} mm"
-            if weight.half_spread > 0.0:
-                what += f", in two halves {1e3 * weight.half_spread:.1f} mm to either side"
+            what = " and ".join(
+                f"{1e3 * lump.mass:+.2f} g at {1e3 * lump.position:.1f} mm" for lump in weight.lumps
+            )
         missing = f"inertia off by {-1e6 * weight.inertia_missing:+.1f} kg mm^2"
         note = f" ({weight.note})" if weight.note else ""
         lines.append(f"{weight.segment:<9} {what}; {missing}{note}")

@@ -174,5 +174,5 @@ def _gradient(requirements: Requirements, free: Floats) -> Floats:
 
 
 def _margin_gradients(requirements: Requirements, free: Floats) -> Floats:
-    """Exact gradients of the margins by the ratios (5, 7)."""
+    """Exact gradients of the margins by the ratios (n, 7)."""
     return _margins(requirements, _stepped(free)).imag.T / IMAGINARY

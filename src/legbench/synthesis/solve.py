@@ -27,7 +27,10 @@ from legbench.synthesis.search import (
 from legbench.synthesis.sensitivity import ActiveBound, active_bounds, refine
 from legbench.synthesis.trace import Trace
 
-MARGIN_UNITS = ("m1/m_leg", "m2/m_leg", "m3/m_leg", "I1/(m_leg l2^2)", "margin/(k1 + k2)")
+MARGIN_UNITS = (
+    *("m1/m_leg", "m2/m_leg", "m3/m_leg", "I1/(m_leg l2^2)", "margin/(k1 + k2)"),
+    *(f"(largest I{n} - I{n})/(m_leg l2^2)" for n in (1, 2, 3)),
+)
 """What the margins of `dependent.margins` are shares of."""
 
 
@@ -188,12 +191,14 @@ def explain(requirements: Requirements, free: Floats) -> str:
     margin = margins(requirements, solve_dependent(requirements, free))
     lacking = [
         f"{name} ({unit} = {value:.3g})"
-        for name, unit, value in zip(MARGINS, MARGIN_UNITS, margin, strict=True)
+        for name, unit, value in zip(MARGINS, MARGIN_UNITS, margin, strict=False)
         if not value > 0.0
     ]
+    overhang = requirements.overhang
+    freely = "" if overhang is None else f", or allow a larger overhang than {overhang:g} m"
     return (
         f"no leg within the bounds meets requirements '{requirements.name}'; the nearest one lacks "
         f"{' and '.join(lacking)}: change leg_com ({requirements.leg_com:g} m), relaxed_length "
         f"({requirements.relaxed_length:g} m) or leg_stiffness ({requirements.leg_stiffness:g} "
-        "N/m), or widen the bounds"
+        f"N/m), or widen the bounds{freely}"
     )

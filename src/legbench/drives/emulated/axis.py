@@ -1,10 +1,12 @@
 """The CiA 402 half of an emulated drive: controlword, modes, motion, statusword; pure."""
 
 from collections import deque
+from collections.abc import Sequence
 from typing import final
 
 from legbench.drives.emulated.alarms import Alarms
 from legbench.drives.emulated.behaviour import Behaviour
+from legbench.drives.emulated.dictionary import USUAL_LINKS
 from legbench.drives.emulated.homing import Homing
 from legbench.drives.emulated.homing_methods import METHODS
 from legbench.drives.emulated.motion import Motion
@@ -12,10 +14,13 @@ from legbench.drives.emulated.power import HALT, POWERED, PowerStage
 from legbench.drives.emulated.sensors import Sensors
 from legbench.drives.emulated.switches import Switches
 from legbench.drives.protocol.cia402 import DriveState, Mode, StatusBit
+from legbench.drives.protocol.datatypes import DataType, range_of
+from legbench.drives.protocol.emcy import Emergency, emcy_frame
 from legbench.drives.protocol.frame import Frame
 from legbench.drives.protocol.objects import LINK_SHORT, Key
 from legbench.drives.protocol.sdo import Abort
 from legbench.drives.setup.config import NodeConfig
+from legbench.drives.setup.encoders import Side
 from legbench.drives.setup.units import wrap
 
 MODES = (Mode.NONE, Mode.HOMING, Mode.CYCLIC_SYNCHRONOUS_POSITION)
@@ -23,6 +28,7 @@ POLARITY = (0x607E, 0)
 FOLLOWING_ERROR, SETPOINTS_MISSING, SYNC_MISSING = 0x8611, 0xFF10, 0xFF11
 HOMED = 1 << 15
 """Bit 15 of the statusword, the maker's own: the position refers to a home since power-on."""
+SHORT = (LINK_SHORT, 0)
 _ENABLED = DriveState.OPERATION_ENABLED
 _STATUS = int(StatusBit.REMOTE)
 
@@ -40,7 +46,15 @@ class Axis:
         warning: whether bit 7 of the statusword is set.
     """
 
-    def __init__(self, node: NodeConfig, behaviour: Behaviour, values: dict[Key, int]) -> None:
+    def __init__(
+        self,
+        node: NodeConfig,
+        behaviour: Behaviour,
+        values: dict[Key, int],
+        links: Sequence[Key] = USUAL_LINKS,
+    ) -> None:
+        """Turn the numbers of an object dictionary; `links` show the position of the link."""
+        self._links = tuple(links)
         self._node, self._behaviour, self._values = node, behaviour, values
         self.node_id = node.node_id
         self.power = PowerStage(values)
@@ -50,8 +64,9 @@ class Axis:
         self.warning = False
         self._switches = Switches(node.motor, behaviour)
         self._homing = Homing(values, self._switches)
-        self._link_counts = node.link.to_counts(behaviour.start_pos)
-        self._torque = 0
+        self._link_counts = 0 if node.link is None else node.link.to_counts(behaviour.start_pos)
+        self._torque = 0.0
+        self._target, self._shown = node.target_object.key, node.motor_object.key
         self._mode_due_ns: int | None = None
         self._waiting_word: int | None = None
         self._now_ns = 0
@@ -117,9 +132,15 @@ class Axis:
             self._say(self.alarms.reset())
         if self.power.state is _ENABLED and not was_enabled:
             self.motion.hold(now_ns)
+            self._warn()
         if obeyed and self.power.state is _ENABLED and self._values[0x6061, 0] == Mode.HOMING:
             self._homing.command(controlword)
         self._status()
+
+    def _warn(self) -> None:
+        """Send the emergency messages of a drive that warns of nothing."""
+        for code in self._behaviour.warnings:
+            self._say(emcy_frame(Emergency(node_id=self._node.node_id, code=code, register=0)))
 
     def fault(self, code: int) -> None:
         """Raise an error and start the fault reaction."""
@@ -133,11 +154,13 @@ class Axis:
             return
         if self.power.stopping is not None or values[0x6040, 0] & HALT:
             return
-        target = values[0x607A, 0] + values[0x60B0, 0] if fresh else None
+        asked, units = values[self._target], self._node.motor
+        # A position beyond what the drive shows is none: it is as if no target had come.
+        target = asked + values[0x60B0, 0] if fresh and units.show(asked) == asked else None
         if target is not None:
             # The object wraps; the motor takes the short way round.
             near = round(self.motion.demand)
-            target = near + wrap(self.motion.sign * target - near)
+            target = units.nearest(self.motion.sign * target, near)
         self.motion.latch(target, now_ns)
         if self.motion.missing > self._behaviour.missing_limit:
             self.fault(SETPOINTS_MISSING)
@@ -148,15 +171,24 @@ class Axis:
         if self._waiting_word is not None:
             word, self._waiting_word = self._waiting_word, None
             self._command(word, now_ns)
-        if self._mode_due_ns is not None and now_ns >= self._mode_due_ns:
-            self._values[0x6061, 0], self._mode_due_ns = self._values[0x6060, 0], None
-            self.motion.hold(now_ns)
+        self._show_mode(now_ns)
         self.sensors.tick(step_ns)
         before = self.motion.actual
         self._move(now_ns, step_ns)
         turned = -1 if self._values[POLARITY] & 0x40 else 1
         self._values[0x606C, 0] = turned * round((self.motion.actual - before) * 1e9 / step_ns)
         return self.motion.angle
+
+    def _show_mode(self, now_ns: int) -> None:
+        """Let the mode display 6061h follow 6060h, late; some drives show none without power."""
+        values, due_ns = self._values, self._mode_due_ns
+        if self._behaviour.mode_needs_power and self.power.state is not _ENABLED:
+            values[0x6061, 0] = Mode.NONE
+            self._mode_due_ns = now_ns + 1000 * self._behaviour.mode_lag_us
+            return
+        if due_ns is not None and now_ns >= due_ns:
+            values[0x6061, 0], self._mode_due_ns = values[0x6060, 0], None
+            self.motion.hold(now_ns)
 
     def _move(self, now_ns: int, step_ns: int) -> None:
         motion, power, values = self.motion, self.power, self._values
@@ -186,26 +218,36 @@ class Axis:
 
     def sense(self, link_pos: float, spring_torque: float) -> None:
         """Take over the state of the body: link angle [rad] and spring torque [N m]."""
-        self._link_counts = self._node.link.to_counts(link_pos)
         if self._behaviour.motor_noise is not None:
             self.sensors.motor.disturb(self._behaviour.motor_noise())
-        rated = self._behaviour.rated_torque
-        self._torque = round(self._node.motor.sign * 1000.0 * spring_torque / rated)
+        node = self._node
+        self._torque = node.motor.sign * spring_torque
+        if node.link is not None:
+            self._link_counts = node.link.to_counts(link_pos)
+        elif node.side is Side.LINK:
+            self.motion.beside = node.motor.counts_per_rad * (link_pos - self.motion.angle)
 
     def publish(self) -> None:
         """Update the actual values in the object dictionary."""
         values, motion = self._values, self.motion
-        actual = self.sensors.motor.show(round(motion.actual))
-        link = self.sensors.link.show(self._link_counts)
-        sign = motion.sign
-        values[0x6064, 0] = wrap(sign * actual)
+        node, sign = self._node, motion.sign
+        actual = self.sensors.motor.show(round(motion.actual + motion.beside))
+        values[self._shown] = node.motor.show(sign * actual)
         values[0x6062, 0] = wrap(sign * round(motion.demand))
         values[0x60F4, 0] = wrap(sign * (round(motion.demand) - actual))
-        values[0x60E4, 1] = wrap(link)
-        values[LINK_SHORT, 0] = wrap(link, 16)
+        if node.link is not None:
+            link = self.sensors.link.show(self._link_counts)
+            for key in self._links:
+                own = key == node.link_object.key
+                short = 16 if key == SHORT else 32
+                values[key] = node.link.show(link) if own else wrap(link, short)
         if self._switches.present:
             values[0x60FD, 0] = self._switches.inputs(motion.travel, sign)
-        values[0x6077, 0] = min(max(self._torque, -32768), 32767)
+        rated = self._behaviour.rated_torque
+        values[0x6077, 0] = _saturated(1000.0 * self._torque / rated, DataType.INTEGER16)
+        if node.torque_object is not None:
+            shown = _saturated(self._torque / node.torque_scale, node.torque_object.kind)
+            values[node.torque_object.key] = shown
         self._status()
 
     def _status(self) -> None:
@@ -217,7 +259,8 @@ class Axis:
         mode = self._values[0x6061, 0]
         if mode == Mode.CYCLIC_SYNCHRONOUS_POSITION:
             if self.power.state is _ENABLED and self.power.stopping is None:
-                if not (self._values[0x6040, 0] & HALT or self.motion.limited):
+                follows = not (self._values[0x6040, 0] & HALT or self.motion.limited)
+                if follows and self._behaviour.follows_bit:
                     word |= StatusBit.FOLLOWS_COMMAND
                 if self.motion.limited:
                     word |= StatusBit.INTERNAL_LIMIT
@@ -242,3 +285,9 @@ class Axis:
     def _say(self, frame: Frame | None) -> None:
         if frame is not None:
             self._out.append(frame)
+
+
+def _saturated(value: float, kind: DataType) -> int:
+    """The nearest number that an object of a kind holds."""
+    low, high = range_of(kind)
+    return min(max(round(value), low), high)

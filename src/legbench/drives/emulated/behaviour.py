@@ -4,6 +4,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
+from legbench.drives.protocol.objects import Key
+from legbench.drives.protocol.sdo import Abort
+from legbench.drives.protocol.sdo_server import SdoAnswers
+
 
 class MissingSetpoint(Enum):
     """Reactions of a drive to a SYNC without a new target."""
@@ -43,6 +47,24 @@ class Behaviour:
     """Function that returns the error of the motor's reading in this period of the body [rad]."""
     mode_lag_us: int = 2000
     """Delay of the mode display (6061h) after a mode change (6060h) [us]."""
+    mode_needs_power: bool = False
+    """Whether 6061h shows 0 until the drive is enabled, and follows with its delay only then."""
+    follows_bit: bool = True
+    """Whether bit 12 of the statusword is set while the drive follows its target."""
+    sdo_answers: SdoAnswers = SdoAnswers.SIZED
+    lacks: frozenset[Key | int] = frozenset()
+    """Objects that it has not, by index, or by index and sub-index."""
+    lacking: Abort = Abort.NO_OBJECT
+    """Code with which it refuses them."""
+    defaults: tuple[tuple[Key, int], ...] = ()
+    """Values that its objects hold at power-on, where they are not the usual ones."""
+    rpdos: int = 4
+    tpdos: int = 4
+    """Number of PDOs that it has, each way."""
+    fixed_mapping: bool = False
+    """Whether its PDOs are mapped for good, as the bus file wants them."""
+    warnings: tuple[int, ...] = ()
+    """Codes of emergency messages that it sends when it becomes enabled and that mean nothing."""
     halt_blocks_mode: bool = True
     """Whether mode changes are refused while the halt bit is set."""
     boot_us: int = 5000

@@ -2,16 +2,20 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.body import Body, stiff_body
+from legbench.drives.emulated.dictionary import Dictionary, dictionary_of
 from legbench.drives.emulated.drive import EmulatedDrive
 from legbench.drives.emulated.faults import Fault
 from legbench.drives.emulated.network import Network
+from legbench.drives.emulated.shared_body import SharedBody
 from legbench.drives.emulated.stuffing import Stuffing
 from legbench.drives.setup.config import BusConfig, NodeConfig
 from legbench.drives.setup.configuration import configuration
+from legbench.drives.sheet.load import load_sheet
 from legbench.errors import ConfigError
 
 STOP_BEHIND = 0.1
@@ -48,6 +52,8 @@ def emulate(
 ) -> Network:
     """Build the emulated bus that a bus file describes, at its bitrate.
 
+    A drive whose node names a data sheet wears that dictionary.
+
     Args:
         bus: the bus.
         behaviours: one a drive; by default ordinary drives at position 0.
@@ -59,14 +65,15 @@ def emulate(
         configured: the drives have kept, over their last power-off, what the bus file says.
 
     Raises:
-        ConfigError: not one behaviour a drive.
+        ConfigError: not one behaviour a drive, or a data sheet that cannot be read.
+        MissingExtraError: a drive has a data sheet, and canopen is not installed.
     """
     chosen = [Behaviour() for _ in bus.nodes] if behaviours is None else list(behaviours)
     if len(chosen) != len(bus.nodes):
         raise ConfigError(f"{len(chosen)} behaviours for {len(bus.nodes)} drives")
     drives = [
-        EmulatedDrive(node, how, tuple(configuration(bus, node)) if configured else ())
-        for node, how in zip(bus.nodes, chosen, strict=True)
+        EmulatedDrive(node, how, tuple(configuration(bus, node)) if configured else (), objects)
+        for node, how, objects in zip(bus.nodes, chosen, _dictionaries(bus), strict=True)
     ]
     return Network(
         drives,
@@ -77,3 +84,56 @@ def emulate(
         faults=faults,
         keep_log=keep_log,
     )
+
+
+def _dictionaries(bus: BusConfig) -> list[Dictionary]:
+    """Return the objects of every drive; a data sheet is read once."""
+    sheets = {path: load_sheet(path) for path in {node.eds for node in bus.nodes} if path}
+    return [dictionary_of(node, node.eds and sheets[node.eds], bus.period_us) for node in bus.nodes]
+
+
+def emulate_channels(
+    bus: BusConfig,
+    behaviours: Sequence[Behaviour] | None = None,
+    *,
+    body: Body = stiff_body,
+    body_period_ns: int | None = None,
+    faults: Sequence[Fault] = (),
+    keep_log: bool = False,
+    configured: bool = False,
+) -> tuple[Network, ...]:
+    """Build a network for every channel of a bus file; arguments as for `emulate`.
+
+    All drives move one body, and their networks pass time together (`LockstepChannels`). A fault
+    is injected into every channel that has its drive or its frame.
+
+    Raises:
+        ConfigError, MissingExtraError: as `emulate`.
+    """
+    chosen = [Behaviour() for _ in bus.nodes] if behaviours is None else list(behaviours)
+    if len(chosen) != len(bus.nodes):
+        raise ConfigError(f"{len(chosen)} behaviours for {len(bus.nodes)} drives")
+    groups = [bus.nodes_on(channel) for channel in bus.channels]
+    order = [bus.nodes.index(node) for nodes in groups for node in nodes]
+
+    def in_order(motor_pos: tuple[float, ...]) -> tuple[Sequence[float], Sequence[float]]:
+        """Body as the drives see it in the order of their channels."""
+        placed = dict(zip(order, motor_pos, strict=True))
+        links, torques = body(tuple(placed[place] for place in range(len(order))))
+        return [links[place] for place in order], [torques[place] for place in order]
+
+    shared = SharedBody(in_order)
+    networks = tuple(
+        emulate(
+            replace(bus, nodes=nodes),
+            [chosen[bus.nodes.index(node)] for node in nodes],
+            body=shared.part(place),
+            body_period_ns=body_period_ns,
+            faults=faults,
+            keep_log=keep_log,
+            configured=configured,
+        )
+        for place, nodes in enumerate(groups)
+    )
+    shared.join(networks)
+    return networks

@@ -16,7 +16,7 @@ from can.typechecking import CanFilters
 from legbench.drives.emulated.build import emulate
 from legbench.drives.emulated.network import PASSIVE, Network
 from legbench.drives.emulated.network_time import NetworkTime
-from legbench.drives.emulated.station import Heard
+from legbench.drives.emulated.station import Heard, Station
 from legbench.drives.errors import BusError
 from legbench.drives.protocol.frame import Frame
 from legbench.drives.setup.bus_file import load_bus
@@ -82,6 +82,11 @@ class LockstepBus(VirtualBus):
         self.channel_info = f"emulated bus {channel}"
         self.channel = channel
         super().__init__(channel=channel, can_filters=can_filters)
+
+    @property
+    def station(self) -> Station:
+        """Controller of this port."""
+        return self._station
 
     @property
     def alone(self) -> bool:

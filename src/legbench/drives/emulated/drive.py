@@ -7,14 +7,17 @@ from typing import final
 from legbench.drives.emulated.axis import Axis
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.connection import Connection
+from legbench.drives.emulated.dictionary import Dictionary, dictionary_of
 from legbench.drives.emulated.heartbeats import HeartbeatConsumer, HeartbeatProducer
-from legbench.drives.emulated.lss import LssSlave, lss_address
+from legbench.drives.emulated.lss import LssSlave, address_of
 from legbench.drives.emulated.memory import ALL, Memory
+from legbench.drives.emulated.oddities import changed
 from legbench.drives.emulated.power import POWERED
 from legbench.drives.emulated.process_data import ProcessData
 from legbench.drives.emulated.reception import RPDO_LATE, Reception
 from legbench.drives.emulated.rules import COMMUNICATION_PROFILE, ERRORS, objection
 from legbench.drives.emulated.store import ObjectStore
+from legbench.drives.emulated.warmth import HOT, WARM, show_temperature
 from legbench.drives.protocol import lss
 from legbench.drives.protocol.cia402 import DriveState
 from legbench.drives.protocol.frame import (
@@ -27,14 +30,14 @@ from legbench.drives.protocol.frame import (
     Frame,
 )
 from legbench.drives.protocol.nmt import NmtCommand, NmtState, decode_nmt, heartbeat_frame
-from legbench.drives.protocol.objects import OBJECTS, TEMPERATURE, Key
+from legbench.drives.protocol.objects import Key
 from legbench.drives.protocol.sdo import Abort, abort_error
 from legbench.drives.protocol.sdo_server import SdoServer
 from legbench.drives.setup.config import NodeConfig, Parameter
 
 UNDER_VOLTAGE, OVER_TEMPERATURE = 0x3220, 0x4310
 HEARTBEAT_LOST = 0x8130
-TARGET, SYNC = (0x607A, 0), (0x1005, 0)
+SYNC = (0x1005, 0)
 ERROR_COUNT, LATEST_ERROR = (0x1003, 0), (0x1003, 1)
 SET_BACK = tuple(index for index in COMMUNICATION_PROFILE if index not in ERRORS)
 _ORDERS = {
@@ -59,23 +62,29 @@ class EmulatedDrive:
         node: NodeConfig,
         behaviour: Behaviour | None = None,
         kept: Sequence[Parameter] = (),
+        dictionary: Dictionary | None = None,
     ) -> None:
         """Switch it on; `kept` is what its memory holds instead of the defaults (1010h)."""
         self._node, self._behaviour = node, behaviour or Behaviour()
         self.node_id = node.node_id
-        self._lss = LssSlave(lss_address(node.identity), node.node_id)
         self._random = random.Random(self._behaviour.seed * LAST_NODE + node.node_id)
-        self._store = ObjectStore(OBJECTS.values(), self._check, self._written)
+        how = self._behaviour
+        self._dictionary = shown = changed(dictionary or dictionary_of(node), node, how)
+        self._store = ObjectStore(
+            shown.entries, self._check, self._written, shown.hidden, lacking=how.lacking
+        )
         self._values = self._store.values
-        self._memory = Memory(self._store, node.identity, kept)
+        self._memory = Memory(self._store, shown, node.node_id, kept)
         self._memory.recall(self.node_id)
-        self.axis = Axis(node, self._behaviour, self._values)
+        self._lss = LssSlave(address_of(self._values), node.node_id)
+        self.axis = Axis(node, how, self._values, shown.links)
         self._pdos = ProcessData(self._store)
-        self._sdo = SdoServer(self._read, self._store.write)
+        self._target = node.target_object.key
+        self._sdo = SdoServer(self._read, self._store.write, how.sdo_answers)
         self.state = NmtState.BOOT_UP
         self._now_ns = 0
         self._tick_ns = 0
-        self._boot_ns = 1000 * self._behaviour.boot_us
+        self._boot_ns = 1000 * how.boot_us
         self._beats = HeartbeatProducer()
         self._heartbeats = HeartbeatConsumer(self._values)
         self._connection = Connection(self.axis, self._values)
@@ -83,6 +92,7 @@ class EmulatedDrive:
             self._values, self.axis, self._pdos, self._connection, self._behaviour.sync_loss_periods
         )
         self._out: list[tuple[int, Frame]] = []
+        show_temperature(self._store, self._dictionary, self._node, WARM)
         self._pdos.rebuild()
 
     # --- what the wire and the body call -----------------------------------------------------
@@ -100,7 +110,9 @@ class EmulatedDrive:
             return
         cob_id, data = frame.cob_id, frame.data
         if cob_id == lss.REQUEST_ID:
-            self._layer_setting(data)
+            self._reply(lss.ANSWER_ID, self._lss.feed(data))
+            if self._lss.released:
+                self._restart(ALL)
         elif self.node_id == lss.UNCONFIGURED:
             return
         elif cob_id == self._values[SYNC] & COB_MASK:
@@ -112,15 +124,13 @@ class EmulatedDrive:
                 self._reception.rpdo(cob_id, data, now_ns)
         elif cob_id == SDO_REQUEST_BASE + self.node_id:
             if self.state is not NmtState.STOPPED:
-                reply = self._sdo.feed(data)
-                if reply is not None:
-                    self._send(Frame(SDO_REPLY_BASE + self.node_id, reply))
+                self._reply(SDO_REPLY_BASE + self.node_id, self._sdo.feed(data))
         elif cob_id == NMT_ID:
             order = decode_nmt(data)
             if order is not None and order[1] in (0, self.node_id):
                 self._obey(order[0])
-        elif HEARTBEAT_BASE < cob_id <= HEARTBEAT_BASE + LAST_NODE:
-            self._heard(cob_id - HEARTBEAT_BASE, data)
+        elif self._heartbeats.hear(cob_id - HEARTBEAT_BASE, data, now_ns):
+            self._connection.over(HEARTBEAT_LOST, now_ns)
         self._connection.forward(self._now_ns)
 
     def tick(self, now_ns: int) -> float:
@@ -154,6 +164,7 @@ class EmulatedDrive:
         self._connection.outlet.clear()
         self.axis.restart()
         self._restart(ALL, cold=True)
+        show_temperature(self._store, self._dictionary, self._node, WARM)
 
     def _restart(self, indices: Container[int], *, cold: bool = False) -> None:
         """Set objects among some indices back and boot; the node id is that set last over LSS."""
@@ -173,7 +184,7 @@ class EmulatedDrive:
         self._now_ns = now_ns
         self.axis.alarms.hold(code)
         if code == OVER_TEMPERATURE:
-            self._values[TEMPERATURE, 0] = 900
+            show_temperature(self._store, self._dictionary, self._node, HOT)
         self.axis.fault(code)
         self._connection.forward(self._now_ns)
 
@@ -203,23 +214,14 @@ class EmulatedDrive:
 
     # --- CiA 301 -----------------------------------------------------------------------------
 
-    def _layer_setting(self, data: bytes) -> None:
-        """Answer LSS (CiA 305); a drive that has got its first node id boots."""
-        answer = self._lss.feed(data)
-        if answer is not None:
-            self._send(Frame(lss.ANSWER_ID, answer))
-        if self._lss.released:
-            self._restart(ALL)
-
     def _check(self, key: Key, value: int) -> Abort | None:
+        if (refusal := self._dictionary.refusal(key, value)) is not None:
+            return refusal
         if Memory.owns(key):
             return Memory.check(key, value, powered=self.axis.power.state in POWERED)
         if ProcessData.owns(key):
             return self._pdos.check(key, value)
-        refusal = objection(key, value, self._values)
-        if refusal is None and key == (0x1019, 0) and self._values[0x1006, 0]:
-            return Abort.DEVICE_STATE
-        return refusal or self.axis.check(key, value)
+        return objection(key, value, self._values) or self.axis.check(key, value)
 
     def _read(self, index: int, sub: int) -> bytes:
         if (index, sub) == LATEST_ERROR and not self._values[ERROR_COUNT]:
@@ -236,8 +238,8 @@ class EmulatedDrive:
             self._heartbeats.clear()
         elif key == ERROR_COUNT:
             self._values[LATEST_ERROR] = 0
-        elif key[0] >= 0x6000:
-            if key == TARGET:
+        elif key[0] >= 0x6000 or key == self._target:
+            if key == self._target:
                 self._reception.fresh = True
             self.axis.written(key, self._now_ns)
 
@@ -268,10 +270,6 @@ class EmulatedDrive:
         elif state is NmtState.OPERATIONAL and before is not state:
             self._heartbeats.start(self._now_ns)
 
-    def _heard(self, node_id: int, data: bytes) -> None:
-        if self._heartbeats.hear(node_id, data, self._now_ns):
-            self._connection.over(HEARTBEAT_LOST, self._now_ns)
-
     def _timers(self) -> None:
         now_ns, values = self._now_ns, self._values
         if self._beats.due(1_000_000 * values[0x1017, 0], now_ns):
@@ -291,6 +289,10 @@ class EmulatedDrive:
             self._enter(fallback)
 
     # --- output ------------------------------------------------------------------------------
+
+    def _reply(self, cob_id: int, data: bytes | None) -> None:
+        if data is not None:
+            self._send(Frame(cob_id, data))
 
     def _send(self, frame: Frame) -> None:
         low, high = self._behaviour.reply_delay_us

@@ -4,7 +4,7 @@ The bitrate of an emulated bus is that of its wire, so a change of the bit timin
 supported.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import final
 
 from legbench.drives.protocol.frame import LAST_NODE
@@ -20,12 +20,13 @@ from legbench.drives.protocol.lss import (
     LssMode,
     lss_frame,
 )
-from legbench.drives.setup.config import Identity
+from legbench.drives.protocol.objects import Key
 
 
-def lss_address(identity: Identity) -> LssAddress:
-    """LSS address of a drive: the four words of its identity object (CiA 305, 4.1)."""
-    return (identity.vendor, identity.product, identity.revision or 0, identity.serial or 0)
+def address_of(values: Mapping[Key, int]) -> LssAddress:
+    """LSS address of a drive: the four words of its identity, 0 where it has none (1018h)."""
+    words = [values.get((0x1018, sub), 0) for sub in range(1, WORDS + 1)]
+    return (words[0], words[1], words[2], words[3])
 
 
 @final

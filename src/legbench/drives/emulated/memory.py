@@ -3,7 +3,7 @@
 from collections.abc import Container, Sequence
 from typing import final
 
-from legbench.drives.emulated.identity import write_identity
+from legbench.drives.emulated.dictionary import Dictionary
 from legbench.drives.emulated.store import ObjectStore
 from legbench.drives.protocol.memory import (
     LOAD_SIGNATURE,
@@ -14,7 +14,6 @@ from legbench.drives.protocol.memory import (
 )
 from legbench.drives.protocol.objects import Access, Key
 from legbench.drives.protocol.sdo import Abort
-from legbench.drives.setup.config import Identity
 from legbench.drives.setup.parameters import Parameter
 
 NEVER = (0x1003, STORE, RESTORE, 0x6040, 0x6071, 0x607A)
@@ -29,19 +28,37 @@ class Memory:
     """Parameters of one drive that differ from its defaults, as it keeps them without power."""
 
     def __init__(
-        self, store: ObjectStore, identity: Identity, kept: Sequence[Parameter] = ()
+        self,
+        store: ObjectStore,
+        dictionary: Dictionary,
+        node_id: int,
+        kept: Sequence[Parameter] = (),
     ) -> None:
-        """Begin with some parameters, of which the last value of an object counts."""
-        self._store, self._identity = store, identity
+        """Begin with some parameters, of which the last value of an object counts.
+
+        Args:
+            store: objects of the drive.
+            dictionary: their values at power-on.
+            node_id: node id for which these are.
+            kept: what is kept; an object that is not there, or takes another value, is left out.
+        """
+        self._store, self._dictionary, self._node_id = store, dictionary, node_id
         self._defaults: dict[Key, int] = {}
-        self._kept: dict[Key, int] = {entry.key: entry.value for entry in kept}
+        self._kept = {entry.key: entry.value for entry in kept if self._takes(entry)}
+
+    def _takes(self, parameter: Parameter) -> bool:
+        key = parameter.key
+        entry = self._store.entry(key)
+        refused = self._dictionary.refusal(key, parameter.value) is not None
+        return entry is not None and entry.access is Access.RW and not refused
 
     def recall(self, node_id: int, indices: Container[int] = ALL) -> None:
         """Set objects to their defaults for a node id, then to what is kept, as at power-on."""
         values = self._store.values
         self._store.load_defaults(indices)
-        write_identity(values, self._identity, node_id)
         among = [key for key in values if key[0] in indices]
+        for key in self._dictionary.relative.intersection(among):
+            values[key] += node_id - self._node_id
         self._defaults |= {key: values[key] for key in among}
         values |= {key: self._kept[key] for key in among if key in self._kept}
 

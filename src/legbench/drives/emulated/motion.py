@@ -9,6 +9,8 @@ from legbench.drives.protocol.objects import Key
 from legbench.drives.setup.units import AxisUnits
 
 SECOND_NS = 1_000_000_000
+LINK_BANDWIDTH = 2.0
+"""Corner frequency of a position loop over the encoder of the link [Hz]."""
 
 
 @final
@@ -21,6 +23,8 @@ class Motion:
         speed: speed of the demand [counts/s].
         limited: the target was cut to the software limits (607Dh).
         missing: SYNCs in a row without a new target.
+        beside: way from the motor to the encoder of the position loop, where that one sits at the
+            link [counts].
         jammed: the motor stands, whatever the position loop does.
     """
 
@@ -34,6 +38,7 @@ class Motion:
         self.limited = False
         self.missing = 0
         self.jammed = False
+        self.beside = 0.0
         self._from = self._to = self.actual
         self._since_ns = 0
         self._late_ms = 0.0
@@ -136,6 +141,9 @@ class Motion:
             return
         move = self.demand - self.actual
         step = step_ns / SECOND_NS
+        if self.beside:
+            # A loop over the spring has to be slow, or the spring swings in it.
+            move = (move - self.beside) * -math.expm1(-2.0 * math.pi * LINK_BANDWIDTH * step)
         if self._behaviour.bandwidth is not None:
             move *= 1.0 - math.exp(-2.0 * math.pi * self._behaviour.bandwidth * step)
         top = self._values[0x6080, 0]
@@ -157,7 +165,7 @@ class Motion:
     def overdue(self, step_ns: int) -> bool:
         """Whether the following error has been too large for too long (6065h, 6066h)."""
         window = self._values[0x6065, 0]
-        if window == 0xFFFFFFFF or abs(self.demand - self.actual) <= window:
+        if window == 0xFFFFFFFF or abs(self.demand - self.actual - self.beside) <= window:
             self._late_ms = 0.0
             return False
         self._late_ms += step_ns / 1e6

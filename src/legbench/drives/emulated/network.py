@@ -154,6 +154,10 @@ class Network:
             return
         self.now_ns = max(self.now_ns, until_ns)
 
+    def upcoming(self) -> tuple[int, Callable[[], None]]:
+        """Time [ns] and handler of the next event, for whoever leads the time of several."""
+        return self._next()
+
     def _next(self) -> tuple[int, Callable[[], None]]:
         """Time and handler of the next event; at equal times the grid of the body goes first."""
         if self._flying is not None:

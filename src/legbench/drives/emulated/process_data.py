@@ -3,10 +3,11 @@
 from typing import final
 
 from legbench.drives.emulated.rules import usable
-from legbench.drives.emulated.store import ObjectStore
+from legbench.drives.emulated.store import ObjectStore, fit
 from legbench.drives.errors import CodecError, SdoAbortError
+from legbench.drives.protocol.datatypes import size_of
 from legbench.drives.protocol.frame import COB_INVALID, COB_MASK, Frame
-from legbench.drives.protocol.objects import MAX_MAPPED, PDO_COUNT, Access, Key
+from legbench.drives.protocol.objects import Access, Key
 from legbench.drives.protocol.pdo import Mapped, PdoMap, split_word
 from legbench.drives.protocol.sdo import Abort
 
@@ -14,6 +15,9 @@ RPDO, TPDO = 0x1400, 0x1800
 ACYCLIC, LAST_SYNCHRONOUS = 0, 240
 """Transmission types: at SYNC if it has changed, and the last of those at every nth SYNC."""
 _EVENT_TYPES = (254, 255)
+EVENT_DRIVEN = 255
+MAX_MAPPED = 64
+"""Most objects that a PDO has room for, a bit each (CiA 301, 7.5.2.36)."""
 
 
 @final
@@ -46,6 +50,8 @@ class ProcessData:
 
     def __init__(self, store: ObjectStore) -> None:
         self._store = store
+        described = [index for index, sub in store.keys if self.owns((index, sub)) and sub == 1]
+        self._comms = tuple(index for index in described if not index & 0x200)
         self.rpdos: dict[int, Pdo] = {}
         self.tpdos: list[Pdo] = []
         self.repeats = False
@@ -53,21 +59,21 @@ class ProcessData:
     @staticmethod
     def owns(key: Key) -> bool:
         """Whether an object describes a PDO."""
-        return RPDO <= key[0] < TPDO + 0x200 + PDO_COUNT
+        return RPDO <= key[0] < TPDO + 0x400
 
     def check(self, key: Key, value: int) -> Abort | None:
         """Abort code that refuses a value for a PDO's object, if any (CiA 301, 7.5.2.36)."""
         index, sub = key
         mapping = bool(index & 0x200)
         comm = index & ~0x200
-        exists = not self._store.values[comm, 1] & COB_INVALID
+        exists = not self._store.values.get((comm, 1), COB_INVALID) & COB_INVALID
         if not mapping:
             return self._check_comm(comm, sub, value, exists)
         if exists:
             return Abort.DEVICE_STATE
         if sub == 0:
             return self._check_layout(index, value)
-        if self._store.values[index, 0]:
+        if self._store.values.get((index, 0)):
             return Abort.DEVICE_STATE
         return None if self._mapped(value, index) is not None else Abort.NOT_MAPPABLE
 
@@ -82,11 +88,10 @@ class ProcessData:
         return Abort.DEVICE_STATE if sub == 3 and exists else None
 
     def _check_layout(self, index: int, count: int) -> Abort | None:
-        if count > MAX_MAPPED:
+        if self._store.entry((index, count)) is None:
             return Abort.PDO_LENGTH
-        entries = [
-            self._mapped(self._store.values[index, sub], index) for sub in range(1, count + 1)
-        ]
+        values = self._store.values
+        entries = [self._mapped(values.get((index, sub), 0), index) for sub in range(1, count + 1)]
         known = [entry for entry in entries if entry is not None]
         if len(known) < count:
             return Abort.NOT_MAPPABLE
@@ -96,7 +101,7 @@ class ProcessData:
         """The object of a mapping entry, if it may stand in this PDO."""
         at, sub, bits = split_word(word)
         entry = self._store.entry((at, sub))
-        if entry is None or not entry.mappable:
+        if entry is None or not entry.mappable or size_of(entry.kind) is None:
             return None
         if index < TPDO and entry.access not in (Access.RW, Access.WO):
             return None
@@ -106,28 +111,29 @@ class ProcessData:
     def rebuild(self) -> None:
         """Read the PDOs' objects again, after one of them was written."""
         old = {pdo.cob_id: pdo for pdo in (*self.rpdos.values(), *self.tpdos)}
-        found = [self._build(RPDO + number, old) for number in range(PDO_COUNT)]
+        found = [self._build(comm, old) for comm in self._comms if comm < TPDO]
         self.rpdos = {pdo.cob_id: pdo for pdo in found if pdo is not None}
-        found = [self._build(TPDO + number, old) for number in range(PDO_COUNT)]
+        found = [self._build(comm, old) for comm in self._comms if comm >= TPDO]
         self.tpdos = [pdo for pdo in found if pdo is not None]
 
     def _build(self, comm: int, old: dict[int, Pdo]) -> Pdo | None:
         values = self._store.values
         cob = values[comm, 1]
         mapping = comm + 0x200
-        count = values[mapping, 0]
+        count = min(values.get((mapping, 0), 0), MAX_MAPPED)
         if cob & COB_INVALID or not count:
             return None
-        entries = [self._mapped(values[mapping, sub], mapping) for sub in range(1, count + 1)]
+        words = [values.get((mapping, sub), 0) for sub in range(1, count + 1)]
+        entries = [self._mapped(word, mapping) for word in words]
         try:
             layout = PdoMap([entry for entry in entries if entry is not None])
         except CodecError:
             return None
         pdo = Pdo(
             cob & COB_MASK,
-            values[comm, 2],
-            inhibit=values[comm, 3],
-            timer_ms=values[comm, 5],
+            values.get((comm, 2), EVENT_DRIVEN),
+            inhibit=values.get((comm, 3), 0),
+            timer_ms=values.get((comm, 5), 0),
             layout=layout,
         )
         known = old.get(pdo.cob_id)
@@ -140,7 +146,12 @@ class ProcessData:
         if self.repeats and pdo.last is not None:
             return pdo.last
         values = self._store.values
-        pdo.last = pdo.layout.pack([values[key] for key in pdo.keys])
+        try:
+            pdo.last = pdo.layout.pack([values[key] for key in pdo.keys])
+        except CodecError:
+            # An object of a data sheet may be shorter than what the drive works with.
+            entries = pdo.layout.entries
+            pdo.last = pdo.layout.pack([fit(one.kind, values[one.key]) for one in entries])
         return pdo.last
 
     def at_sync(self) -> list[Frame]:

@@ -29,6 +29,8 @@ ALLOWED: Mapping[Key, Container[int]] = {
 }
 """Values by object; negative option codes are the manufacturer's, and this one has none."""
 SYNC, CONSUMERS = (0x1005, 0), 0x1016
+COUNTER = (0x1019, 0)
+"""Synchronous counter overflow, which stays as it is while SYNC has a period (1006h)."""
 
 
 def usable(cob: int) -> bool:
@@ -53,7 +55,9 @@ def objection(key: Key, value: int, values: Mapping[Key, int]) -> Abort | None:
     """
     allowed = ALLOWED.get(key)
     if allowed is not None:
-        return None if value in allowed else Abort.INVALID_VALUE
+        if value not in allowed:
+            return Abort.INVALID_VALUE
+        return Abort.DEVICE_STATE if key == COUNTER and values[0x1006, 0] else None
     if key == SYNC:
         # Bit 30 asks for a producer of SYNC, which a drive is not.
         producer = bool(value & COB_NO_REMOTE)

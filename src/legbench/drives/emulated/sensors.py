@@ -68,7 +68,7 @@ class Sensors:
     def __init__(self, node: NodeConfig) -> None:
         """Take the resolutions from the bus file."""
         self.motor = Encoder(node.motor.counts_per_rad)
-        self.link = Encoder(node.link.counts_per_rad)
+        self.link = Encoder((node.link or node.motor).counts_per_rad)
 
     def tick(self, step_ns: int) -> None:
         """Advance the time of the fault [ns]."""

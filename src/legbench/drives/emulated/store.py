@@ -1,10 +1,18 @@
 """The object dictionary inside a drive: values, and access to them by SDO."""
 
-from collections.abc import Callable, Container, Iterable
+from collections.abc import Callable, Container, Iterable, Mapping
 from typing import final
 
 from legbench.drives.errors import CodecError
-from legbench.drives.protocol.datatypes import Value, pack, range_of, size_of, unpack
+from legbench.drives.protocol.datatypes import (
+    FORMATS,
+    DataType,
+    Value,
+    pack,
+    range_of,
+    size_of,
+    unpack,
+)
 from legbench.drives.protocol.objects import Access, Key, ObjectEntry
 from legbench.drives.protocol.sdo import Abort, abort_error
 
@@ -21,8 +29,27 @@ class ObjectStore:
         values: the numbers, for the drive's own use.
     """
 
-    def __init__(self, entries: Iterable[ObjectEntry], check: Check, written: Written) -> None:
+    def __init__(
+        self,
+        entries: Iterable[ObjectEntry],
+        check: Check,
+        written: Written,
+        hidden: Mapping[Key, int] | None = None,
+        *,
+        lacking: Abort = Abort.NO_OBJECT,
+    ) -> None:
+        """Hold the power-on values.
+
+        Args:
+            entries: objects that there are.
+            check: asked before a value is taken.
+            written: told of every value that was taken.
+            hidden: numbers for the drive's own use that no SDO reaches.
+            lacking: code that refuses what is not there; that of the standard by default.
+        """
+        self._hidden = hidden or {}
         self._entries = {entry.key: entry for entry in entries}
+        self._lacking = lacking
         self._indices = {index for index, _ in self._entries}
         self._check, self._written = check, written
         self.values: dict[Key, int] = {}
@@ -31,6 +58,7 @@ class ObjectStore:
 
     def load_defaults(self, indices: Container[int] = range(0x10000)) -> None:
         """Set every object among some indices, by default all, to its power-on default."""
+        self.values |= {key: value for key, value in self._hidden.items() if key[0] in indices}
         for key, entry in self._entries.items():
             if entry.index not in indices:
                 continue
@@ -38,6 +66,11 @@ class ObjectStore:
                 self.values[key] = entry.default
             else:
                 self._texts[key] = entry.default
+
+    @property
+    def keys(self) -> tuple[Key, ...]:
+        """Index and sub-index of every object that an SDO reaches, in order."""
+        return tuple(self._entries)
 
     def entry(self, key: Key) -> ObjectEntry | None:
         """Description of an object, if there is one."""
@@ -48,8 +81,10 @@ class ObjectStore:
         entry = self._known(index, sub)
         if entry.access is Access.WO:
             raise abort_error(Abort.WRITE_ONLY, index, sub)
-        key = entry.key
-        return pack(entry.kind, self.values[key] if key in self.values else self._texts[key])
+        if entry.kind not in FORMATS:
+            there = self._texts.get(entry.key)
+            return pack(entry.kind, self.values[entry.key] if there is None else there)
+        return pack(entry.kind, fit(entry.kind, self.values[entry.key]))
 
     def write(self, index: int, sub: int, data: bytes) -> None:
         """Take the bytes of an object, all or nothing; raises SdoAbortError."""
@@ -77,14 +112,25 @@ class ObjectStore:
         self.values[entry.key] = value
         self._written(entry.key)
 
-    def show(self, key: Key, value: int) -> None:
-        """Publish an actual value, saturated to what its object holds."""
-        low, high = range_of(self._entries[key].kind)
-        self.values[key] = min(max(value, low), high)
+    def show(self, key: Key, value: float) -> None:
+        """Publish a measured value, rounded and saturated to what its object holds."""
+        kind = self._entries[key].kind
+        if kind is DataType.REAL32:
+            self._texts[key] = float(value)
+            return
+        low, high = range_of(kind)
+        self.values[key] = min(max(round(value), low), high)
 
     def _known(self, index: int, sub: int) -> ObjectEntry:
         entry = self._entries.get((index, sub))
         if entry is None:
             known = index in self._indices
-            raise abort_error(Abort.NO_SUB_INDEX if known else Abort.NO_OBJECT, index, sub)
+            usual = known and self._lacking is Abort.NO_OBJECT
+            raise abort_error(Abort.NO_SUB_INDEX if usual else self._lacking, index, sub)
         return entry
+
+
+def fit(kind: DataType, value: int) -> int:
+    """Return a number as an object of a type shows it, wrapped as its bits are."""
+    low, high = range_of(kind)
+    return value if low <= value <= high else (value - low) % (high - low + 1) + low

@@ -23,8 +23,12 @@ from legbench.drives.transport.unix_packet import (
     unpack_frame,
 )
 
-UNREAD = 4096
-"""Number of frames that wait for a master who does not read; what comes then is lost to it."""
+UNREAD = 64
+"""Number of frames that wait here for a master who does not read; what comes then is lost to it.
+
+The kernel's queue, about 280 frames, is full before. A longer one would feed a slow reader with
+what was true a second ago; SocketCAN's queue of a socket is as long.
+"""
 
 
 @final

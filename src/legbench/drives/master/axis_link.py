@@ -1,24 +1,29 @@
 """One drive in the cycle: process data <-> angles, controlword and target; pure."""
 
+import math
 from typing import final
 
 from legbench.drives.errors import CodecError
-from legbench.drives.protocol.cia402 import PowerMachine, decode_state
+from legbench.drives.protocol.cia402 import PowerMachine, StatusBit, decode_state
 from legbench.drives.protocol.pdo import PdoMap
-from legbench.drives.setup.config import (
-    CONTROLWORD,
-    POSITION_ACTUAL,
-    STATUSWORD,
-    TARGET_POSITION,
-    NodeConfig,
-)
-from legbench.drives.setup.units import Unwrapper, wrap
+from legbench.drives.setup.config import NodeConfig
+from legbench.drives.setup.pdos import CONTROLWORD, STATUSWORD
+from legbench.drives.setup.quirks import ModeShown
+from legbench.drives.setup.units import Unwrapper
+
+LINK, TORQUE = 2, 3
+"""Slots of the second encoder and of the torque among what a drive shows."""
 
 
 def _wanted(layout: PdoMap, node: NodeConfig) -> tuple[tuple[int, int], ...]:
     """Pairs of a slot in `_shown` and the place of its object among the values of a TPDO."""
-    objects = (STATUSWORD, POSITION_ACTUAL, node.link_object)
-    places = [(slot, layout.place(*entry.key)) for slot, entry in enumerate(objects)]
+    objects = (STATUSWORD, node.motor_object, node.link_object, node.torque_object)
+    wanted = [
+        (slot, entry)
+        for slot, entry in enumerate(objects)
+        if entry is not None and (slot != LINK or node.link is not None)
+    ]
+    places = [(slot, layout.place(*entry.key)) for slot, entry in wanted]
     return tuple((slot, place) for slot, place in places if place is not None)
 
 
@@ -33,7 +38,11 @@ class AxisLink:
         target_counts: target of its next RPDO, not wrapped.
         sent_counts: target of its last RPDO, none before the first.
         fresh: whether all its TPDOs have come in this cycle.
-        motor_pos, link_pos: measured angles of motor and link [rad].
+        motor_pos: angle of the encoder of the position loop (6064h) [rad].
+        link_pos: angle of the second encoder, at the link; not a number without one [rad].
+        follows: bits of the statusword that are set while the drive follows its target.
+        in_mode: whether the drive has shown its mode (6061h).
+        torque: torque at the joint that the drive tells; not a number if it does not [N m].
     """
 
     def __init__(self, node: NodeConfig) -> None:
@@ -44,8 +53,17 @@ class AxisLink:
         self.sent_counts: int | None = None
         self.motor_counts = 0
         self.link_counts = 0
-        self._motor_rad, self._link_rad = node.motor.to_rad, node.link.to_rad
-        self.motor_pos, self.link_pos = self._motor_rad(0), self._link_rad(0)
+        units, link = node.motor, node.link
+        self._motor_rad = units.to_rad
+        self._lowest, self._modulus = units.lowest, units.modulus
+        self._link_rad = None if link is None else link.to_rad
+        self.motor_pos = self._motor_rad(0)
+        self.link_pos = math.nan if link is None else link.to_rad(0)
+        self._torque_scale = units.sign * node.torque_scale
+        self.follows = int(StatusBit.FOLLOWS_COMMAND) if node.quirks.follows_bit else 0
+        self.in_mode = node.quirks.mode_shown is ModeShown.CONFIGURED
+        self._tells_torque = node.torque_object is not None
+        self.torque = math.nan
         maps = {node.tpdo_id(pdo): PdoMap(pdo.objects) for pdo in node.tpdos}
         self._tpdos = {
             cob_id: (1 << number, layout, _wanted(layout, node))
@@ -55,17 +73,18 @@ class AxisLink:
         self._all = (1 << len(maps)) - 1
         self._missing = self._all
         self.fresh = False
-        self._shown = [0, 0, 0]
-        """Statusword, motor and link, as received."""
+        self._shown = [0, 0, 0, 0]
+        """Statusword, motor, link and torque, as received."""
         self._rpdos = tuple((node.rpdo_id(pdo), PdoMap(pdo.objects)) for pdo in node.rpdos)
         self._plain = self._plain_layout()
-        self._motor = Unwrapper(node.motor.bits, 0)
-        self._link = Unwrapper(node.link.bits, 0)
+        self._motor = Unwrapper(units.modulus, 0)
+        self._link = Unwrapper(1 if link is None else link.modulus, 0)
         self._known = False
 
     def _plain_layout(self) -> bool:
         """Whether all process data is one usual frame each way."""
-        return len(self._rpdos) == 1 and self._rpdos[0][1].entries == (CONTROLWORD, TARGET_POSITION)
+        plain = (CONTROLWORD, self.node.target_object)
+        return len(self._rpdos) == 1 and self._rpdos[0][1].entries == plain
 
     @property
     def tpdo_ids(self) -> tuple[int, ...]:
@@ -113,18 +132,28 @@ class AxisLink:
         return True
 
     def _digest(self) -> None:
-        self.statusword, motor, link = self._shown
+        self.statusword, motor, link, torque = self._shown
         if not self._known:
             self._find(motor)
         self.motor_counts = counts = self._motor.feed(motor)
         self.motor_pos = self._motor_rad(counts)
-        self.link_counts = counts = self._link.feed(link)
-        self.link_pos = self._link_rad(counts)
+        if self._link_rad is not None:
+            self.link_counts = counts = self._link.feed(link)
+            self.link_pos = self._link_rad(counts)
+        if self._tells_torque:
+            self.torque = self._torque_scale * torque
 
     def _find(self, motor: int) -> None:
-        """Unwrap for the first time: the link lies within half a turn of its motor."""
+        """Unwrap for the first time: the link lies within half a turn of its motor.
+
+        A position with a modulus of its own lies within half of it of angle 0.
+        """
+        units, link = self.node.motor, self.node.link
+        if units.modulus_counts is not None:
+            motor = units.nearest(motor, units.offset_counts)
         self._motor.counts = motor
-        self._link.counts = self.node.link.to_counts(self.node.motor.to_rad(motor))
+        if link is not None:
+            self._link.counts = link.to_counts(units.to_rad(motor))
         self._known = True
 
     def forget(self) -> None:
@@ -158,11 +187,14 @@ class AxisLink:
     def frames(self, controlword: int) -> list[tuple[int, bytes]]:
         """RPDOs of this cycle: COB-ID and data."""
         self.sent_counts = self.target_counts
-        target = wrap(self.target_counts)
+        # As `AxisUnits.show`, without its calls.
+        lowest = self._lowest
+        target = lowest + (self.target_counts - lowest) % self._modulus
         if self._plain:
             cob_id, layout = self._rpdos[0]
             return [(cob_id, layout.pack((controlword, target)))]
-        known = {CONTROLWORD.key: controlword, TARGET_POSITION.key: target, (0x6060, 0): 8}
+        known = {CONTROLWORD.key: controlword, self.node.target_object.key: target}
+        known[0x6060, 0] = 8
         return [
             (cob_id, layout.pack([known.get(entry.key, 0) for entry in layout.entries]))
             for cob_id, layout in self._rpdos

@@ -14,19 +14,20 @@ from legbench.drives.master.parking import is_parked
 from legbench.drives.master.port import Port
 from legbench.drives.master.sdo_port import SdoPort
 from legbench.drives.master.sdo_stop import SdoStop
+from legbench.drives.master.writing import read_configuration, write_configuration
 from legbench.drives.protocol.cia402 import POWERED, Mode, decode_state
 from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.emcy import MEANINGS
 from legbench.drives.protocol.nmt import NmtCommand, nmt_frame
-from legbench.drives.protocol.objects import name_of
-from legbench.drives.protocol.sdo import Abort
-from legbench.drives.setup.config import BusConfig, Identity, NodeConfig, Parameter
+from legbench.drives.protocol.sdo import ABSENT
+from legbench.drives.setup.config import BusConfig, Identity, NodeConfig
 from legbench.drives.setup.configuration import configuration
+from legbench.drives.setup.outcome import Outcome
+from legbench.drives.setup.quirks import ModeShown
 from legbench.interrupts import shielded
 
-MODE_PATIENCE = 50
-"""Number of reads of 6061h, 10 ms apart, until the mode must be there."""
-_MISSING = (Abort.NO_OBJECT, Abort.NO_SUB_INDEX)
+MODE_LOOK_NS = 10_000_000
+"""Time between two reads of 6061h [ns]."""
 U32, I32, I8, U16 = (
     DataType.UNSIGNED32,
     DataType.INTEGER32,
@@ -70,7 +71,7 @@ class BringUp:
                 return
             for node in self._bus.nodes:
                 if node.heartbeat_consumer:
-                    self.lookout.watched(node, self.sdo(node).get_int(0x1016, 1, U32))
+                    self.lookout.watched(node, self.sdo(node).find_int(0x1016, 1, U32) or 0)
 
     def glance(self) -> None:
         """Hear what has come by now; raises PlantFault if another master has spoken."""
@@ -118,53 +119,54 @@ class BringUp:
         if failed is not None:
             raise failed
 
-    def differences(self, node: NodeConfig) -> list[tuple[Parameter, int]]:
-        """Objects of the configuration that a drive holds otherwise, with what it holds.
+    def compare(self, node: NodeConfig) -> tuple[Outcome, ...]:
+        """Compare what a drive holds with its configuration, object by object; writes nothing."""
+        return read_configuration(self.sdo(node), tuple(configuration(self._bus, node)))
 
-        The entries that switch a PDO off while it is mapped are left out.
-        """
-        final_values = {parameter.key: parameter for parameter in configuration(self._bus, node)}
-        different = []
-        for parameter in final_values.values():
-            try:
-                there = self.sdo(node).get_int(parameter.index, parameter.sub, parameter.kind)
-            except SdoAbortError as error:
-                if parameter.optional and error.code in _MISSING:
-                    continue
-                raise
-            if there != parameter.value:
-                different.append((parameter, there))
-        return different
+    def differences(self, node: NodeConfig) -> list[Outcome]:
+        """Objects that a drive holds otherwise, or lacks and must not; writes nothing."""
+        return [
+            entry
+            for entry in self.compare(node)
+            if not entry.agrees and (entry.there is not None or not entry.passes)
+        ]
 
-    def refuse_differences(self) -> None:
+    def refuse_differences(self) -> dict[str, tuple[Outcome, ...]]:
         """Raise DriveError for the first drive that differs, for a master that may not configure.
 
         Process data that is mapped otherwise would be read as what it is not. Command frames
-        that are switched off, as after every run, change nothing for those who only look.
+        that are switched off, as after every run, change nothing for those who only look, and
+        neither does a protection that the drive lacks or holds otherwise. Returns what every drive
+        holds, by the name of its node.
         """
+        found: dict[str, tuple[Outcome, ...]] = {}
         for node in self._bus.nodes:
+            found[node.name] = self.compare(node)
             different = [
-                (parameter, there)
-                for parameter, there in self.differences(node)
-                if not is_parked(node, parameter, there)
+                entry
+                for entry in found[node.name]
+                if not entry.passes
+                and not (entry.there and is_parked(node, entry.parameter, entry.there))
             ]
             if different:
-                parameter, there = different[0]
+                first = different[0]
                 raise DriveError(
                     f"node {node.node_id} ('{node.name}') holds {len(different)} objects otherwise "
-                    f"than the bus file, first {name_of(parameter.index, parameter.sub)}: {there}, "
-                    f"wanted {parameter.value}; read-only changes no drive: run `legbench drives "
+                    f"than the bus file, first {first.name}: {first.there}, wanted "
+                    f"{first.parameter.value}; read-only changes no drive: run `legbench drives "
                     "configure --write` first"
                 )
+        return found
 
-    def configure(self, node: NodeConfig) -> int:
-        """Write the configuration and read every object back; returns the number of objects.
+    def configure(self, node: NodeConfig) -> tuple[Outcome, ...]:
+        """Write the configuration and read every object back; returns what became of each.
 
         Raises:
-            DriveError: the drive refuses, or holds another value afterwards.
+            DriveError: the drive refuses what is required, or holds another value afterwards.
         """
         try:
-            count = self._configure(node)
+            sdo, plan = self.sdo(node), tuple(configuration(self._bus, node))
+            outcomes = write_configuration(sdo, node, plan)
         except KeyboardInterrupt as error:
             error.add_note(
                 f"drive '{node.name}' (node {node.node_id}) has no power, and holds its "
@@ -173,56 +175,46 @@ class BringUp:
             )
             raise
         self._await_mode(node)
-        return count
-
-    def _configure(self, node: NodeConfig) -> int:
-        sdo, count = self.sdo(node), 0
-        for parameter in configuration(self._bus, node):
-            if not self._write(node, parameter):
-                continue
-            there = sdo.get_int(parameter.index, parameter.sub, parameter.kind)
-            if there != parameter.value:
-                raise DriveError(
-                    f"node {node.node_id} ('{node.name}'), "
-                    f"{name_of(parameter.index, parameter.sub)}: wrote {parameter.value}, reads "
-                    f"{there}; the drive does not take this value"
-                )
-            count += 1
-        return count
-
-    def _write(self, node: NodeConfig, parameter: Parameter) -> bool:
-        """Write one object; false if the drive has none and may do without."""
-        try:
-            self.sdo(node).put(parameter.index, parameter.sub, parameter.kind, parameter.value)
-        except SdoAbortError as error:
-            if parameter.optional and error.code in _MISSING:
-                return False
-            raise
-        return True
+        return outcomes
 
     def _await_mode(self, node: NodeConfig) -> None:
-        """Read 6061h until it shows the mode written to 6060h, behind which it lags."""
-        timebase, mode = self._port.timebase, 0
-        for _ in range(MODE_PATIENCE):
+        """Read 6061h until it shows the mode written to 6060h, behind which it lags.
+
+        A drive that shows its mode only once it is enabled is asked then, see `ModePoll`.
+        """
+        quirks, timebase = node.quirks, self._port.timebase
+        if quirks.mode_shown is ModeShown.ENABLED:
+            return
+        until_ns = timebase.now_ns() + 1_000_000 * quirks.mode_patience_ms
+        while True:
             mode = self.sdo(node).get_int(0x6061, 0, I8)
             if mode == Mode.CYCLIC_SYNCHRONOUS_POSITION:
                 return
-            timebase.wait_until(timebase.now_ns() + 10_000_000)
+            if timebase.now_ns() >= until_ns:
+                break
+            timebase.wait_until(timebase.now_ns() + MODE_LOOK_NS)
         raise DriveError(
-            f"node {node.node_id} ('{node.name}') stays in mode {mode}, asked for was 8; is its "
-            "halt bit set?"
+            f"node {node.node_id} ('{node.name}') stays in mode {mode} (6061h) for "
+            f"{quirks.mode_patience_ms} ms, asked for was 8: is its halt bit set? If the drive is "
+            "slow, raise mode_patience_ms in [node.quirks]; if it shows its mode only once it is "
+            f'enabled, give mode_shown = "{ModeShown.ENABLED}"'
         )
 
     def preload(self, node: NodeConfig) -> int:
         """Set the target to the motor position (607Ah from 6064h); returns it [counts]."""
-        sdo = self.sdo(node)
-        actual = sdo.get_int(0x6064, 0, I32)
-        sdo.put(0x607A, 0, I32, actual)
-        if sdo.get_int(0x607A, 0, I32) != actual:
+        sdo, target = self.sdo(node), node.target_object
+        actual = self.position(node)
+        sdo.put(target.index, target.sub, target.kind, actual)
+        if sdo.get_int(target.index, target.sub, target.kind) != actual:
             raise DriveError(
                 f"node {node.node_id} ('{node.name}') does not take a target position by SDO"
             )
         return actual
+
+    def position(self, node: NodeConfig) -> int:
+        """Position of a drive as its object shows it (6064h) [counts]; raises as `SdoPort.get`."""
+        entry = node.motor_object
+        return self.sdo(node).get_int(entry.index, entry.sub, entry.kind)
 
     def soft_limits(self, node: NodeConfig) -> tuple[int, int] | None:
         """Range to which the drive clamps targets (607Dh) [counts]; none where it does not."""
@@ -230,7 +222,7 @@ class BringUp:
         try:
             low, high = sdo.get_int(0x607D, 1, I32), sdo.get_int(0x607D, 2, I32)
         except SdoAbortError as error:
-            if error.code in _MISSING:
+            if error.code in ABSENT:
                 return None
             raise
         return (low, high) if low < high else None
@@ -244,7 +236,7 @@ class BringUp:
         limits = self.soft_limits(node)
         if limits is None:
             return
-        actual = self.sdo(node).get_int(0x6064, 0, I32)
+        actual = self.position(node)
         if not limits[0] <= actual <= limits[1]:
             ends = sorted(map(node.motor.to_rad, limits))
             raise DriveError(
@@ -254,10 +246,12 @@ class BringUp:
                 "when enabled: move it back by hand, or correct soft_limits and offset_counts"
             )
 
-    def temperature(self, node: NodeConfig) -> int | None:
+    def temperature(self, node: NodeConfig) -> float | None:
         """Reading of the drive's temperature [counts]; none if the bus file names no object."""
         entry = node.temperature_object
-        return None if entry is None else self.sdo(node).get_int(entry.index, entry.sub, entry.kind)
+        if entry is None:
+            return None
+        return self.sdo(node).get_number(entry.index, entry.sub, entry.kind)
 
     def unpower(self) -> None:
         """Stop drives that are found with power, by quick stop, before anything is written.
@@ -280,6 +274,8 @@ class BringUp:
         return decode_state(self.sdo(node).get_int(0x6041, 0, U16)) in POWERED
 
     def error_text(self, node: NodeConfig) -> str:
-        """Error code 603Fh in words."""
-        code = self.sdo(node).get_int(0x603F, 0, U16)
+        """Error code 603Fh in words; a drive may have none."""
+        code = self.sdo(node).find_int(0x603F, 0, U16)
+        if code is None:
+            return "it has no error code (603Fh)"
         return f"{code:04X}h {MEANINGS.get(code, 'see the drive manual')}"

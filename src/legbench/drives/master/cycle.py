@@ -12,10 +12,11 @@ import can
 
 from legbench.drives.errors import BusError
 from legbench.drives.master.axis_link import AxisLink
+from legbench.drives.master.mode_poll import mode_polls
 from legbench.drives.master.notices import Notices
 from legbench.drives.master.outgoing import Outgoing
 from legbench.drives.master.port import Port
-from legbench.drives.master.temperature import TemperaturePoll
+from legbench.drives.master.temperature import temperature_polls
 from legbench.drives.master.tick import Tick
 from legbench.drives.master.watch import NodeWatch
 from legbench.drives.protocol.frame import (
@@ -55,7 +56,7 @@ class Cycle:
         self._port, self._config = port, config
         self.axes = tuple(AxisLink(node) for node in config.nodes)
         self.watches = tuple(NodeWatch(config, node, now_ns) for node in config.nodes)
-        self.polls = tuple(TemperaturePoll(node) for node in config.nodes)
+        self.polls = temperature_polls(config)
         self.bus_error: BusError | None = None
         self.bus_off = False
         self.stranger: int | None = None
@@ -73,17 +74,17 @@ class Cycle:
         self._by_node = {
             node.node_id: watch for node, watch in zip(config.nodes, self.watches, strict=True)
         }
-        self._polls = {
-            node.node_id: poll for node, poll in zip(config.nodes, self.polls, strict=True)
-        }
         self._period_ns = config.period_ns
-        self._deadline_ns = 1000 * config.tpdo_deadline_us
+        self._deadline_ns = 1000 * config.deadline_us
         self._due_ns = 0
         self._count = 0
         self._owed: set[int] = set()
         """COB-IDs of process data that has not come, and still may."""
         self._sync = port.message(SYNC_ID)
-        self._outgoing = Outgoing(port, config, self.axes, self.polls, self._failed)
+        modes = mode_polls(self.axes, config)
+        both = zip(config.nodes, self.polls, modes, strict=True)
+        self._polls = {node.node_id: polls for node, *polls in both}
+        self._outgoing = Outgoing(port, config, self.axes, (*self.polls, *modes), self._failed)
 
     def begin(self) -> None:
         """Lay the grid: the next tick is one period from now, on a whole period."""
@@ -226,7 +227,8 @@ class Cycle:
         elif base == EMCY_BASE:
             watch.hear_emergency(bytes(message.data))
         elif base == SDO_REPLY_BASE:
-            self._polls[node_id].feed(bytes(message.data))
+            for poll in self._polls[node_id]:
+                poll.feed(bytes(message.data))
         elif base == SDO_REQUEST_BASE and self._port.foreign(message):
             self.notices.sdo_request(message, node_id, self._port.timebase.now_ns())
 

@@ -25,8 +25,8 @@ def enabled(axis: AxisLink) -> bool:
 
 
 def obeys(axis: AxisLink) -> bool:
-    """Whether a drive is enabled and follows its target."""
-    return enabled(axis) and bool(axis.statusword & StatusBit.FOLLOWS_COMMAND)
+    """Whether a drive is enabled, has shown its mode and follows its target."""
+    return enabled(axis) and axis.in_mode and axis.statusword & axis.follows == axis.follows
 
 
 @final
@@ -67,7 +67,8 @@ class EnableWatch:
             raise PlantFault(
                 "command ignored",
                 f"{_who(axis)} does not follow its target on enabling: "
-                f"{describe_statusword(axis.statusword)}",
+                f"{describe_statusword(axis.statusword)}; look at its software limits (607Dh), or "
+                "give follows_bit = false in [node.quirks] if it never shows bit 12 of 6041h",
             )
 
     def _check_together(self) -> None:
@@ -85,8 +86,8 @@ class EnableWatch:
 
 
 def _ignores(axis: AxisLink) -> bool:
-    """Whether a drive is enabled but does not follow its target."""
-    return enabled(axis) and not obeys(axis)
+    """Whether a drive is enabled and in its mode, but does not follow its target."""
+    return enabled(axis) and axis.in_mode and not obeys(axis)
 
 
 def _who(axis: AxisLink) -> str:

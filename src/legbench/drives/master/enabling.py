@@ -38,7 +38,7 @@ def enable(
         )
     sample = motion.sample(ticks.last)
     motion.check(sample)
-    guard.check_start(sample.motor_pos)
+    guard.check_start(motion.led_pos)
     up.enable(ticks.watched)
     motion.begin()
     parts.status.state = LinkState.RUNNING

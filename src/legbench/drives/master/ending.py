@@ -37,7 +37,7 @@ class Ending:
             if parts.read_only or (not status.leads and self._led_by_another(shield)):
                 status.state = LinkState.STOPPED
             else:
-                status.note(StopLadder(parts.cycle, shield.hold).run())
+                status.note(StopLadder(parts.cycle, shield.hold, parts.config.cycles_in).run())
 
     def close(self) -> None:
         """Stop, park the drives, release the channel, as `Link.close` describes it."""

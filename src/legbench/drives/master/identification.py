@@ -16,7 +16,9 @@ U32 = DataType.UNSIGNED32
 
 def read_identity(sdo: SdoPort) -> Identity:
     """Read the identity object of a node (1018h); raises as `SdoPort.read` does."""
-    vendor, product, revision, serial = (sdo.get_int(0x1018, sub, U32) for sub in range(1, 5))
+    vendor = sdo.get_int(0x1018, 1, U32)
+    # CiA 301 (7.5.2.19) demands the vendor alone.
+    product, revision, serial = (sdo.find_int(0x1018, sub, U32) for sub in (2, 3, 4))
     return Identity(vendor=vendor, product=product, revision=revision, serial=serial)
 
 
@@ -47,7 +49,9 @@ def identify(
     for node in nodes:
         _compare(node, found, bus)
     for node in nodes:
-        if not sdo_of(node).get_int(0x6502, 0, U32) & CSP_BIT:
+        modes = sdo_of(node).find_int(0x6502, 0, U32)
+        # A drive that does not tell its modes is asked for this one, and has to show it (6061h).
+        if modes is not None and not modes & CSP_BIT:
             raise DriveError(
                 f"node {node.node_id} ('{node.name}') knows no cyclic synchronous position mode"
             )
@@ -59,6 +63,11 @@ def _compare(node: NodeConfig, found: Mapping[int, Identity], bus: BusConfig) ->
         value, real = getattr(wanted, name), getattr(there, name)
         if value is None or value == real:
             continue
+        if real is None:
+            raise DriveError(
+                f"node {node.node_id} ('{node.name}') does not tell its {name} (1018h), expected "
+                f"is {value:#x}; leave {name} out of the bus file if this is the right drive"
+            )
         hint = "correct the bus file if this is the right drive"
         for other in bus.nodes:
             at = found.get(other.node_id)

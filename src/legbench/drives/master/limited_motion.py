@@ -6,21 +6,32 @@ from typing import final
 from legbench.drives.master.cycle import Cycle
 from legbench.drives.master.sample import Sample, sample_of
 from legbench.drives.master.tick import Tick
+from legbench.drives.setup.config import BusConfig
 from legbench.limits.guard import Guard
+from legbench.limits.safety import SafetyLimits
 
 
 @final
 class LimitedMotion:
     """Motion of all drives of a link, held within the limits of its guard."""
 
-    def __init__(self, cycle: Cycle, guard: Guard, stiffness: Sequence[float]) -> None:
+    def __init__(
+        self,
+        cycle: Cycle,
+        guard: Guard,
+        stiffness: Sequence[float],
+        *,
+        two_encoders: bool = True,
+    ) -> None:
         """Prepare to measure and command the drives of a cycle.
 
         Args:
             cycle: cycle of the drives.
             guard: limits of their motion and of their commands.
             stiffness: stiffness of the series springs, one a drive [N m/rad].
+            two_encoders: every drive has an encoder on both sides of its spring.
         """
+        self._two_encoders = two_encoders
         self._cycle, self._guard = cycle, guard
         self._stiffness = tuple(float(value) for value in stiffness)
         self._expected: list[tuple[float, ...]] = []
@@ -33,7 +44,18 @@ class LimitedMotion:
 
     def sample(self, tick: Tick) -> Sample:
         """Measurements of all drives after a tick."""
-        return sample_of(self._cycle, tick, self._stiffness, self._guard.applied)
+        return sample_of(
+            self._cycle,
+            tick,
+            self._stiffness,
+            self._guard.applied,
+            two_encoders=self._two_encoders,
+        )
+
+    @property
+    def led_pos(self) -> tuple[float, ...]:
+        """Positions of the encoders that the drives' loops are closed over [rad]."""
+        return tuple(axis.motor_pos for axis in self._cycle.axes)
 
     def check(self, sample: Sample) -> None:
         """Check measurements against the limits; raises PlantFault."""
@@ -45,6 +67,7 @@ class LimitedMotion:
             temperature=sample.temperature,
             fresh=sample.fresh,
             elapsed=1 + sample.skipped,
+            led_pos=None if self._two_encoders else self.led_pos,
         )
 
     def aim(self, motor_pos: Sequence[float]) -> tuple[tuple[float, ...], list[int | None]]:
@@ -60,3 +83,13 @@ class LimitedMotion:
             words.append(axis.machine.controlword)
         self._expected = [self._expected[-1], applied]
         return applied, words
+
+
+def guard_of(config: BusConfig, limits: SafetyLimits) -> Guard:
+    """Make the guard of a bus; limits of what its drives do not tell will not act."""
+    return Guard(
+        limits,
+        config.period,
+        known=[node.knows for node in config.nodes],
+        two_encoders=config.two_encoders,
+    )

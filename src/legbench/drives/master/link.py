@@ -20,7 +20,7 @@ import can
 from legbench.drives.errors import DriveError
 from legbench.drives.master.enabling import enable
 from legbench.drives.master.ending import Ending, StopOnError
-from legbench.drives.master.limited_motion import LimitedMotion
+from legbench.drives.master.limited_motion import LimitedMotion, guard_of
 from legbench.drives.master.link_parts import LinkParts
 from legbench.drives.master.link_state import LinkState
 from legbench.drives.master.move import missed, move
@@ -29,13 +29,13 @@ from legbench.drives.master.port import Listener, Port
 from legbench.drives.master.sample import Sample
 from legbench.drives.master.stop_report import Lead, StopReport
 from legbench.drives.master.ticks import Ticks
-from legbench.drives.setup.config import BusConfig, check_start_speed
-from legbench.drives.setup.wire import check_load
+from legbench.drives.setup.bus_numbers import check_start_speed
+from legbench.drives.setup.config import BusConfig
+from legbench.drives.setup.exchange import check_budget
 from legbench.drives.transport.lock import ChannelLock
 from legbench.drives.transport.open_bus import timebase_of
 from legbench.drives.transport.timebase import Timebase
 from legbench.errors import PlantFault
-from legbench.limits.guard import Guard
 from legbench.limits.safety import SafetyLimits
 from legbench.limits.shortfall import Shortfall
 
@@ -76,7 +76,7 @@ class Link(Lead):
         Raises:
             ConfigError: the bus cannot carry the schedule.
         """
-        check_load(config)
+        check_budget(config)
         self._port = Port(bus, timebase or timebase_of(bus), listener)
         parts = LinkParts.wired(
             self._port,
@@ -91,8 +91,10 @@ class Link(Lead):
         self._opening, self._ending = Opening(parts), Ending(parts)
         self._stop_on_error = StopOnError(self._ending)
         self._ticks = Ticks(parts)
-        self._guard = Guard(parts.limits, config.period)
-        self._motion = LimitedMotion(parts.cycle, self._guard, stiffness)
+        self._guard = guard_of(config, parts.limits)
+        self._motion = LimitedMotion(
+            parts.cycle, self._guard, stiffness, two_encoders=config.two_encoders
+        )
 
     # --- what has become of it ---------------------------------------------------------------
 
@@ -120,6 +122,16 @@ class Link(Lead):
     def listening(self) -> bool:
         """Whether this link is read-only and another master sends SYNC: this one sends nothing."""
         return self._status.listening
+
+    @property
+    def unprotected(self) -> tuple[str, ...]:
+        """What the drives lack or hold otherwise, a line each, once it is open."""
+        return self._status.unprotected
+
+    @property
+    def led_pos(self) -> tuple[float, ...]:
+        """Positions of the encoders that the drives' loops are closed over [rad]."""
+        return self._motion.led_pos
 
     @property
     def skipped_total(self) -> int:

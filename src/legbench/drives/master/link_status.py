@@ -26,6 +26,9 @@ class LinkStatus:
     leads: bool = False
     """Whether this link has begun to give the drives power, so that no one else may stop them."""
 
+    unprotected: tuple[str, ...] = ()
+    """What the drives lack or hold otherwise, a line each, once the link is open."""
+
     def note(self, report: StopReport) -> None:
         """Keep the report of a stop, joined with what an earlier stop had to tell."""
         self.stopped = report.after(self.stopped)

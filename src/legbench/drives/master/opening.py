@@ -13,6 +13,7 @@ from legbench.drives.master.preparation import (
 )
 from legbench.drives.master.read_only import may_pace, may_read
 from legbench.drives.setup.master_watch import check_master_watch
+from legbench.drives.setup.taken import Outcomes, tells_heartbeat, unprotected
 
 LISTEN_NS = 100_000_000
 """Time that a read-only link listens for another master's SYNC and for heartbeats [ns]."""
@@ -45,8 +46,8 @@ class Opening:
         Raises:
             ConfigError: a drive would go on for too long without its master.
             BusError: the channel has a master, or the interface does not work.
-            DriveError: a drive is missing, is another one, or refuses its configuration; or, in
-                read-only, is not configured.
+            DriveError: a drive is missing, is another one, refuses what is required of it, or would
+                not be protected; or, in read-only, is not configured.
             PlantFault: in read-only, somebody else is about to lead the drives.
         """
         parts = self._parts
@@ -58,7 +59,8 @@ class Opening:
             else:
                 check_master_watch(parts.config, speed=parts.limits.command_speed)
                 parts.channel.take()
-                prepare_to_move(parts.bring_up, parts.config)
+                speed = parts.limits.command_speed
+                self._took(prepare_to_move(parts.bring_up, parts.config, speed=speed))
             read_temperatures(parts.bring_up, parts.cycle, parts.config)
         except BaseException:
             parts.channel.release()
@@ -66,6 +68,13 @@ class Opening:
         parts.status.state = LinkState.CONFIGURED
         if self._waiting is not None:
             parts.port.listener = self._waiting
+
+    def _took(self, outcomes: Outcomes) -> None:
+        """Keep what drives lack, and watch for no heartbeat that a drive does not produce."""
+        parts = self._parts
+        parts.status.unprotected = unprotected(outcomes)
+        for node, watch in zip(parts.config.nodes, parts.cycle.watches, strict=True):
+            watch.expects_heartbeat = tells_heartbeat(outcomes[node.name])
 
     def _prepare_to_look(self) -> None:
         """Prepare a read-only link: listen to another master's SYNC, or send SYNC if there is none.
@@ -86,7 +95,7 @@ class Opening:
             parts.bring_up.listen()
         parts.bring_up.identify()
         check_homed(parts.bring_up, parts.config.nodes)
-        parts.bring_up.refuse_differences()
+        self._took(parts.bring_up.refuse_differences())
         if listening:
             return
         refuse_led(parts.bring_up, parts.cycle, parts.config)

@@ -1,14 +1,22 @@
 """The frames that a master sends after the process data of a cycle: commands, heartbeat, polls."""
 
 from collections.abc import Callable, Sequence
-from typing import final
+from typing import Protocol, final
 
 from legbench.drives.errors import BusError
 from legbench.drives.master.axis_link import AxisLink
 from legbench.drives.master.port import Port
-from legbench.drives.master.temperature import TemperaturePoll
+from legbench.drives.protocol.frame import Frame
 from legbench.drives.protocol.nmt import NmtState, heartbeat_frame
 from legbench.drives.setup.config import BusConfig
+
+
+class Poll(Protocol):
+    """A request that is due in some cycles."""
+
+    def due(self, cycle: int) -> Frame | None:
+        """Request of this cycle, none if none is due."""
+        ...
 
 
 @final
@@ -20,7 +28,7 @@ class Outgoing:
         port: Port,
         config: BusConfig,
         axes: Sequence[AxisLink],
-        polls: Sequence[TemperaturePoll],
+        polls: Sequence[Poll],
         failed: Callable[[BusError], None],
     ) -> None:
         """Prepare the frames; nothing is sent.
@@ -29,7 +37,7 @@ class Outgoing:
             port: port of the bus.
             config: drives on the bus.
             axes: the drives.
-            polls: requests of their temperatures, in the same order.
+            polls: requests that are sent beside the commands, now and then.
             failed: called with the error of a frame that could not be sent.
         """
         self._port, self._axes, self._polls, self._failed = port, axes, polls, failed

@@ -41,9 +41,8 @@ def is_parked(node: NodeConfig, parameter: Parameter, there: int) -> bool:
         parameter: object and value of the configuration.
         there: value that the drive holds.
     """
-    return any(
-        (parameter.key, there) == (rest.key, rest.value) and there == parameter.value | COB_INVALID
-        for rest in parked(node)
+    return there == parameter.value | COB_INVALID and any(
+        parameter.key == rest.key for rest in parked(node)
     )
 
 
@@ -77,7 +76,7 @@ def park(
             for rest in parked(node):
                 sdo.put(rest.index, rest.sub, rest.kind, rest.value)
                 there = sdo.get_int(rest.index, rest.sub, rest.kind)
-                if there != rest.value:
+                if not there & COB_INVALID:
                     failed.append(
                         f"{who} keeps its commands switched on: {rest.index:04X}h:01 is "
                         f"{there:08X}h"

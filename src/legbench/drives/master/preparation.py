@@ -7,14 +7,27 @@ from legbench.drives.master.bring_up import BringUp
 from legbench.drives.master.cycle import Cycle
 from legbench.drives.protocol.nmt import NmtState
 from legbench.drives.setup.config import BusConfig, NodeConfig
+from legbench.drives.setup.outcome import Outcome
+from legbench.drives.setup.taken import check_taken
 
 
-def prepare_to_move(bring_up: BringUp, config: BusConfig) -> None:
+def prepare_to_move(
+    bring_up: BringUp, config: BusConfig, *, speed: float
+) -> dict[str, tuple[Outcome, ...]]:
     """Take the power from all drives, configure them, and set each target to its motor position.
+
+    Args:
+        bring_up: access to the drives.
+        config: the bus.
+        speed: highest speed of the motors [rad/s].
+
+    Returns:
+        What became of every object of each drive's configuration, by the name of its node.
 
     Raises:
         BusError: nobody can be talked to.
-        DriveError: a drive is missing, is another one, is not homed, or refuses its configuration.
+        DriveError: a drive is missing, is another one, is not homed, refuses what is required, or
+            is not protected by what it took.
         PlantFault: somebody else leads the drives.
     """
     bring_up.listen()
@@ -23,10 +36,12 @@ def prepare_to_move(bring_up: BringUp, config: BusConfig) -> None:
     bring_up.unpower()
     bring_up.glance()
     bring_up.pre_operational()
+    outcomes = {node.name: bring_up.configure(node) for node in config.nodes}
+    check_taken(config, outcomes, speed=speed)
     for node in config.nodes:
-        bring_up.configure(node)
         bring_up.check_soft_limits(node)
         bring_up.preload(node)
+    return outcomes
 
 
 def is_homed(bring_up: BringUp, node: NodeConfig) -> bool | None:

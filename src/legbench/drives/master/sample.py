@@ -5,6 +5,7 @@ from operator import attrgetter
 from typing import NamedTuple
 
 from legbench.drives.master.cycle import Cycle
+from legbench.drives.master.joint import joint_of
 from legbench.drives.master.tick import Tick
 
 _MOTOR, _LINK = attrgetter("motor_pos"), attrgetter("link_pos")
@@ -24,11 +25,12 @@ class Sample(NamedTuple):
     skipped: int
     """Number of ticks without SYNC just before this one."""
     motor_pos: tuple[float, ...]
-    """Positions of the motors [rad]."""
+    """Positions of the motors; not a number where not known [rad]."""
     link_pos: tuple[float, ...]
-    """Positions of the links [rad]."""
+    """Positions of the links; not a number where not known [rad]."""
     spring_torque: tuple[float, ...]
-    """Torques of the series springs on the links, from the encoders' difference [N m]."""
+    """Torques of the series springs on the links, from the encoders' difference, else from the
+    drive's torque; not a number where not known [N m]."""
     applied_pos: tuple[float, ...]
     """Command as it was last let through; empty before the drives are enabled [rad]."""
     statusword: tuple[int, ...]
@@ -39,18 +41,36 @@ class Sample(NamedTuple):
 
 
 def sample_of(
-    cycle: Cycle, tick: Tick, stiffness: Sequence[float], applied_pos: tuple[float, ...]
+    cycle: Cycle,
+    tick: Tick,
+    stiffness: Sequence[float],
+    applied_pos: tuple[float, ...],
+    *,
+    two_encoders: bool = True,
 ) -> Sample:
-    """The state of a cycle after a tick; stiffness of the series springs [N m/rad]."""
+    """The state of a cycle after a tick.
+
+    Args:
+        cycle: cycle of the drives.
+        tick: its last tick.
+        stiffness: of the series springs [N m/rad].
+        applied_pos: command as it was last let through [rad].
+        two_encoders: every drive has an encoder on both sides of its spring.
+    """
     axes = cycle.axes
-    motor, links = tuple(map(_MOTOR, axes)), tuple(map(_LINK, axes))
+    if two_encoders:
+        motor, links = tuple(map(_MOTOR, axes)), tuple(map(_LINK, axes))
+        torque = tuple([k * (a - b) for k, a, b in zip(stiffness, motor, links, strict=True)])
+    else:
+        joints = [joint_of(axis, k) for axis, k in zip(axes, stiffness, strict=True)]
+        motor, links, torque = zip(*joints, strict=True)
     return Sample(
         tick.time_ns,
         tick.late_ns,
         tick.skipped,
         motor,
         links,
-        tuple([k * (a - b) for k, a, b in zip(stiffness, motor, links, strict=True)]),
+        torque,
         applied_pos,
         tuple(map(_STATUSWORD, axes)),
         tuple(map(_FRESH, axes)),

@@ -1,17 +1,19 @@
 """Objects of one drive over a port: blocking, with time-outs and retries; not for the cycle."""
 
 from collections.abc import Callable
-from typing import final
+from typing import TypeVar, final
 
 import can
 
 from legbench.drives.errors import CodecError, DriveError, NoAnswerError, SdoAbortError
 from legbench.drives.master.port import Port
-from legbench.drives.protocol.datatypes import DataType, Value, pack, unpack
+from legbench.drives.protocol.datatypes import DataType, Value, pack
 from legbench.drives.protocol.frame import SDO_REPLY_BASE, SDO_REQUEST_BASE
 from legbench.drives.protocol.objects import name_of
 from legbench.drives.protocol.sdo import Abort, abort_data
 from legbench.drives.protocol.sdo_client import Download, Progress, Upload
+
+Carried = TypeVar("Carried", Upload, Download)
 
 
 def _ignore(_message: can.Message) -> None:
@@ -49,8 +51,7 @@ class SdoPort:
             NoAnswerError: it does not answer.
             BusError: the bus does not work.
         """
-        transfer = self._transfer(lambda: Upload(index, sub), index, sub)
-        return transfer.result if isinstance(transfer, Upload) else b""
+        return self._upload(index, sub).result
 
     def write(self, index: int, sub: int, content: bytes) -> None:
         """Write the bytes of an object; raises as `read` does."""
@@ -58,9 +59,9 @@ class SdoPort:
 
     def get(self, index: int, sub: int, kind: DataType) -> Value:
         """Value of an object; raises as `read` does, and DriveError for another type."""
-        content = self.read(index, sub)
+        transfer = self._upload(index, sub)
         try:
-            return unpack(kind, content)
+            return transfer.value(kind)
         except CodecError as error:
             raise DriveError(f"node {self.node_id}, {name_of(index, sub)}: {error}") from None
 
@@ -71,13 +72,34 @@ class SdoPort:
             raise DriveError(f"node {self.node_id}, {name_of(index, sub)} is no number")
         return value
 
+    def get_number(self, index: int, sub: int, kind: DataType) -> float:
+        """Value of an object that is a number of any kind; raises as `get` does."""
+        value = self.get(index, sub, kind)
+        if not isinstance(value, int | float):
+            raise DriveError(f"node {self.node_id}, {name_of(index, sub)} is no number")
+        return value
+
+    def find_int(self, index: int, sub: int, kind: DataType) -> int | None:
+        """Value of a numeric object that a drive may do without; none where it cannot be read.
+
+        Raises:
+            NoAnswerError: the drive does not answer.
+            BusError: the bus does not work.
+            DriveError: the object has another type.
+        """
+        try:
+            return self.get_int(index, sub, kind)
+        except SdoAbortError:
+            return None
+
     def put(self, index: int, sub: int, kind: DataType, value: int) -> None:
         """Write the value of an object; raises as `read` does."""
         self.write(index, sub, pack(kind, value))
 
-    def _transfer(
-        self, begin: Callable[[], Upload | Download], index: int, sub: int
-    ) -> Upload | Download:
+    def _upload(self, index: int, sub: int) -> Upload:
+        return self._transfer(lambda: Upload(index, sub), index, sub)
+
+    def _transfer(self, begin: Callable[[], Carried], index: int, sub: int) -> Carried:
         for _ in range(self._retries):
             transfer = begin()
             try:

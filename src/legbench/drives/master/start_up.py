@@ -6,7 +6,7 @@ from typing import final
 from legbench.drives.errors import DriveError
 from legbench.drives.master.axis_link import AxisLink
 from legbench.drives.master.cycle import Cycle
-from legbench.drives.master.enable_watch import EnableWatch, obeys
+from legbench.drives.master.enable_watch import EnableWatch, enabled, obeys
 from legbench.drives.master.port import Port
 from legbench.drives.master.tick import Tick
 from legbench.drives.protocol.cia402 import (
@@ -19,10 +19,10 @@ from legbench.drives.protocol.cia402 import (
 from legbench.drives.protocol.nmt import NmtCommand, nmt_frame
 from legbench.drives.setup.config import BusConfig
 
-SETTLE_PATIENCE = 2000
-"""Number of cycles within which process data has to become regular."""
-ENABLE_PATIENCE = 2000
-"""Number of cycles within which all drives have to be enabled."""
+SETTLE_PATIENCE_MS = 2000
+"""Time within which process data has to become regular [ms]."""
+ENABLE_PATIENCE_MS = 2000
+"""Time within which all drives have to be enabled [ms]."""
 
 
 @final
@@ -42,7 +42,7 @@ class StartUp:
                 self._port.send_frame(nmt_frame(NmtCommand.START, node.node_id))
         self._cycle.begin()
         regular = 0
-        for _ in range(SETTLE_PATIENCE):
+        for _ in range(self._config.cycles_in(SETTLE_PATIENCE_MS)):
             last = tick()
             regular = regular + 1 if last.complete else 0
             self.idle()
@@ -51,7 +51,7 @@ class StartUp:
                 return last
         missing = [axis.node.name for axis in self._cycle.axes if not axis.fresh]
         raise DriveError(
-            f"no regular process data within {SETTLE_PATIENCE} cycles; missing: "
+            f"no regular process data within {SETTLE_PATIENCE_MS} ms; missing: "
             f"{', '.join(missing) or 'now and then'}; look at the bus load and the mapping"
         )
 
@@ -142,7 +142,7 @@ class StartUp:
     ) -> Tick:
         """Run cycles until drives have reached their goal; the last cycle is not ended."""
         refused: list[AxisLink] = []
-        for _ in range(ENABLE_PATIENCE):
+        for _ in range(self._config.cycles_in(_patience_ms(axes))):
             last = tick()
             if reached():
                 return last
@@ -154,8 +154,24 @@ class StartUp:
         slow = (refused or behind or list(axes))[0]
         raise DriveError(
             f"drive '{slow.node.name}' (node {slow.node.node_id}) does not {words}: "
-            f"{describe_statusword(slow.statusword)}"
+            f"{describe_statusword(slow.statusword)}{_why_not(slow)}"
         )
+
+
+def _patience_ms(axes: Sequence[AxisLink]) -> int:
+    """Time within which drives have to reach a goal, that of showing their mode included [ms]."""
+    waits = [axis.node.quirks.mode_patience_ms for axis in axes if not axis.in_mode]
+    return ENABLE_PATIENCE_MS + max(waits, default=0)
+
+
+def _why_not(axis: AxisLink) -> str:
+    """What else is missing of an enabled drive: it has not shown its mode."""
+    if axis.in_mode or not enabled(axis):
+        return ""
+    return (
+        f"; mode 8 is not shown in 6061h within {axis.node.quirks.mode_patience_ms} ms: raise "
+        "mode_patience_ms in [node.quirks]"
+    )
 
 
 def _switched_on(axis: AxisLink) -> bool:

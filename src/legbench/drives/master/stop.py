@@ -8,15 +8,15 @@ from legbench.drives.master.cycle import Cycle
 from legbench.drives.master.stop_report import StopReport
 from legbench.drives.protocol.cia402 import POWERED, Goal, decode_state, describe_statusword
 
-RAMP_CYCLES = 40
-"""Longest wait for a quick-stop ramp [cycles]. A drive that still has power then loses its
-voltage, and obeys two cycles later: at 1 kHz every drive is without power after 50 ms."""
-OFF_CYCLES = 100
-"""Longest wait until drives whose voltage is disabled show no power [cycles]."""
+RAMP_MS = 40
+"""Longest wait for a quick-stop ramp [ms]. A drive that still has power then loses its voltage,
+and obeys two cycles later: every drive is without power after 50 ms."""
+OFF_MS = 100
+"""Longest wait until drives whose voltage is disabled show no power [ms]."""
 SURE_CYCLES = 3
 """Number of cycles in a row that all drives must show no power to count as stopped."""
-SILENT_CYCLES = 20
-"""Number of cycles in a row without process data beyond which a drive counts as silent."""
+SILENT_MS = 20
+"""Time without process data beyond which a drive counts as silent [ms]."""
 FAILED_CYCLES = 3
 """Number of failed cycles in a row that end a wait, as no time passes in them."""
 
@@ -28,14 +28,22 @@ class StopLadder:
     Whatever a step raises, a KeyboardInterrupt out of a driver included, the next step is taken.
     """
 
-    def __init__(self, cycle: Cycle, hold: Callable[[BaseException], None]) -> None:
+    def __init__(
+        self,
+        cycle: Cycle,
+        hold: Callable[[BaseException], None],
+        cycles_in: Callable[[float], int] = round,
+    ) -> None:
         """Prepare to stop the drives of a cycle.
 
         Args:
             cycle: cycle of the drives, which this stop alone leads from now on.
             hold: called with what was raised, such as `Shield.hold`.
+            cycles_in: number of cycles in a time [ms], see `BusConfig.cycles_in`; by default of
+                1 ms each.
         """
         self._cycle, self._hold = cycle, hold
+        self._ramp, self._off_wait, self._silence = map(cycles_in, (RAMP_MS, OFF_MS, SILENT_MS))
         self._cut_off: list[str] = []
         self._errors: dict[str, None] = {}
         self._quiet = dict.fromkeys(cycle.axes, 0)
@@ -49,7 +57,7 @@ class StopLadder:
             axis.hold()
             axis.machine.seek(Goal.QUICK_STOP)
         self._send()
-        for _ in range(RAMP_CYCLES):
+        for _ in range(self._ramp):
             self._tick()
             if all(map(self._standing, cycle.axes)) or self._failed == FAILED_CYCLES:
                 break
@@ -64,7 +72,7 @@ class StopLadder:
     def _lead_to_rest(self) -> None:
         """Disable the voltage until every drive has shown for a while that it has no power."""
         sure, self._failed = 0, 0
-        for _ in range(OFF_CYCLES):
+        for _ in range(self._off_wait):
             self._send()
             self._tick()
             sure = sure + 1 if all(map(self._standing, self._cycle.axes)) else 0
@@ -105,7 +113,7 @@ class StopLadder:
         return axis.fresh and decode_state(axis.statusword) not in POWERED
 
     def _silent(self, axis: AxisLink) -> bool:
-        return self._quiet[axis] > SILENT_CYCLES or (self._cycle.bus_off and not axis.fresh)
+        return self._quiet[axis] > self._silence or (self._cycle.bus_off and not axis.fresh)
 
     def _report(self) -> StopReport:
         left = [axis for axis in self._cycle.axes if not self._off(axis)]

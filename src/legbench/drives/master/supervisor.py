@@ -5,13 +5,12 @@ from typing import final
 
 from legbench.drives.master.cycle import Cycle
 from legbench.drives.master.tick import Tick
-from legbench.drives.protocol.cia402 import StatusBit, Way, describe_statusword
+from legbench.drives.protocol.cia402 import Way, describe_statusword
 from legbench.drives.setup.config import BusConfig
 from legbench.drives.transport.timebase import Timebase
 from legbench.errors import PlantFault
 from legbench.limits.safety import OVERRUNS, SafetyLimits
 
-FOLLOWS = int(StatusBit.FOLLOWS_COMMAND)
 MISSING_TEMPERATURES = 3
 """Number of unanswered temperature requests in a row that end a run with such a limit."""
 
@@ -101,7 +100,7 @@ class Supervisor:
                     f"drive '{axis.node.name}' (node {axis.node.node_id}) left operation enabled: "
                     f"{describe_statusword(axis.statusword)}",
                 )
-            ignored = ignored or not axis.statusword & FOLLOWS
+            ignored = ignored or axis.statusword & axis.follows != axis.follows
         self._ignored = self._ignored + 1 if ignored else 0
         if self._ignored > self._limits.following_cycles:
             words = "; ".join(describe_statusword(axis.statusword) for axis in self._cycle.axes)

@@ -2,7 +2,7 @@
 
 from typing import final
 
-from legbench.drives.protocol.emcy import Emergency, decode_emcy
+from legbench.drives.protocol.emcy import MEANINGS, Emergency, decode_emcy
 from legbench.drives.protocol.nmt import HeartbeatWatch, NmtState, decode_heartbeat
 from legbench.drives.setup.config import BusConfig, NodeConfig
 
@@ -16,12 +16,13 @@ class NodeWatch:
 
     Attributes:
         state: its NMT state, as last heard.
-        emergency: the first one since `arm`.
+        emergency: the first one since `arm` that is no warning.
         history: every emergency ever heard, the all-clear included.
         missed: cycles without process data since two in a row had theirs: every second answer is
             no answer, and may be an old one.
         lost_total: all cycles without process data.
         bad_total: process data of a wrong length.
+        expects_heartbeat: whether the drive produces one (1017h), which then must come.
     """
 
     def __init__(self, bus: BusConfig, node: NodeConfig, now_ns: int) -> None:
@@ -33,6 +34,7 @@ class NodeWatch:
         self.missed = 0
         self.lost_total = 0
         self.bad_total = 0
+        self.expects_heartbeat = True
         self._rebooted = False
         self._well = True
 
@@ -59,7 +61,8 @@ class NodeWatch:
         if emergency is None:
             return
         self.history.append(emergency)
-        if emergency.code != 0 and self.emergency is None:
+        warns = emergency.code in self._node.quirks.warnings
+        if emergency.code != 0 and not warns and self.emergency is None:
             self.emergency = emergency
 
     def cycle(self, *, complete: bool) -> None:
@@ -73,11 +76,18 @@ class NodeWatch:
             self.missed += 1
             self.lost_total += 1
 
+    def _way(self) -> str:
+        """How to go on after an emergency that only the maker of the drive can explain."""
+        if self.emergency is None or self.emergency.code in MEANINGS:
+            return ""
+        code = f"0x{self.emergency.code:04X}"
+        return f"; if its manual calls it a warning, give warnings = [{code}] in [node.quirks]"
+
     def trouble(self, now_ns: int, lost_frames: int) -> tuple[str, str] | None:
         """Cause and message of what is wrong with the drive; none if nothing is."""
         who = self._who
         if self.emergency is not None:
-            return "drive emergency", f"{who}: {self.emergency}"
+            return "drive emergency", f"{who}: {self.emergency}{self._way()}"
         if self._rebooted:
             return "drive reset", f"{who} has started again; its configuration is gone"
         if self.missed >= lost_frames:
@@ -85,7 +95,7 @@ class NodeWatch:
                 "process data lost",
                 f"{who} sent no process data for {self.missed} cycles, the limit is {lost_frames}",
             )
-        if self._beat.lost(now_ns):
+        if self.expects_heartbeat and self._beat.lost(now_ns):
             late_ms = (now_ns - self._beat.last_ns) / 1e6
             return "heartbeat lost", f"{who}: no heartbeat for {late_ms:.0f} ms"
         state = self.state

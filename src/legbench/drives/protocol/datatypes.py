@@ -5,7 +5,7 @@ from enum import IntEnum
 
 from legbench.drives.errors import CodecError
 
-Value = int | str | bytes
+Value = int | float | str | bytes
 
 
 class DataType(IntEnum):
@@ -18,6 +18,7 @@ class DataType(IntEnum):
     UNSIGNED8 = 0x05
     UNSIGNED16 = 0x06
     UNSIGNED32 = 0x07
+    REAL32 = 0x08
     VISIBLE_STRING = 0x09
     OCTET_STRING = 0x0A
     INTEGER64 = 0x15
@@ -35,8 +36,10 @@ FORMATS = {
     DataType.INTEGER64: "q",
     DataType.UNSIGNED64: "Q",
 }
-"""`struct` code of every numeric type."""
-_STRUCTS = {kind: struct.Struct("<" + code) for kind, code in FORMATS.items()}
+"""`struct` code of every whole number's type."""
+_STRUCTS = {
+    kind: struct.Struct("<" + code) for kind, code in {**FORMATS, DataType.REAL32: "f"}.items()
+}
 SHORT_NAMES = {
     "bool": DataType.BOOLEAN,
     "i8": DataType.INTEGER8,
@@ -45,6 +48,7 @@ SHORT_NAMES = {
     "u8": DataType.UNSIGNED8,
     "u16": DataType.UNSIGNED16,
     "u32": DataType.UNSIGNED32,
+    "f32": DataType.REAL32,
     "i64": DataType.INTEGER64,
     "u64": DataType.UNSIGNED64,
     "str": DataType.VISIBLE_STRING,
@@ -60,7 +64,7 @@ def size_of(kind: DataType) -> int | None:
 
 
 def range_of(kind: DataType) -> tuple[int, int]:
-    """Lowest and highest value of a numeric type."""
+    """Lowest and highest value of a whole number's type."""
     if kind is DataType.BOOLEAN:
         return (0, 1)
     bits = 8 * _STRUCTS[kind].size
@@ -81,7 +85,9 @@ def pack(kind: DataType, value: Value) -> bytes:
     elif isinstance(value, str):
         if kind is DataType.VISIBLE_STRING and value.isascii():
             return value.encode("ascii")
-    elif kind in _STRUCTS:
+    elif kind is DataType.REAL32:
+        return _STRUCTS[kind].pack(value)
+    elif kind in FORMATS and isinstance(value, int):
         low, high = range_of(kind)
         if low <= value <= high:
             return _STRUCTS[kind].pack(value)
@@ -100,7 +106,7 @@ def unpack(kind: DataType, data: bytes) -> Value:
         if len(data) != layout.size:
             raise CodecError(f"{len(data)} bytes are no {kind.name}; it has {layout.size}")
         (number,) = layout.unpack(data)
-        return int(number)
+        return float(number) if kind is DataType.REAL32 else int(number)
     if kind is DataType.OCTET_STRING:
         return bytes(data)
     try:

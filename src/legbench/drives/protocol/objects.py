@@ -13,7 +13,9 @@ from legbench.drives.protocol.frame import COB_INVALID, RPDO_BASES, TPDO_BASES
 Key = tuple[int, int]
 """Index and sub-index."""
 PDO_COUNT = 4
-"""Number of RPDOs, and of TPDOs, of a drive."""
+"""Number of RPDOs, and of TPDOs, that the predefined connection set gives identifiers."""
+LAST_PDO = 512
+"""Highest number of an RPDO or a TPDO (CiA 301, 7.5.2.33)."""
 MAX_MAPPED = 8
 LINK_SHORT = 0x2064
 """Link position in 16 bits, manufacturer specific: with 6041h and 6064h it fills one TPDO."""

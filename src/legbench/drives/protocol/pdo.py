@@ -56,12 +56,15 @@ class PdoMap:
     """Objects <-> bytes of one PDO.
 
     Raises:
-        CodecError: more than eight bytes, or nothing at all.
+        CodecError: more than eight bytes, nothing at all, or an object that is no whole number.
     """
 
     def __init__(self, entries: Sequence[Mapped]) -> None:
         self.entries = tuple(entries)
         self.keys = tuple(entry.key for entry in self.entries)
+        reals = [str(entry) for entry in self.entries if entry.kind not in FORMATS]
+        if reals:
+            raise CodecError(f"{reals[0]} is no whole number; map another object")
         self._layout = struct.Struct("<" + "".join(FORMATS[entry.kind] for entry in self.entries))
         self._ranges = tuple(range_of(entry.kind) for entry in self.entries)
         self.size = self._layout.size

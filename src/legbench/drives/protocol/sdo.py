@@ -47,6 +47,10 @@ class Abort(IntEnum):
     NO_DATA = 0x08000024
 
 
+ABSENT = (Abort.NO_OBJECT, Abort.NO_SUB_INDEX, Abort.UNSUPPORTED_ACCESS, Abort.GENERAL)
+"""Codes with which drives refuse objects that they have not; the last two are not the standard's
+way, and may mean something else on an object that is there."""
+
 MEANINGS = {
     Abort.TOGGLE: "toggle bit not alternated",
     Abort.TIMED_OUT: "SDO protocol timed out",

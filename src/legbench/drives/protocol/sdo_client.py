@@ -4,6 +4,7 @@ from enum import Enum
 from typing import final
 
 from legbench.drives.errors import CodecError
+from legbench.drives.protocol.datatypes import DataType, Value, size_of, unpack
 from legbench.drives.protocol.sdo import (
     EXPEDITED,
     FRAME,
@@ -66,11 +67,32 @@ class Upload(_Transfer):
         self.request = MUX.pack(0x40, index, sub) + bytes(4)
         self._size: int | None = None
         self._got = bytearray()
+        self._sized = True
 
     @property
     def result(self) -> bytes:
-        """The object's bytes."""
+        """The object's bytes, as they came."""
         return bytes(self._got)
+
+    def value(self, kind: DataType) -> Value:
+        """The object's value, from an answer of four bytes or without a size, too.
+
+        Some drives answer for short numbers with all four bytes of the frame. What is beyond the
+        type is left out where no size is told; where one is, it must repeat the sign, or be zero.
+
+        Raises:
+            CodecError: the bytes are none of this type.
+        """
+        content, size = self.result, size_of(kind)
+        if size is None or len(content) != EXPEDITED or size >= EXPEDITED:
+            return unpack(kind, content)
+        value = unpack(kind, content[:size])
+        padding = {bytes(EXPEDITED - size)}
+        if isinstance(value, int) and value < 0:
+            padding.add(b"\xff" * (EXPEDITED - size))
+        if self._sized and content[size:] not in padding:
+            return unpack(kind, content)
+        return value
 
     def feed(self, data: bytes) -> Progress:
         """Take a reply.
@@ -88,7 +110,8 @@ class Upload(_Transfer):
         if specifier >> 5 != 2:
             return Progress.IGNORED
         if specifier & 2:
-            length = EXPEDITED - (specifier >> 2 & 3) if specifier & 1 else EXPEDITED
+            self._sized = bool(specifier & 1)
+            length = EXPEDITED - (specifier >> 2 & 3) if self._sized else EXPEDITED
             self._got += data[4 : 4 + length]
             return Progress.DONE
         if specifier & 1:

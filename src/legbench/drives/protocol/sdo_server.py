@@ -1,6 +1,7 @@
 """The drive's side of SDO transfers, frame by frame."""
 
 from collections.abc import Callable
+from enum import Enum
 from typing import final
 
 from legbench.drives.errors import SdoAbortError
@@ -20,13 +21,28 @@ Reader = Callable[[int, int], bytes]
 Writer = Callable[[int, int, bytes], None]
 """Take the bytes of an object; raises SdoAbortError."""
 
+LEFT_OVER = b"\xa5"
+"""Filler behind objects in answers without a size."""
+
+
+class SdoAnswers(Enum):
+    """Ways in which a drive answers for an object of one to three bytes."""
+
+    SIZED = "sized"
+    """Answers are as long as the object, as the standard says."""
+    FOUR_BYTES = "four bytes"
+    """All answers have four bytes, with zeros behind the object."""
+    UNSIZED = "without size"
+    """No size is told; what follows the object is left over from another answer."""
+
 
 @final
 class SdoServer:
     """Answers one client; a request that makes no sense is aborted and changes nothing."""
 
-    def __init__(self, read: Reader, write: Writer) -> None:
-        self._read, self._write = read, write
+    def __init__(self, read: Reader, write: Writer, answers: SdoAnswers = SdoAnswers.SIZED) -> None:
+        """Answer for the objects behind `read` and `write`; short ones in the way of `answers`."""
+        self._read, self._write, self._answers = read, write, answers
         self._object = (0, 0)
         self._toggle = 0
         self._to_send: memoryview | None = None
@@ -72,10 +88,18 @@ class SdoServer:
         self._begin(data)
         content = self._read(*self._object)
         if 0 < len(content) <= EXPEDITED:
-            specifier = 0x43 | (EXPEDITED - len(content)) << 2
-            return MUX.pack(specifier, *self._object) + content.ljust(EXPEDITED, b"\0")
+            return self._short(content)
         self._to_send = memoryview(content)
         return MUX.pack(0x41, *self._object) + SIZE.pack(len(content))
+
+    def _short(self, content: bytes) -> bytes:
+        """The answer with an object of one to four bytes."""
+        if self._answers is SdoAnswers.SIZED:
+            specifier = 0x43 | (EXPEDITED - len(content)) << 2
+            return MUX.pack(specifier, *self._object) + content.ljust(EXPEDITED, b"\0")
+        if self._answers is SdoAnswers.UNSIZED:
+            return MUX.pack(0x42, *self._object) + content.ljust(EXPEDITED, LEFT_OVER)
+        return MUX.pack(0x43, *self._object) + content.ljust(EXPEDITED, b"\0")
 
     def _upload_segment(self, data: bytes) -> bytes:
         if self._to_send is None:

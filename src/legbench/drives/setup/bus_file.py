@@ -1,42 +1,46 @@
 """Bus and limit files: TOML to dataclasses, every key checked."""
 
 import re
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import MISSING, fields
+from collections.abc import Callable, Mapping
+from dataclasses import fields
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from legbench.drives.errors import CodecError
 from legbench.drives.protocol.datatypes import SHORT_NAMES
 from legbench.drives.protocol.objects import name_of
 from legbench.drives.protocol.pdo import Mapped
-from legbench.drives.setup.config import (
-    NOT_IN_FILES,
-    RPDO,
-    BusConfig,
-    Identity,
-    NodeConfig,
-    Parameter,
-    PdoConfig,
-)
+from legbench.drives.setup.building import Built, at, build, finite
+from legbench.drives.setup.config import BusConfig, Identity, NodeConfig, Parameter
 from legbench.drives.setup.configuration import interpolation_time
+from legbench.drives.setup.encoders import Side
 from legbench.drives.setup.homed import HomedCondition
+from legbench.drives.setup.pdos import (
+    CONTROLWORD,
+    LINK_POSITION_SHORT,
+    POSITION_ACTUAL,
+    RPDO,
+    STATUSWORD,
+    TARGET_POSITION,
+    PdoConfig,
+    packed,
+)
+from legbench.drives.setup.quirks import ModeShown, Quirks
 from legbench.drives.setup.units import AxisUnits
 from legbench.errors import ConfigError
 from legbench.limits.safety import SafetyLimits
 from legbench.reading import UnreadableError, read_toml
 
-Built = TypeVar("Built")
 _OBJECT = re.compile(r"([0-9A-Fa-f]{4}):([0-9A-Fa-f]{2}) ([a-z]+[0-9]*)")
 _IDENTITY = tuple(field.name for field in fields(Identity))
-_PLAIN_TYPES: dict[str, tuple[type, ...]] = {
-    "str": (str,),
-    "float": (int, float),
-    "bool": (bool,),
-}
-LARGEST = 1e18
-"""Bound that the magnitude of every number of a file stays below."""
+OBJECT_KEYS = (
+    "motor_object",
+    "target_object",
+    "link_object",
+    "torque_object",
+    "temperature_object",
+)
+"""Keys of a node that name an object."""
 AXES = 2
 """Axes of a leg, and so pairs of a range."""
 
@@ -47,7 +51,7 @@ def load_bus(path: Path) -> BusConfig:
     Raises:
         ConfigError: it is missing, no TOML, or describes no bus; the message starts with the path.
     """
-    return _load(path, bus_from_mapping)
+    return _load(path, lambda content: bus_from_mapping(content, path.parent))
 
 
 def load_limits(path: Path) -> SafetyLimits:
@@ -59,9 +63,9 @@ def load_limits(path: Path) -> SafetyLimits:
     return _load(path, limits_from_mapping)
 
 
-def _load(path: Path, build: Callable[[Mapping[str, Any]], Built]) -> Built:
+def _load(path: Path, make: Callable[[Mapping[str, Any]], Built]) -> Built:
     try:
-        return build(read_toml(path))
+        return make(read_toml(path))
     except FileNotFoundError:
         raise ConfigError(f"{path}: no such file; hardware/ holds the bench's") from None
     except (ConfigError, UnreadableError) as error:
@@ -85,29 +89,23 @@ def limits_from_mapping(content: Mapping[str, Any]) -> SafetyLimits:
             given[name] = _range(name, given[name])
     _waive(given)
     done = ("motor_range", "joint_range", "motor_knee_range", "joint_knee_range", "waive")
-    return _build(SafetyLimits, "limits", given, converted=done)
+    return build(SafetyLimits, "limits", given, converted=done)
 
 
-def bus_from_mapping(content: Mapping[str, Any]) -> BusConfig:
-    """A bus from the tables of a file; raises ConfigError."""
+def bus_from_mapping(content: Mapping[str, Any], folder: Path = Path()) -> BusConfig:
+    """A bus from the tables of a file in `folder`; raises ConfigError."""
     given = dict(content)
     tables = _list("node", given.pop("node", []))
-    given["nodes"] = tuple(_node(table, place) for place, table in enumerate(tables, start=1))
+    # A data sheet of the bus is that of every node which names none.
+    usual = {"eds": given.pop("eds")} if "eds" in given else {}
+    given["nodes"] = tuple(
+        _node(usual | _table("node", table), place, folder)
+        for place, table in enumerate(tables, start=1)
+    )
     _waive(given)
-    bus = _build(BusConfig, "bus", given, converted=("nodes", "waive"))
+    bus = build(BusConfig, "bus", given, converted=("nodes", "waive"))
     interpolation_time(bus.period_us)
     return bus
-
-
-@contextmanager
-def _at(where: str) -> Iterator[None]:
-    """Put a place of the file in front of an error that does not begin with it yet."""
-    try:
-        yield
-    except ConfigError as error:
-        if str(error).startswith(where):
-            raise
-        raise ConfigError(f"{where}: {error}") from None
 
 
 def _waive(given: dict[str, Any]) -> None:
@@ -119,33 +117,30 @@ def _waive(given: dict[str, Any]) -> None:
         given["waive"] = tuple(names)
 
 
-def _node(table: object, place: int) -> NodeConfig:
-    given = _table("node", table)
+def _node(given: dict[str, Any], place: int, folder: Path) -> NodeConfig:
     where = f"node '{given['name']}'" if "name" in given else f"node {place} of the file"
-    with _at(where):
-        return _node_of(given, where)
+    with at(where):
+        return _node_of(given, where, folder)
 
 
-def _node_of(given: dict[str, Any], where: str) -> NodeConfig:
+def _node_of(given: dict[str, Any], where: str, folder: Path) -> NodeConfig:
     identity = {key: given.pop(key) for key in _IDENTITY if key in given}
-    given["identity"] = _build(Identity, where, identity)
-    for axis in ("motor", "link"):
-        with _at(f"{where} {axis}"):
-            given[axis] = _build(AxisUnits, f"{where} {axis}", _table(axis, given.get(axis, {})))
+    given["identity"] = build(Identity, where, identity)
+    _encoders(where, given)
+    if "eds" in given:
+        if not isinstance(given["eds"], str):
+            raise ConfigError(f"{where}: eds is {given['eds']!r}; it must be the path of a file")
+        given["eds"] = folder / given["eds"]
     if "id" in given:
         given["node_id"] = given.pop("id")
-    for key in ("link_object", "temperature_object"):
+    for key in OBJECT_KEYS:
         if key in given:
-            with _at(f"{where}: {key}"):
+            with at(f"{where}: {key}"):
                 given[key] = parse_object(given[key])
-    for key, plural in (("rpdo", "rpdos"), ("tpdo", "tpdos")):
-        if key in given:
-            usual = {"deadline_ms": RPDO.deadline_ms} if key == "rpdo" else {}
-            pdos = _list(key, given.pop(key))
-            with _at(f"{where}: {key}"):
-                given[plural] = tuple(_pdo(where, entry, usual) for entry in pdos)
+    given["quirks"] = _quirks(where, given.get("quirks", {}))
+    _pdos(where, given)
     if "homed" in given:
-        with _at(f"{where} homed"):
+        with at(f"{where} homed"):
             given["homed"] = _homed(f"{where} homed", given["homed"])
     if "soft_limits" in given:
         given["soft_limits"] = _range("soft_limits", given["soft_limits"])
@@ -155,22 +150,73 @@ def _node_of(given: dict[str, Any], where: str) -> NodeConfig:
     for key in keys:
         if keys.count(key) > 1:
             raise ConfigError(f"{where} gives parameter {name_of(*key)} twice")
-    done = ("identity", "motor", "link", "link_object", "temperature_object", "rpdos", "tpdos")
-    return _build(NodeConfig, where, given, converted=(*done, "parameters", "soft_limits", "homed"))
+    done = ("identity", "motor", "link", "side", "quirks", "rpdos", "tpdos", "eds", *OBJECT_KEYS)
+    return build(NodeConfig, where, given, converted=(*done, "parameters", "soft_limits", "homed"))
 
 
 def _homed(where: str, table: object) -> HomedCondition:
     given = _table("homed", table)
     if "object" in given:
         given["object"] = parse_object(given["object"])
-    return _build(HomedCondition, where, given, converted=("object",))
+    return build(HomedCondition, where, given, converted=("object",))
+
+
+def _encoders(where: str, given: dict[str, Any]) -> None:
+    """Turn the tables of a drive's encoders into units: [node.motor], [node.link], or both.
+
+    A drive that has the one of the link alone closes its position loop over it.
+    """
+    found = [axis for axis in ("motor", "link") if axis in given]
+    if not found:
+        raise ConfigError(f"{where} has no encoder; describe it in [node.motor], [node.link]")
+    units: dict[str, AxisUnits] = {}
+    for axis in found:
+        with at(f"{where} {axis}"):
+            units[axis] = build(AxisUnits, f"{where} {axis}", _table(axis, given[axis]))
+    given["motor"] = units[found[0]]
+    given["link"] = units["link"] if len(found) == 2 else None
+    given["side"] = Side(found[0])
+
+
+def _quirks(where: str, value: object) -> Quirks:
+    given = _table("quirks", value)
+    codes = _list("warnings", given.get("warnings", []))
+    for code in codes:
+        if isinstance(code, bool) or not isinstance(code, int):
+            raise ConfigError(f"{where} quirks: warnings holds {code!r}; it must be a whole number")
+    given["warnings"] = tuple(codes)
+    shown = given.get("mode_shown", ModeShown.CONFIGURED)
+    if shown not in list(ModeShown):
+        raise ConfigError(
+            f"{where} quirks: mode_shown is {shown!r}; it must be one of {', '.join(ModeShown)}"
+        )
+    given["mode_shown"] = ModeShown(shown)
+    return build(Quirks, f"{where} quirks", given, converted=("warnings", "mode_shown"))
+
+
+def _pdos(where: str, given: dict[str, Any]) -> None:
+    """Turn the tables of the PDOs into process data; what is not given is packed by itself."""
+    for key, plural in (("rpdo", "rpdos"), ("tpdo", "tpdos")):
+        if key in given:
+            usual = {"deadline_ms": RPDO.deadline_ms} if key == "rpdo" else {}
+            pdos = _list(key, given.pop(key))
+            with at(f"{where}: {key}"):
+                given[plural] = tuple(_pdo(where, entry, usual) for entry in pdos)
+    target = given.get("target_object", TARGET_POSITION)
+    given.setdefault("rpdos", packed((CONTROLWORD, target), RPDO.deadline_ms))
+    answers = [STATUSWORD, given.get("motor_object", POSITION_ACTUAL)]
+    if given["link"] is not None:
+        answers.append(given.get("link_object", LINK_POSITION_SHORT))
+    if "torque_object" in given:
+        answers.append(given["torque_object"])
+    given.setdefault("tpdos", packed(answers))
 
 
 def _pdo(where: str, table: object, usual: Mapping[str, int]) -> PdoConfig:
     given = dict(usual) | _table("PDO", table)
     objects = _list("objects", given.get("objects", []))
     given["objects"] = tuple(parse_object(text) for text in objects)
-    return _build(PdoConfig, f"{where} PDO", given, converted=("objects",))
+    return build(PdoConfig, f"{where} PDO", given, converted=("objects",))
 
 
 def _parameter(text: str, value: object) -> Parameter:
@@ -201,56 +247,6 @@ def format_object(entry: Mapped) -> str:
     return f"{entry.index:04X}:{entry.sub:02X} {short}"
 
 
-def _build(
-    kind: Callable[..., Built],
-    where: str,
-    given: Mapping[str, Any],
-    converted: tuple[str, ...] = (),
-) -> Built:
-    """A dataclass from keys: unknown and missing ones are named, plain types checked."""
-    known = {
-        field.name: field
-        for field in fields(kind)  # pyright: ignore[reportArgumentType]
-        if field.init and NOT_IN_FILES not in field.metadata
-    }
-    unknown = sorted(set(given) - set(known))
-    if unknown:
-        raise ConfigError(
-            f"{where} has unknown keys: {', '.join(unknown)}; it knows {', '.join(known)}"
-        )
-    for name, value in given.items():
-        if name in converted:
-            continue
-        words = str(getattr(known[name].type, "__name__", known[name].type)).split(" | ")[0]
-        allowed = _PLAIN_TYPES.get(words, (int,))
-        if (isinstance(value, bool) and words != "bool") or not isinstance(value, allowed):
-            raise ConfigError(f"{where}: {name} is {value!r}; it must be of type {words}")
-    plain = {
-        name: _finite(where, name, value)
-        for name, value in given.items()
-        if name not in converted and isinstance(value, int | float)
-    }
-    lacking = [
-        "id" if name == "node_id" else name
-        for name, field in known.items()
-        if name not in given and field.default is MISSING
-    ]
-    if lacking:
-        raise ConfigError(f"{where}: {', '.join(lacking)} must be given")
-    return kind(**(dict(given) | plain))
-
-
-def _finite(where: str, name: str, value: float) -> float:
-    """Return a number of a file, refusing one that is infinite, not a number or too large."""
-    if not abs(value) < LARGEST:
-        text = f"{value}" if isinstance(value, float) else "too large"
-        raise ConfigError(
-            f"{where}: {name} is {text}; it must be a number below {LARGEST:g}: a limit that is "
-            "not to act is left out"
-        )
-    return value
-
-
 def _table(name: str, value: object) -> dict[str, Any]:
     if not isinstance(value, Mapping):
         raise ConfigError(f"'{name}' must be a table, not {value!r}")
@@ -269,5 +265,5 @@ def _range(name: str, pair: object) -> tuple[float, float]:
         isinstance(number, int | float) and not isinstance(number, bool) for number in numbers
     ):
         raise ConfigError(f"{name} needs pairs [low, high] in rad, not {pair!r}")
-    low, high = (float(_finite("range", name, number)) for number in numbers)
+    low, high = (float(finite("range", name, number)) for number in numbers)
     return (low, high)

@@ -2,84 +2,36 @@
 
 import math
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
-from legbench.drives.errors import CodecError
-from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.frame import LAST_NODE, RPDO_BASES, TPDO_BASES
-from legbench.drives.protocol.objects import LINK_SHORT, PDO_COUNT
-from legbench.drives.protocol.pdo import Mapped, PdoMap
-from legbench.drives.setup.bus_numbers import BUS_NUMBERS, LONG, WORD, check_bus_numbers
-from legbench.drives.setup.cob_ids import check_cob_id, check_distinct
+from legbench.drives.protocol.pdo import Mapped
+from legbench.drives.setup.bus_numbers import BUS_NUMBERS, check_bus_numbers, check_start_speed
+from legbench.drives.setup.cob_ids import check_distinct
+from legbench.drives.setup.encoders import Side, check_encoder, check_sides, known_signals
 from legbench.drives.setup.homed import HomedCondition
+from legbench.drives.setup.identity import Identity as Identity
 from legbench.drives.setup.parameters import Parameter, check_parameter
+from legbench.drives.setup.pdos import (
+    CONTROLWORD,
+    LINK_POSITION_SHORT,
+    POSITION_ACTUAL,
+    RPDO,
+    STATUSWORD,
+    TARGET_POSITION,
+    TPDO,
+    PdoConfig,
+    check_mapped,
+)
+from legbench.drives.setup.pdos import LINK_POSITION as LINK_POSITION
+from legbench.drives.setup.quirks import Quirks
 from legbench.drives.setup.units import AxisUnits
 from legbench.errors import ConfigError
 from legbench.limits.safety import Range
 from legbench.limits.upper_ends import BUS_WAIVERS, check_number, check_waivers
 
-STATUSWORD = Mapped(0x6041, 0, DataType.UNSIGNED16)
-CONTROLWORD = Mapped(0x6040, 0, DataType.UNSIGNED16)
-POSITION_ACTUAL = Mapped(0x6064, 0, DataType.INTEGER32)
-TARGET_POSITION = Mapped(0x607A, 0, DataType.INTEGER32)
-LINK_POSITION_SHORT = Mapped(LINK_SHORT, 0, DataType.INTEGER16)
-LINK_POSITION = Mapped(0x60E4, 1, DataType.INTEGER32)
 LARGEST_COUNT = (1 << 31) - 1
 """Highest count of a 32-bit position object [counts]."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Identity:
-    """Identity object 1018h; what is not given is not checked.
-
-    Raises:
-        ConfigError: a number that 32 bits do not hold.
-    """
-
-    vendor: int
-    product: int
-    serial: int | None = None
-    revision: int | None = None
-
-    def __post_init__(self) -> None:
-        for name in ("vendor", "product", "serial", "revision"):
-            value = getattr(self, name)
-            if value is not None:
-                check_number(name, value, 0, LONG, "")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PdoConfig:
-    """Synchronous process data object (1400h/1600h or 1800h/1A00h and following).
-
-    Raises:
-        ConfigError: a number that does not exist, or objects that fill no frame.
-    """
-
-    number: int
-    """Number of the RPDO or TPDO, 1 to 4."""
-    objects: tuple[Mapped, ...]
-    cob_id: int | None = None
-    """COB-ID of the PDO; by default that of the predefined connection set."""
-    deadline_ms: int = 0
-    """Time without an RPDO after which the drive faults (140xh:05) [ms]; 0 leaves that object,
-    which not every drive has, alone."""
-
-    def __post_init__(self) -> None:
-        if not 1 <= self.number <= PDO_COUNT:
-            raise ConfigError(f"PDO number {self.number}; a drive has 1 to {PDO_COUNT}")
-        try:
-            PdoMap(self.objects)
-        except CodecError as error:
-            raise ConfigError(f"PDO {self.number}: {error}") from None
-        if self.cob_id is not None:
-            check_cob_id(self.cob_id)
-        check_number("deadline_ms", self.deadline_ms, 0, WORD, "ms")
-
-
-RPDO = PdoConfig(number=1, objects=(CONTROLWORD, TARGET_POSITION), deadline_ms=20)
-"""Command frame used by default: controlword and target position, six bytes."""
-TPDO = PdoConfig(number=1, objects=(STATUSWORD, POSITION_ACTUAL, LINK_POSITION_SHORT))
-"""Answer frame used by default: statusword, motor and link position, eight bytes."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,14 +46,26 @@ class NodeConfig:
     node_id: int
     identity: Identity
     motor: AxisUnits
-    link: AxisUnits
+    """Units of position and target (6064h, 607Ah)."""
+    link: AxisUnits | None
+    """Units of the second encoder, at the link; none on a drive that has one encoder."""
+    side: Side = Side.MOTOR
+    """Side of the spring on which the encoder of 6064h sits."""
+    channel: str | None = None
+    """Channel of the drive, where it is not that of the bus."""
+    motor_object: Mapped = POSITION_ACTUAL
+    target_object: Mapped = TARGET_POSITION
     link_object: Mapped = LINK_POSITION_SHORT
+    torque_object: Mapped | None = None
+    """Object in which the drive sends its torque every cycle; none if it does not."""
+    torque_scale: float = 0.0
+    """Torque at the joint of one count of `torque_object` [N m]."""
     rpdos: tuple[PdoConfig, ...] = (RPDO,)
     tpdos: tuple[PdoConfig, ...] = (TPDO,)
     parameters: tuple[Parameter, ...] = ()
     """Objects written after those of `configuration.configuration`, in this order."""
     temperature_object: Mapped | None = None
-    """Integer object in which the drive reports its temperature; none if it does not."""
+    """Object in which the drive reports its temperature, a number; none if it does not."""
     temperature_scale: float = 0.1
     """Temperature of one count of `temperature_object`, which depends on the maker [deg C]."""
     heartbeat_consumer: bool = True
@@ -110,33 +74,56 @@ class NodeConfig:
     homed: HomedCondition | None = None
     """How the drive shows that it is homed, without which nothing moves; none needs no homing, as
     with an absolute encoder."""
+    eds: Path | None = None
+    """Electronic data sheet of the drive, relative to the bus file; an emulated one wears it."""
     soft_limits: Range | None = None
     """Motor range to which the drive itself clamps targets (607Dh) [rad]; none sets no range."""
+    quirks: Quirks = field(default_factory=Quirks)
 
     def __post_init__(self) -> None:
         if not 1 <= self.node_id <= LAST_NODE:
             raise ConfigError(f"node '{self.name}' has id {self.node_id}; it must be 1 to 127")
-        for needed, pdos, words in (
-            ((CONTROLWORD, TARGET_POSITION), self.rpdos, "RPDO"),
-            ((STATUSWORD, POSITION_ACTUAL, self.link_object), self.tpdos, "TPDO"),
-        ):
-            mapped = [entry for pdo in pdos for entry in pdo.objects]
-            for entry in needed:
-                if mapped.count(entry) != 1:
-                    raise ConfigError(
-                        f"node '{self.name}' maps {entry} {mapped.count(entry)} times; it must "
-                        f"stand in one {words}"
-                    )
-        if self.link.bits != self.link_object.bits:
-            raise ConfigError(
-                f"node '{self.name}': link bits is {self.link.bits}, but {self.link_object} has "
-                f"{self.link_object.bits}"
-            )
+        commands = (CONTROLWORD, self.target_object)
+        check_mapped(self.name, self.rpdos, commands, "RPDO")
+        check_mapped(self.name, self.tpdos, self.answers, "TPDO")
+        self._check_encoders()
         for parameter in self.parameters:
             check_parameter(self.name, parameter)
         check_number("temperature_scale", self.temperature_scale, 1e-4, 10.0, "deg C a count")
         if self.soft_limits is not None:
             _ = self.soft_limits_counts
+
+    @property
+    def answers(self) -> tuple[Mapped, ...]:
+        """Objects that the drive sends every cycle: statusword, positions, and its torque."""
+        second = None if self.link is None else self.link_object
+        optional = (second, self.torque_object)
+        found = tuple(entry for entry in optional if entry is not None)
+        return (STATUSWORD, self.motor_object, *found)
+
+    @property
+    def link_units(self) -> AxisUnits:
+        """Units of the second encoder; raises ConfigError on a drive that has one encoder."""
+        if self.link is None:
+            raise ConfigError(
+                f"node '{self.name}' has no second encoder, which [node.link] describes"
+            )
+        return self.link
+
+    @property
+    def knows(self) -> frozenset[str]:
+        """Names of the signals that the drive tells of its joint, see `known_signals`."""
+        second, torque = self.link is not None, self.torque_object is not None
+        return known_signals(self.side, second=second, torque=torque)
+
+    def _check_encoders(self) -> None:
+        check_sides(self.name, self.side, self.link)
+        for entry in (self.motor_object, self.target_object):
+            check_encoder(self.name, "motor", self.motor, entry)
+        if self.link is not None:
+            check_encoder(self.name, "link", self.link, self.link_object)
+        if self.torque_object is not None:
+            check_number("torque_scale", self.torque_scale, 1e-6, 1e3, "N m a count")
 
     @property
     def soft_limits_counts(self) -> tuple[int, int] | None:
@@ -150,38 +137,28 @@ class NodeConfig:
                 "high"
             )
         ends = sorted((self.motor.to_counts(low), self.motor.to_counts(high)))
-        if ends[0] < -LARGEST_COUNT or ends[1] > LARGEST_COUNT:
+        lowest = max(self.motor.lowest, -LARGEST_COUNT)
+        highest = min(self.motor.lowest + self.motor.modulus - 1, LARGEST_COUNT)
+        if ends[0] < lowest or ends[1] > highest:
             raise ConfigError(
                 f"node '{self.name}': soft_limits are {ends[0]} to {ends[1]} counts; 607Dh holds "
-                f"{LARGEST_COUNT}: zero the encoder, or leave them out"
+                f"{lowest} to {highest}: zero the encoder, or leave them out"
             )
         return (ends[0], ends[1])
 
     def rpdo_id(self, pdo: PdoConfig) -> int:
         """COB-ID of an RPDO."""
-        return _given(pdo, RPDO_BASES[pdo.number - 1] + self.node_id)
+        return pdo.identifier(RPDO_BASES, self.node_id)
 
     def tpdo_id(self, pdo: PdoConfig) -> int:
         """COB-ID of a TPDO."""
-        return _given(pdo, TPDO_BASES[pdo.number - 1] + self.node_id)
+        return pdo.identifier(TPDO_BASES, self.node_id)
 
 
-def _given(pdo: PdoConfig, predefined: int) -> int:
-    return predefined if pdo.cob_id is None else pdo.cob_id
-
-
+USUAL_DEADLINE = 0.7
+"""Share of the period that drives have for their answers [-]."""
 NOT_IN_FILES = "not in files"
 """Metadata of a field that is no key of a bus file."""
-FASTEST_START = 5.0
-"""Highest speed of the move to the start posture, before a run begins [rad/s]."""
-
-
-def check_start_speed(speed: float) -> None:
-    """Refuse a start speed [rad/s] that is not above 0 or is too fast; raises ConfigError."""
-    if not 0.0 < speed <= FASTEST_START:
-        raise ConfigError(
-            f"start_speed is {speed:g} rad/s; it must be above 0 and at most {FASTEST_START:g}"
-        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -199,10 +176,12 @@ class BusConfig:
     bitrate: int = 1_000_000
     """Bitrate of the bus [bit/s]."""
     period_us: int = 1000
-    tpdo_deadline_us: int = 700
-    """Deadline of the TPDOs after SYNC; later process data counts as lost [us]. A reply delay of
-    250 us, two full frames and a heartbeat in front make 640 us at 1 Mbit/s; RPDOs need 230 us
-    after it."""
+    tpdo_deadline_us: int | None = None
+    """Deadline of the TPDOs after SYNC; later process data counts as lost; by default 70 % of the
+    period [us]. A reply delay of 250 us, two full frames and a heartbeat in front make 640 us at
+    1 Mbit/s; RPDOs need 230 us after it."""
+    reply_delay_us: int = 250
+    """Longest time from SYNC until a drive begins to send its first answer [us]."""
     master_id: int = 126
     """Node id under which the master produces the heartbeat that the drives watch."""
     heartbeat_ms: int = 20
@@ -239,9 +218,9 @@ class BusConfig:
         numbers = {name: getattr(self, name) for name in (*BUS_NUMBERS, "heartbeat_ms")}
         check_bus_numbers(numbers, self.waive)
         check_start_speed(self.start_speed)
-        if not 0 < self.tpdo_deadline_us < self.period_us:
+        if not 0 < self.deadline_us < self.period_us:
             raise ConfigError(
-                f"tpdo_deadline_us is {self.tpdo_deadline_us}; it must lie within the period of "
+                f"tpdo_deadline_us is {self.deadline_us}; it must lie within the period of "
                 f"{self.period_us} us"
             )
 
@@ -273,6 +252,40 @@ class BusConfig:
             f"{self.bitrate} bit/s is asked for, but the bus file says {self.stated_bitrate} "
             "bit/s: leave --bitrate out, or give that of the drives"
         )
+
+    @property
+    def channels(self) -> tuple[str | None, ...]:
+        """Channels that drives hang on, in the order of the drives, each once."""
+        return tuple(dict.fromkeys(map(self.channel_of, self.nodes)))
+
+    def channel_of(self, node: NodeConfig) -> str | None:
+        """Channel of a drive: its own, else that of the bus."""
+        return self.channel if node.channel is None else node.channel
+
+    def nodes_on(self, channel: str | None) -> tuple[NodeConfig, ...]:
+        """Drives on a channel, in their order."""
+        return tuple(node for node in self.nodes if self.channel_of(node) == channel)
+
+    @property
+    def two_encoders(self) -> bool:
+        """Whether every drive has an encoder on both sides of its spring."""
+        return all(node.link is not None for node in self.nodes)
+
+    @property
+    def deadline_us(self) -> int:
+        """Deadline of the TPDOs after SYNC [us]."""
+        given = self.tpdo_deadline_us
+        return round(USUAL_DEADLINE * self.period_us) if given is None else given
+
+    def cycles_in(self, time_ms: float) -> int:
+        """Number of cycles that last for a time [ms] or longer, 1 or more."""
+        return max(1, math.ceil(1000 * time_ms / self.period_us))
+
+    @property
+    def beat_ms(self) -> int:
+        """Longest time between two heartbeats of the master, which leave on ticks [ms]."""
+        ticks = math.ceil(1000 * self.master_heartbeat_ms / self.period_us)
+        return math.ceil(1e-3 * ticks * self.period_us)
 
     @property
     def period(self) -> float:

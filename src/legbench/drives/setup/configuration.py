@@ -5,7 +5,8 @@ from collections.abc import Iterator
 from legbench.drives.protocol.cia402 import Mode
 from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.frame import COB_INVALID, COB_NO_REMOTE, SYNC_ID
-from legbench.drives.protocol.objects import PDO_COUNT
+from legbench.drives.protocol.objects import PDO_COUNT, Key
+from legbench.drives.setup.bus_numbers import WORD
 from legbench.drives.setup.config import BusConfig, NodeConfig, Parameter, PdoConfig
 from legbench.errors import ConfigError
 
@@ -17,6 +18,8 @@ EVERY_SYNC = 1
 """Transmission type: latched, or sampled, at every SYNC."""
 U8, U16, U32 = DataType.UNSIGNED8, DataType.UNSIGNED16, DataType.UNSIGNED32
 I8, I16, I32 = DataType.INTEGER8, DataType.INTEGER16, DataType.INTEGER32
+SLOW_DOWN, QUICK_STOP_RAMP = (0x6084, 0), (0x6085, 0)
+"""Profile deceleration and quick-stop deceleration, one of which a quick stop brakes with."""
 STOP_OPTIONS = ((0x605B, 1), (0x605C, 1), (0x605D, 2), (0x605E, 2))
 """Stop option codes that make a drive stop on a ramp, by object: 0 would let the leg drop."""
 OFFSETS = ((0x60B0, I32), (0x60B1, I32), (0x60B2, I16), (0x607E, U8))
@@ -38,10 +41,24 @@ def interpolation_time(period_us: int) -> tuple[int, int]:
     return value, exponent
 
 
+def quick_stop_option(node: NodeConfig) -> int:
+    """Quick stop option (605Ah): 1 on the ramp 6084h if the bus file gives that one alone, else 2.
+
+    Both lead to switch on disabled.
+    """
+    return 1 if quick_stop_ramp(node) == SLOW_DOWN else 2
+
+
+def quick_stop_ramp(node: NodeConfig) -> Key:
+    """Return the object whose ramp a quick stop brakes on: 6084h if the bus file gives no 6085h."""
+    given = {parameter.key for parameter in node.parameters}
+    return SLOW_DOWN if SLOW_DOWN in given and QUICK_STOP_RAMP not in given else QUICK_STOP_RAMP
+
+
 def configuration(bus: BusConfig, node: NodeConfig) -> Iterator[Parameter]:
     """Return all objects that a drive is sent in pre-operational, default values included."""
     value, exponent = interpolation_time(bus.period_us)
-    watched = bus.master_id << 16 | HEARTBEATS_MISSED * bus.master_heartbeat_ms
+    watched = bus.master_id << 16 | min(WORD, HEARTBEATS_MISSED * bus.beat_ms)
     yield _parameter(0x1005, 0, U32, SYNC_ID)  # bit 30 clear: the drive is no SYNC producer
     yield _parameter(0x1006, 0, U32, bus.period_us)
     if node.heartbeat_consumer:
@@ -49,15 +66,16 @@ def configuration(bus: BusConfig, node: NodeConfig) -> Iterator[Parameter]:
     yield _parameter(0x1017, 0, U16, bus.heartbeat_ms)
     yield _parameter(0x1029, 1, U8, 0)  # a communication error leads to pre-operational
     yield _parameter(0x6007, 0, I16, QUICK_STOP)
-    yield _parameter(0x605A, 0, I16, 2)  # quick stop on its own ramp, then switch on disabled
-    yield _parameter(0x60C2, 1, U8, value)
+    yield _parameter(0x605A, 0, I16, quick_stop_option(node))
+    # Some drives fix the power of ten, to which the value then has to be fitted.
     yield _parameter(0x60C2, 2, I8, exponent)
+    yield _parameter(0x60C2, 1, U8, value)
     for index, kind in OFFSETS:
-        yield Parameter(index=index, sub=0, kind=kind, value=0, optional=True)
+        yield _parameter(index, 0, kind, 0)
     given = {parameter.key for parameter in node.parameters}
     for index, value in STOP_OPTIONS:
         if (index, 0) not in given:
-            yield Parameter(index=index, sub=0, kind=I16, value=value, optional=True)
+            yield _parameter(index, 0, I16, value)
     yield from node.parameters
     if node.soft_limits_counts is not None:
         low, high = node.soft_limits_counts
@@ -68,7 +86,7 @@ def configuration(bus: BusConfig, node: NodeConfig) -> Iterator[Parameter]:
         (node.tpdos, 0x1800, node.tpdo_id, COB_NO_REMOTE),
     ):
         used = {pdo.number: pdo for pdo in pdos}
-        for number in range(1, PDO_COUNT + 1):
+        for number in sorted({*range(1, PDO_COUNT + 1), *used}):
             pdo = used.get(number)
             if pdo is None:
                 yield _parameter(

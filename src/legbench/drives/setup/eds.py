@@ -58,7 +58,7 @@ def dcf_text(bus: BusConfig, node: NodeConfig, stamps: Stamps | None = None) -> 
     identity = node.identity
     numbers = {
         "VendorNumber": identity.vendor,
-        "ProductNumber": identity.product,
+        "ProductNumber": identity.product or 0,
         "RevisionNumber": identity.revision or 0,
     }
     defaults: dict[Key, int] = {

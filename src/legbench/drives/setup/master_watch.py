@@ -6,15 +6,21 @@ drive stands within 100 ms of its master's last frame.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from legbench.drives.protocol.objects import Key
 from legbench.drives.setup.config import CONTROLWORD, TARGET_POSITION, BusConfig, NodeConfig
-from legbench.drives.setup.configuration import HEARTBEATS_MISSED
-from legbench.drives.setup.stopping import QUICK_STOP_DECELERATION
+from legbench.drives.setup.configuration import configuration, quick_stop_ramp
 from legbench.errors import ConfigError
 from legbench.limits.upper_ends import MASTER_WATCH
 
+CONNECTION_LOST, CONSUMER = (0x6007, 0), (0x1016, 1)
+"""Reaction to a lost connection, and the heartbeat that a drive watches."""
+STOPS = (1, 3)
+"""Values of 6007h that stop a motor: by the reaction to a fault, and by quick stop."""
+LONGEST_TIME_MS = 0xFFFF
+"""Time that 1016h holds in its lower half [ms]."""
 LONGEST_STOP_MS = 100.0
 """Longest time from the last frame of the master to standstill of every drive [ms].
 
@@ -32,7 +38,7 @@ class Means:
     time_ms: float
     """Longest time from the last frame of the master to the reaction of the drive [ms]."""
     ramp_ms: float
-    """Time from the reaction to standstill, on the quick-stop ramp 6085h [ms]."""
+    """Time from the reaction to standstill, on the ramp of a quick stop [ms]."""
 
     @property
     def stop_ms(self) -> float:
@@ -41,13 +47,18 @@ class Means:
 
 
 def means_of(
-    config: BusConfig, node: NodeConfig, *, speed: float = math.inf, commands: bool = True
+    config: BusConfig,
+    node: NodeConfig,
+    *,
+    speed: float = math.inf,
+    commands: bool = True,
+    held: Mapping[Key, int] | None = None,
 ) -> tuple[Means, ...]:
     """Return every means that a drive has, the fastest first.
 
     The heartbeat consumer (1016h) and the deadline of an RPDO (140xh:05) lead to the quick stop of
-    6007h, all written and read back before a drive is enabled. A watch over SYNC (1006h)
-    is not counted: CiA 301 leaves what follows to the maker of the drive.
+    6007h, all written and read back before a drive is enabled. Without 6007h, and for a watch over
+    SYNC (1006h), the standard leaves what follows to the maker of the drive: they are not counted.
 
     Args:
         config: the bus.
@@ -55,37 +66,49 @@ def means_of(
         speed: highest speed of the motor; without one, or a ramp in the bus file, the ramp counts
             as no time [rad/s].
         commands: RPDOs are sent, as in a run; the deadline of one that never comes never ends.
+        held: what the drive holds, read back; by default what it is going to be written.
     """
-    ramp_ms = _ramp_ms(node, speed)
+    if held is None:
+        held = {entry.key: entry.value for entry in configuration(config, node)}
+    if held.get(CONNECTION_LOST) not in STOPS:
+        return ()
+    ramp_ms = _ramp_ms(node, speed, held)
     # A drive checks its timers once per cycle of its own.
     late_ms = 1e-3 * config.period_us
     found: list[tuple[str, float]] = []
-    if node.heartbeat_consumer:
-        time_ms = HEARTBEATS_MISSED * config.master_heartbeat_ms
-        found.append(("heartbeat consumer 1016h", time_ms))
+    watched = held.get(CONSUMER, 0)
+    if watched >> 16 == config.master_id and watched & LONGEST_TIME_MS:
+        found.append(("heartbeat consumer 1016h", watched & LONGEST_TIME_MS))
     for pdo in node.rpdos if commands else ():
         leads = CONTROLWORD in pdo.objects or TARGET_POSITION in pdo.objects
-        if leads and pdo.deadline_ms:
+        deadline_ms = held.get((0x1400 + pdo.number - 1, 5), 0)
+        if leads and deadline_ms:
             name = f"deadline of RPDO{pdo.number} {0x1400 + pdo.number - 1:04X}h:05"
-            found.append((name, pdo.deadline_ms))
+            found.append((name, deadline_ms))
     means = [
         Means(name=name, time_ms=time_ms + late_ms, ramp_ms=ramp_ms) for name, time_ms in found
     ]
     return tuple(sorted(means, key=lambda one: one.time_ms))
 
 
-def _ramp_ms(node: NodeConfig, speed: float) -> float:
+def _ramp_ms(node: NodeConfig, speed: float, held: Mapping[Key, int]) -> float:
     """Time of a quick stop from a speed; 0 where one of the two is not known [ms]."""
-    ramp = [one.value for one in node.parameters if one.key == QUICK_STOP_DECELERATION]
-    if not ramp or ramp[-1] <= 0 or not math.isfinite(speed):
+    ramp = held.get(quick_stop_ramp(node), 0)
+    if ramp <= 0 or not math.isfinite(speed):
         return 0.0
-    return 1e3 * speed * abs(node.motor.counts_per_rad) / ramp[-1]
+    return 1e3 * speed * abs(node.motor.counts_per_rad) / ramp
 
 
 def check_master_watch(
-    config: BusConfig, *, speed: float = math.inf, commands: bool = True
+    config: BusConfig,
+    *,
+    speed: float = math.inf,
+    commands: bool = True,
+    held: Mapping[str, Mapping[Key, int]] | None = None,
 ) -> None:
     """Refuse a bus whose drives would go on without their master; arguments as for `means_of`.
+
+    What drives hold is given by the name of their node; one that is left out is not looked at.
 
     Raises:
         ConfigError: a drive has no means, or stands later than 100 ms after its master's death, and
@@ -94,7 +117,10 @@ def check_master_watch(
     if MASTER_WATCH in config.waive:
         return
     for node in config.nodes:
-        means = means_of(config, node, speed=speed, commands=commands)
+        if held is not None and node.name not in held:
+            continue
+        there = None if held is None else held[node.name]
+        means = means_of(config, node, speed=speed, commands=commands, held=there)
         if means and means[0].stop_ms <= LONGEST_STOP_MS:
             continue
         raise ConfigError(
@@ -106,7 +132,7 @@ def check_master_watch(
 
 def _describe(means: Sequence[Means]) -> str:
     if not means:
-        return "it has no means to notice it"
+        return "it has no means to notice it, which are 1016h or 140xh:05, both with 6007h"
     return ", ".join(f"{one.stop_ms:.1f} ms by its {one.name}" for one in means)
 
 

@@ -15,8 +15,6 @@ class Parameter:
     sub: int
     kind: DataType
     value: int
-    optional: bool = False
-    """Whether the object is left out on a drive that has no such object."""
 
     @property
     def key(self) -> Key:

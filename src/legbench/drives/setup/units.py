@@ -8,6 +8,10 @@ from legbench.errors import ConfigError
 
 MOST_COUNTS = 1 << 31
 """First count beyond the range of a 32-bit position object [counts]."""
+FEWEST_COUNTS = 16
+"""Fewest counts after which a position repeats [counts]."""
+LENGTHS = (8, 16, 32, 64)
+"""Lengths of the position objects that there are [bits]."""
 LEAST_GEAR = 1e-4
 """Smallest gear ratio of a joint [-]; the largest is its inverse."""
 
@@ -29,7 +33,13 @@ class AxisUnits:
     offset_counts: int = 0
     """Count that the encoder shows at angle 0."""
     bits: int = 32
-    """Length of the position object, which wraps at 2^bits [bits]."""
+    """Length of the position object [bits]."""
+    modulus_counts: int | None = None
+    """Counts after which the position repeats, such as 4096 of a 12-bit encoder of a single turn;
+    by default all that the object holds, 2^bits [counts]."""
+    lowest_count: int | None = None
+    """Lowest count that the object shows; by default 0 with a modulus, else -2^(bits - 1), that of
+    a signed object [counts]."""
     counts_per_rad: float = field(init=False)
     """Counts for one radian of the axis, negative for a mirrored one [counts/rad]."""
 
@@ -44,17 +54,63 @@ class AxisUnits:
                 f"gear is {self.gear:g}; it must be positive, {LEAST_GEAR:g} to "
                 f"{1.0 / LEAST_GEAR:g}, the sign is 'sign'"
             )
-        if not abs(self.offset_counts) < MOST_COUNTS:
+        most = max(MOST_COUNTS, 1 << self.bits - 1) if self.bits in LENGTHS else MOST_COUNTS
+        if not abs(self.offset_counts) < most:
             raise ConfigError(
-                f"offset_counts is {self.offset_counts}; a position object of 32 bits shows less "
-                f"than {MOST_COUNTS} either way"
+                f"offset_counts is {self.offset_counts}; a position object of {self.bits} bits "
+                f"shows less than {most} either way"
             )
         if self.sign not in (-1, 1):
             raise ConfigError(f"sign is {self.sign}; it must be 1 or -1")
-        if self.bits not in (16, 32):
-            raise ConfigError(f"bits is {self.bits}; a position object has 16 or 32")
+        if self.bits not in LENGTHS:
+            raise ConfigError(
+                f"bits is {self.bits}; a position object has {', '.join(map(str, LENGTHS))}"
+            )
+        self._check_window()
         scale = self.sign * self.gear * self.counts_per_rev / (2.0 * math.pi)
         object.__setattr__(self, "counts_per_rad", scale)
+
+    def _check_window(self) -> None:
+        """Refuse counts that no object of this length shows."""
+        modulus, low = self.modulus, self.lowest
+        if not FEWEST_COUNTS <= modulus <= 1 << self.bits:
+            raise ConfigError(
+                f"modulus_counts is {modulus}; an object of {self.bits} bits repeats after "
+                f"{FEWEST_COUNTS} to {1 << self.bits} counts"
+            )
+        if not -(1 << self.bits - 1) <= low <= (1 << self.bits) - modulus:
+            raise ConfigError(
+                f"lowest_count is {low}; an object of {self.bits} bits that repeats after "
+                f"{modulus} counts begins at {-(1 << self.bits - 1)} to "
+                f"{(1 << self.bits) - modulus}"
+            )
+
+    @property
+    def modulus(self) -> int:
+        """Counts after which the position repeats."""
+        return 1 << self.bits if self.modulus_counts is None else self.modulus_counts
+
+    @property
+    def lowest(self) -> int:
+        """Lowest count that the position object shows."""
+        if self.lowest_count is not None:
+            return self.lowest_count
+        return -(1 << self.bits - 1) if self.modulus_counts is None else 0
+
+    @property
+    def lap(self) -> float:
+        """Angle after which the position repeats [rad]."""
+        return self.modulus * self.resolution
+
+    def show(self, counts: int) -> int:
+        """A count as the position object shows it: within one lap from its lowest count."""
+        low = self.lowest
+        return low + (counts - low) % self.modulus
+
+    def nearest(self, shown: int, near: int) -> int:
+        """The count that shows as `shown` and lies closest to `near`."""
+        half = self.modulus // 2
+        return near + (shown - near + half) % self.modulus - half
 
     @property
     def resolution(self) -> float:
@@ -76,22 +132,17 @@ def wrap(counts: int, bits: int = 32) -> int:
     return (counts + half & (1 << bits) - 1) - half
 
 
-def unwrap(shown: int, near: int, bits: int = 32) -> int:
-    """The count that shows as `shown` and lies closest to `near`."""
-    return near + wrap(shown - near, bits)
-
-
 @final
 class Unwrapper:
     """Follows a wrapping position object across its seam."""
 
-    def __init__(self, bits: int, near: int) -> None:
-        self._half, self._mask = 1 << (bits - 1), (1 << bits) - 1
+    def __init__(self, modulus: int, near: int) -> None:
+        self._half, self._modulus = modulus // 2, modulus
         self.counts = near
 
     def feed(self, shown: int) -> int:
-        """The unwrapped count: `unwrap` without its calls, four times a cycle."""
+        """The unwrapped count: `AxisUnits.nearest` without its calls, four times a cycle."""
         half = self._half
         near = self.counts
-        self.counts = near + ((shown - near + half) & self._mask) - half
+        self.counts = near + (shown - near + half) % self._modulus - half
         return self.counts

@@ -78,11 +78,16 @@ class LoadEntry:
     """Number of frames per second [1/s]."""
 
 
-def schedule(bus: BusConfig) -> tuple[LoadEntry, ...]:
-    """Return every frame that is sent regularly, with its worst length and rate."""
+def schedule(bus: BusConfig, channel: str | None = None) -> tuple[LoadEntry, ...]:
+    """Return every frame that is sent regularly, with its worst length and rate.
+
+    Args:
+        bus: the bus.
+        channel: one of its channels; by default the first one.
+    """
     rate = 1e6 / bus.period_us
     entries = [LoadEntry(what=f"SYNC {SYNC_ID:03X}h", bits=worst_bits(0), rate=rate)]
-    for node in bus.nodes:
+    for node in bus.nodes_on(bus.channels[0] if channel is None else channel):
         for words, pdos, cob_of in (
             ("RPDO", node.rpdos, node.rpdo_id),
             ("TPDO", node.tpdos, node.tpdo_id),
@@ -100,23 +105,23 @@ def schedule(bus: BusConfig) -> tuple[LoadEntry, ...]:
                 what=f"heartbeat {node.name}", bits=worst_bits(1), rate=1e3 / bus.heartbeat_ms
             )
         )
-    beat = 1e3 / bus.master_heartbeat_ms
+    beat = min(rate, 1e3 / bus.master_heartbeat_ms)
     entries.append(LoadEntry(what="heartbeat master", bits=worst_bits(1), rate=beat))
     return tuple(entries)
 
 
-def bus_load(bus: BusConfig) -> float:
-    """Worst-case share of the bus's bitrate that the schedule takes [-]."""
-    return sum(entry.bits * entry.rate for entry in schedule(bus)) / bus.bitrate
+def bus_load(bus: BusConfig, channel: str | None = None) -> float:
+    """Worst-case share of a channel's bitrate that the schedule takes, as for `schedule` [-]."""
+    return sum(entry.bits * entry.rate for entry in schedule(bus, channel)) / bus.bitrate
 
 
 def check_load(bus: BusConfig) -> float:
-    """Return the worst-case bus load, refusing one that the bus cannot carry.
+    """Return the worst-case load of the fullest channel, refusing one that it cannot carry.
 
     Raises:
         ConfigError: it is above 80 %.
     """
-    load = bus_load(bus)
+    load = max(bus_load(bus, channel) for channel in bus.channels)
     if load > MAX_LOAD:
         stated = "" if bus.stated_bitrate is None else f"; {bus.bitrate_text}"
         raise ConfigError(

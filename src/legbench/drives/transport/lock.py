@@ -11,6 +11,7 @@ import hashlib
 import os
 import socket
 import struct
+from collections.abc import Sequence
 from pathlib import Path
 from typing import final
 
@@ -45,6 +46,7 @@ class ChannelLock:
         self._private = False
         self._fd: int | None = None
         self._depth = 0
+        self._others: tuple[ChannelLock, ...] = ()
 
     @classmethod
     def of_channel(
@@ -62,6 +64,13 @@ class ChannelLock:
         return cls(f"{interface or 'default'} {where}", scope)
 
     @classmethod
+    def joined(cls, locks: "Sequence[ChannelLock]") -> "ChannelLock":
+        """One lock of several channels: it is taken with all of them, or not at all."""
+        first = locks[0]
+        first._others = tuple(locks[1:])
+        return first
+
+    @classmethod
     def private(cls, name: str) -> "ChannelLock":
         """A lock for a channel that no other process can reach; it binds no name."""
         lock = cls(name)
@@ -77,6 +86,14 @@ class ChannelLock:
         if self._fd is None:
             self._fd = self._take()
         self._depth += 1
+        for place, other in enumerate(self._others):
+            try:
+                other.acquire()
+            except BaseException:
+                for taken in self._others[:place]:
+                    taken.release()
+                self._give_back()
+                raise
 
     def _take(self) -> int:
         taken = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
@@ -116,6 +133,11 @@ class ChannelLock:
 
     def release(self) -> None:
         """Undo one `acquire`; without one nothing happens."""
+        for other in self._others:
+            other.release()
+        self._give_back()
+
+    def _give_back(self) -> None:
         self._depth = max(0, self._depth - 1)
         if self._depth == 0 and self._fd is not None:
             os.close(self._fd)

@@ -26,7 +26,7 @@ def frame_of(message: can.Message) -> Frame:
         or len(data) != (0 if remote else dlc)
     ):
         raise can.CanOperationError(_objection(message))
-    return Frame(message.arbitration_id, data, remote, extended, dlc=dlc if remote else 0)
+    return Frame(message.arbitration_id, data, remote, extended, False, dlc if remote else 0)
 
 
 def _objection(message: can.Message) -> str:

@@ -16,10 +16,15 @@ import can
 from can.interfaces.slcan import slcanBus
 
 from legbench.drives.protocol.slcan import OK, REFUSED, format_frame, parse_frame
-from legbench.drives.transport.messages import frame_of, message_of
+from legbench.drives.transport.messages import frame_of, message_of, refuse_fd
 
 CHUNK = 4096
 """Largest number of bytes read at once."""
+OPTIONS = (
+    *("bitrate", "can_filters", "fd", "listen_only", "rtscts", "single_handle"),
+    *("sleep_after_open", "timeout", "timing", "tty_baudrate"),
+)
+"""Options of python-can's `slcanBus`, and those that its programs give to every interface."""
 CLOSING_S = 0.1
 """Longest that an adapter may take to be told to close its channel [s]."""
 
@@ -29,10 +34,19 @@ class SlcanBus(slcanBus):
     """Bus behind a CAN adapter on a serial line."""
 
     def __init__(self, channel: str, **options: Any) -> None:
-        """Open the adapter; raises as python-can's `slcanBus` does."""
+        """Open the adapter; takes what python-can's `slcanBus` takes, and raises what it raises.
+
+        Raises:
+            TypeError: an option that it does not have.
+            can.CanInitializationError: flexible data rate is asked for.
+        """
+        self._is_shutdown = True  # A bus that fails to open has nothing to shut down.
+        unknown = sorted(options.keys() - OPTIONS)
+        if unknown:
+            raise TypeError(f"slcan takes no {', '.join(unknown)}; it takes {', '.join(OPTIONS)}")
+        refuse_fd(bool(options.pop("fd", False)))
         self._partial, self._unsent = b"", b""
         self._lines: deque[tuple[bytes, float]] = deque()
-        self._is_shutdown = True  # A bus that fails to open has nothing to shut down.
         super().__init__(channel, **options)
         self._is_shutdown = False
         self.serialPortOrig.write_timeout = CLOSING_S

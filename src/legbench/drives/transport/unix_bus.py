@@ -18,6 +18,7 @@ from can.typechecking import CanFilters
 
 from legbench.drives.transport.messages import frame_of, message_of, refuse_fd
 from legbench.drives.transport.unix_packet import (
+    NOTE,
     PACKET,
     Controller,
     Opening,
@@ -33,6 +34,8 @@ SO_TIMESTAMPNS, SO_PEEK_OFF = 35, 42
 STAMP = struct.Struct("@qq")
 """`struct timespec` of SO_TIMESTAMPNS: seconds and nanoseconds since 1970."""
 STAMP_SPACE = socket.CMSG_SPACE(STAMP.size)
+SPACE = PACKET.size + 1
+"""Space for a packet, and for a byte by which one that is too long is known [bytes]."""
 STATES = {
     Controller.ACTIVE: can.BusState.ACTIVE,
     Controller.PASSIVE: can.BusState.PASSIVE,
@@ -77,6 +80,7 @@ class UnixBus(can.BusABC):
 
     def _connect(self) -> None:
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._readable = (self._socket.fileno(),)
         self._controller = Controller.ACTIVE
         try:
             self._socket.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
@@ -155,9 +159,12 @@ class UnixBus(can.BusABC):
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
         self._check_open()
         try:
-            if not select.select([self._socket], [], [], timeout)[0]:
+            if not select.select(self._readable, (), (), timeout)[0]:
                 return None, False
-            packet, stamps, _, _ = self._socket.recvmsg(PACKET.size + 1, STAMP_SPACE)
+            packet, stamps, _, _ = self._socket.recvmsg(SPACE, STAMP_SPACE, socket.MSG_DONTWAIT)
+        except BlockingIOError:
+            # Another thread was faster.
+            return None, False
         except OSError as error:
             raise can.CanOperationError(f"{self.channel}: {error.strerror}") from error
         if not packet:
@@ -165,7 +172,7 @@ class UnixBus(can.BusABC):
         frame = unpack_frame(packet)
         if frame is None:
             return None, False
-        if controller_of(packet) is Controller.BUS_OFF:
+        if packet[NOTE] and controller_of(packet) is Controller.BUS_OFF:
             self._controller = Controller.BUS_OFF
         message = message_of(frame, _stamp_of(stamps), self.channel, own=is_own(packet))
         return message, False
@@ -187,8 +194,8 @@ class UnixBus(can.BusABC):
 
 def _stamp_of(ancillary: list[tuple[int, int, bytes]]) -> float:
     """Time at which a packet came, as the kernel says [s since 1970]."""
-    for level, kind, data in ancillary:
-        if (level, kind) == (socket.SOL_SOCKET, SO_TIMESTAMPNS):
-            seconds, nanoseconds = STAMP.unpack_from(data)
-            return seconds + 1e-9 * nanoseconds
-    return time.time()
+    if not ancillary:
+        return time.time()
+    # Nothing else has been asked for.
+    seconds, nanoseconds = STAMP.unpack(ancillary[0][2])
+    return seconds + 1e-9 * nanoseconds

@@ -43,9 +43,12 @@ def pack_frame(
         controller: state of the controller of that master.
         own: whether that master has sent the frame itself.
     """
-    flags = EXTENDED * frame.extended | REMOTE * frame.remote | ERROR * frame.error
+    cob_id, data, remote, extended, error, dlc = frame
     note = controller << 1 | own
-    return PACKET.pack(frame.cob_id | flags, frame.length, note, frame.data)
+    if not (remote or extended or error):
+        return PACKET.pack(cob_id, len(data), note, data)
+    flags = EXTENDED * extended | REMOTE * remote | ERROR * error
+    return PACKET.pack(cob_id | flags, dlc if remote else len(data), note, data)
 
 
 def controller_of(packet: bytes) -> Controller:
@@ -76,6 +79,8 @@ def unpack_frame(packet: bytes) -> Frame | None:
     if len(packet) != PACKET.size:
         return None
     word, length, _, data = PACKET.unpack(packet)
+    if word <= BASE_MASK and length <= len(data):
+        return Frame(word, data[:length])
     cob_id, remote, error = word & ID_MASK, bool(word & REMOTE), bool(word & ERROR)
     extended = bool(word & EXTENDED)
     if length > len(data) or not (extended or error or cob_id <= BASE_MASK):

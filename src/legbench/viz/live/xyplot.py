@@ -28,7 +28,13 @@ class XYPlot:
         stream.log(f"{spec.path}/data/head", head, static=True)
 
     def cover(self, points: Floats) -> None:
-        """Make room on the axes for points (n, 2); draws the axes when they change."""
+        """Make room on the axes for points (n, 2); draws the axes when they change.
+
+        Points that are not known, not numbers, need none.
+        """
+        points = points[np.isfinite(points).all(axis=1)]
+        if not len(points):
+            return
         low, high = points.min(axis=0).tolist(), points.max(axis=0).tolist()
         if self._limits is None:
             least, margin = self._spec.least, self._spec.margin

@@ -1,51 +1,42 @@
-"""Pictures of modes and hops: figures of their own, no window."""
+"""Pictures of modes: figures of their own, no window."""
 
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
-from legbench.modes.basin import Fate, Question
-from legbench.modes.brake import Family
-from legbench.modes.flow import orbit
+from legbench.modes.branches import Branch
+from legbench.modes.family import Family
 from legbench.modes.scene import Scene
-from legbench.signals import Floats, Ints
-from legbench.viz.print._matplotlib import (
-    BoundaryNorm,
-    Figure,
-    Line2D,
-    ListedColormap,
-    styled,
-)
+from legbench.viz.print._matplotlib import Axes, Figure, Line2D, styled
 from legbench.viz.print.save import save_figure
 
 RADIAL, POLAR, GREY = "#00acc1", "#e69f00", "#808080"
 COLOURS = {"radial": RADIAL, "polar": POLAR}
-FATES = {
-    Fate.RETURNS: ("#2e7d32", "ends in the periodic hop"),
-    Fate.WANDERS: ("#c0ca33", "hops on, otherwise"),
-    Fate.STANDS: ("#9e9e9e", "comes to stand"),
-    Fate.FELL: ("#c62828", "swings over"),
-    Fate.FAULT: ("#6a1b9a", "controller loses step"),
-    Fate.BURIED: ("#e0e0e0", "foot under the ground"),
-}
+BRANCH = "#8e24aa"
 DPI = 150
+BELOW = (0.5, -0.18)
+"""Place of a legend under its panel, in the panel's own units."""
 
 
-def plot_modes(scene: Scene, families: list[Family], path: Path) -> None:
-    """Generator curves over joint space, backbones, and the phase portrait of the radial mode."""
+def plot_modes(
+    scene: Scene,
+    families: Sequence[Family],
+    branches: Mapping[str, Sequence[Branch]],
+    path: Path,
+) -> None:
+    """Generator curves over joint space, backbones with their stability, and phase portraits."""
     with styled():
-        figure = Figure(figsize=(11.0, 3.8), layout="constrained")
+        figure = Figure(figsize=(11.0, 4.0), layout="constrained")
         joint, backbone, phase = figure.subplots(1, 3)
         _joint_space(joint, scene, families)
         for family in families:
-            energies = [found.energy for found in family.orbits]
-            freq = [1.0 / found.period for found in family.orbits]
-            colour = COLOURS[family.mode.name]
-            backbone.plot(freq, energies, "o-", ms=3, color=colour, label=family.mode.name)
-            backbone.axvline(family.mode.freq, lw=0.8, ls=":", color=colour)
-        backbone.plot([], [], lw=0.8, ls=":", color=GREY, label="linear")
+            draw_backbone(backbone, family)
+            for branch in branches[family.mode.name]:
+                _draw_branch(backbone, branch, 2.0 * max(one.largest for one in families))
+        _explain(backbone, families, any(branches.values()))
         backbone.set(xlabel="frequency [Hz]", ylabel="energy above rest [J]", title="backbones")
-        backbone.legend(frameon=False)
         for family in families:
             _portrait(phase, scene, family)
         phase.set(
@@ -58,8 +49,60 @@ def plot_modes(scene: Scene, families: list[Family], path: Path) -> None:
         save_figure(figure, path, DPI)
 
 
-def _joint_space(axes, scene: Scene, families: list[Family]) -> None:  # type: ignore[no-untyped-def]
-    rest, ends = np.asarray(scene.rest), [np.asarray(scene.rest)]
+def draw_backbone(axes: Axes, family: Family) -> None:
+    """Energy over frequency: dotted where orbits are not stable, a ring where that changes."""
+    colour = COLOURS[family.mode.name]
+    changes = [passing.orbit for passing in family.passings if passing.changes]
+    orbits = sorted([*family.orbits, *changes], key=lambda orbit: orbit.energy)
+    for first, last in pairwise(orbits):
+        stable = abs(first.monodromy.trace + last.monodromy.trace) < 4.0
+        axes.plot(
+            [1.0 / first.period, 1.0 / last.period],
+            [first.energy, last.energy],
+            lw=1.6 if stable else 1.2,
+            ls="-" if stable else ":",
+            color=colour,
+        )
+    for passing in family.passings:
+        if passing.changes:
+            at = 1.0 / passing.orbit.period, passing.orbit.energy
+            axes.plot(*at, "o", ms=6, mfc="white", color=colour)
+    axes.plot(family.mode.freq, 0.0, "^", ms=6, color=colour, clip_on=False)
+
+
+def _draw_branch(axes: Axes, branch: Branch, highest: float) -> None:
+    """Energy over frequency of a branch, up to an energy [J]."""
+    shown = [orbit for orbit in branch.orbits if orbit.energy < highest]
+    freq = [1.0 / orbit.period for orbit in shown]
+    stable = all(orbit.monodromy.stable for orbit in shown)
+    energies = [orbit.energy for orbit in shown]
+    axes.plot(freq, energies, lw=1.2, ls="-" if stable else ":", color=BRANCH)
+
+
+def _explain(axes: Axes, families: Sequence[Family], branched: bool) -> None:
+    handles = [
+        Line2D([], [], lw=1.6, color=COLOURS[family.mode.name], label=family.mode.name)
+        for family in families
+    ]
+    if branched:
+        handles.append(Line2D([], [], lw=1.2, color=BRANCH, label="branches"))
+    handles += [
+        Line2D([], [], marker="^", ls="", color=GREY, label="linear"),
+        Line2D([], [], lw=1.2, ls=":", color=GREY, label="not stable"),
+        Line2D([], [], marker="o", ls="", mfc="white", color=GREY, label="stability changes"),
+    ]
+    axes.legend(
+        handles=handles,
+        loc="upper center",
+        bbox_to_anchor=BELOW,
+        ncols=3,
+        fontsize=6,
+        frameon=False,
+    )
+
+
+def _joint_space(axes: Axes, scene: Scene, families: Sequence[Family]) -> None:
+    rest, ends = np.asarray(scene.rest), [np.asarray([scene.rest])]
     for family in families:
         colour = COLOURS[family.mode.name]
         generator = np.array(
@@ -67,7 +110,9 @@ def _joint_space(axes, scene: Scene, families: list[Family]) -> None:  # type: i
         )
         axes.plot(*generator.T, "o", ms=2.5, color=colour)
         widest = family.orbits[-1]
-        axes.plot(*orbit(scene, widest.start, 0.5 * widest.period, 120).T, lw=1.2, color=colour)
+        times = np.linspace(0.0, 0.5 * widest.period, 120)
+        start = np.array([*widest.start, 0.0, 0.0])
+        axes.plot(*family.shooting.carrier.path(start, times)[:, :2].T, lw=1.2, color=colour)
         ends.append(generator)
     points = np.vstack(ends)
     low, high = points.min(axis=0) - 0.15, points.max(axis=0) + 0.15
@@ -93,11 +138,10 @@ def _joint_space(axes, scene: Scene, families: list[Family]) -> None:  # type: i
         Line2D([], [], lw=0.7, ls=":", color=GREY, label="modal axes"),
         Line2D([], [], lw=0.7, color="#cccccc", label="equal energy"),
     ]
-    below = (0.5, -0.18)
     axes.legend(
         handles=handles,
         loc="upper center",
-        bbox_to_anchor=below,
+        bbox_to_anchor=BELOW,
         ncols=4,
         fontsize=6,
         frameon=False,
@@ -108,63 +152,17 @@ def _joint_space(axes, scene: Scene, families: list[Family]) -> None:  # type: i
     axes.set_aspect("equal")
 
 
-def _portrait(axes, scene: Scene, family: Family) -> None:  # type: ignore[no-untyped-def]
+def _portrait(axes: Axes, scene: Scene, family: Family) -> None:
     rest = np.asarray(scene.rest)
     axis = np.array([-1.0, 1.0] if family.mode.name == "radial" else [1.0, 1.0]) / np.sqrt(2.0)
     for found in family.orbits[:: max(1, len(family.orbits) // 5)]:
-        path = (orbit(scene, found.start, found.period, 400) - rest) @ axis
-        rate = np.gradient(path, found.period / 399)
-        axes.plot(path, rate, lw=0.9, color=COLOURS[family.mode.name])
-
-
-def plot_return(heights: Floats, fixed: float | None, title: str, path: Path) -> None:
-    """The return map of the apex height: (n, 2) of before and after [m]."""
-    with styled():
-        figure = Figure(figsize=(4.6, 4.4), layout="constrained")
-        axes = figure.subplots()
-        span = [float(np.min(heights)), float(np.max(heights))]
-        axes.plot(span, span, lw=0.8, color=GREY, label="same height again")
-        axes.plot(*heights.T, "o-", ms=3, lw=0.9, color=RADIAL, label="hops in a row")
-        if fixed is not None:
-            axes.plot(fixed, fixed, "o", ms=7, mfc="none", color="k", ls="", label="periodic hop")
-        axes.legend(frameon=False)
-        axes.set(
-            xlabel="apex of the centre of mass [m]",
-            ylabel="next apex of the centre of mass [m]",
-            title=title,
+        start, times = np.array([*found.start, 0.0, 0.0]), np.linspace(0.0, found.period, 400)
+        path = family.shooting.carrier.path(start, times)
+        look = "-" if found.monodromy.stable else ":"
+        axes.plot(
+            (path[:, :2] - rest) @ axis,
+            path[:, 2:] @ axis,
+            lw=0.9,
+            ls=look,
+            color=COLOURS[family.mode.name],
         )
-        axes.set_aspect("equal")
-        save_figure(figure, path, DPI)
-
-
-def plot_basin(question: Question, fates: Ints, path: Path) -> None:
-    """The grid of starts, coloured by where they lead."""
-    with styled():
-        figure = Figure(figsize=(5.6, 4.4), layout="constrained")
-        axes = figure.subplots()
-        colours = ListedColormap([colour for colour, _ in FATES.values()])
-        axes.pcolormesh(
-            question.across.values(),
-            question.up.values(),
-            fates,
-            cmap=colours,
-            norm=BoundaryNorm(np.arange(-0.5, len(FATES)), len(FATES)),
-            rasterized=True,
-        )
-        centre = question.centre
-        at = (getattr(centre, question.across.name), getattr(centre, question.up.name))
-        axes.plot(*at, "k+", ms=10)
-        handles = [Line2D([], [], marker="+", ls="", color="k", ms=10, label="periodic hop")]
-        for value in np.unique(fates).tolist():
-            colour, label = FATES[Fate(value)]
-            handles.append(Line2D([], [], marker="s", ls="", color=colour, label=label))
-        axes.legend(handles=handles, frameon=True, loc="upper right")
-        units = {"height": "m", "speed": "m/s", "dz1": "rad/s", "dz2": "rad/s"}
-        labels = [
-            f"{name} at the apex [{units.get(name, 'rad')}]"
-            for name in (question.across.name, question.up.name)
-        ]
-        axes.set(
-            xlabel=labels[0], ylabel=labels[1], title=f"{question.design.name}: where a hop leads"
-        )
-        save_figure(figure, path, DPI)

@@ -1,0 +1,175 @@
+"""Joint stops on the compiled leg: which joint is beyond its limit, and whether its stop pushes.
+
+The law (`analytic.stops`) compares: a stop acts beyond the limit, and only while it would push. The
+compiled equations switch instead, so both comparisons are events, and between events the switches
+are known. A switch is set by the law whenever something jumps, and by its own event otherwise,
+never by the sign of a number that is zero up to rounding. So no stop can pull.
+"""
+
+from typing import final
+
+from legbench.analytic.equations import SCALAR, Ops, Pair, Term, pair_acceleration, pair_share
+from legbench.analytic.model import LegModel
+from legbench.analytic.places import FREE_PUSHES, PUSHES, Event
+from legbench.analytic.stops import TIME_CONSTANT, Stop
+from legbench.analytic.terms import PairTerms
+from legbench.analytic.watch import OFF, Watch
+
+AT_LIMIT = 1e-12
+"""Depth that may be rounding: the speed then says whether the stop is touched [rad]."""
+FIRST = int(Event.KNEE_LOW)
+"""Place of the first of the four events of meeting or leaving a limit."""
+
+
+@final
+class Bumpers:
+    """The stops of knee and hip, lower and upper end each; none of a leg that has no stops.
+
+    Attributes:
+        touched: whether a joint is beyond a limit.
+    """
+
+    def __init__(self, model: LegModel) -> None:
+        self._model, self._stops = model, model.stops
+        self._touched = [False] * len(model.stops)
+        self._pushing, self._free = [False, False], [False, False]
+        self._acting: list[Stop | None] = [None, None]
+        """The stop that each joint is beyond."""
+        self.touched, self._version = False, 0
+
+    def find(self, q: Pair, v: Pair) -> None:
+        """Tell by the law which limits a leg is beyond that is put somewhere."""
+        found = []
+        for stop in self._stops:
+            depth = stop.depth(q)
+            found.append(depth > AT_LIMIT or (depth > -AT_LIMIT and stop.speed(v) > 0.0))
+        if found != self._touched:
+            self._touched = found
+            self._changed()
+
+    def lay(self, watch: Watch) -> None:
+        """Watch the four events: to go beyond a limit, or to come back."""
+        if watch.version == self._version:
+            return
+        watch.version = self._version
+        for index, (stop, beyond) in enumerate(zip(self._stops, self._touched, strict=True)):
+            gain = stop.sign if beyond else -stop.sign
+            if watch.gain[FIRST + index] != gain:
+                watch.lay(FIRST + index, gain, gain * stop.limit)
+
+    def cross(self, event: int) -> None:
+        """A joint has gone beyond a limit, or has come back."""
+        self._touched[event - FIRST] ^= True
+        self._changed()
+
+    def _changed(self) -> None:
+        self._acting = [None, None]
+        for index, (stop, beyond) in enumerate(zip(self._stops, self._touched, strict=True)):
+            if beyond:
+                self._acting[index // 2] = stop
+        self.touched = True in self._touched
+        self._version += 1
+
+    def decide(self, watch: Watch, terms: PairTerms, motor: Pair, q: Pair, v: Pair) -> None:
+        """Let those stops push of which the law asks it, after something has jumped."""
+        if not self.touched:
+            if watch.pushed:
+                self._silence(watch)
+            return
+        watch.pushed = True
+        asked = self._asked(terms, motor, q, v)
+        self._pushing = [push > 0.0 for push in asked]
+        if watch.held:
+            asked = self._asked(self._model.falling, motor, q, v)
+            self._free = [push > 0.0 for push in asked]
+        self._switch(watch)
+
+    def flip(self, watch: Watch, event: int) -> None:
+        """A stop begins or ends to push, or would if the foot were let go."""
+        if event >= Event.KNEE_FREE:
+            self._free[event - Event.KNEE_FREE] ^= True
+        else:
+            self._pushing[event - Event.KNEE_PUSH] ^= True
+        self._switch(watch)
+
+    def guard(self, watch: Watch, terms: PairTerms, motor: Pair, q: Pair, v: Pair) -> None:
+        """Watch the pushes of the joints that are beyond a limit."""
+        found = [(Event.KNEE_PUSH, terms, self._pushing)]
+        if watch.held:
+            found.append((Event.KNEE_FREE, self._model.falling, self._free))
+        for first, inertia, pushing in found:
+            asked = self._asked(inertia, motor, q, v)
+            for joint in (0, 1):
+                stop = self._acting[joint]
+                if stop is None:
+                    watch.lay(first + joint, *OFF)
+                    continue
+                watch.lay(first + joint, -stop.sign if pushing[joint] else stop.sign, 0.0)
+                watch.guard(first + joint, stop.sign * asked[joint])
+
+    def _silence(self, watch: Watch) -> None:
+        """Let no stop act, and watch no push, as no joint is beyond a limit."""
+        watch.pushed = False
+        watch.pars[PUSHES : PUSHES + 4 : 2] = 0.0
+        for event in (Event.KNEE_PUSH, Event.HIP_PUSH):
+            watch.lay(event, *OFF)
+        if watch.held:
+            watch.pars[FREE_PUSHES : FREE_PUSHES + 2] = 0.0
+            for event in (Event.KNEE_FREE, Event.HIP_FREE):
+                watch.lay(event, *OFF)
+
+    def _switch(self, watch: Watch) -> None:
+        for joint in (0, 1):
+            stop = self._acting[joint]
+            place = PUSHES + 2 * joint
+            watch.pars[place] = float(stop is not None and self._pushing[joint])
+            watch.pars[place + 1] = 0.0 if stop is None else stop.limit
+            if watch.held:
+                watch.pars[FREE_PUSHES + joint] = float(stop is not None and self._free[joint])
+
+    def turns(
+        self, ops: Ops, terms: PairTerms, torque: Pair, q: Pair, v: Pair, *, free: bool = False
+    ) -> tuple[list[Term], Pair]:
+        """What the law asks of each joint's stop, in the reading of the events; accelerations.
+
+        Those stops act that are switched on, those of the leg in the air if `free`.
+        """
+        return self._turns(ops, terms, torque, q, v, self._free if free else self._pushing)
+
+    def released(self, terms: PairTerms, torque: Pair, q: Pair, v: Pair) -> Pair:
+        """Accelerations where those stops act, of the limits a joint is known to be beyond, that
+        would push.
+        """
+        return self._turns(SCALAR, terms, torque, q, v, None)[1]
+
+    def _asked(self, terms: PairTerms, motor: Pair, q: Pair, v: Pair) -> list[float]:
+        """What the law asks of each joint's stop, where those act that would push."""
+        torque = self._model.torque(motor, q, v)
+        return self._turns(SCALAR, terms, torque, q, v, None)[0]
+
+    def _turns(
+        self,
+        ops: Ops,
+        terms: PairTerms,
+        torque: Pair,
+        q: Pair,
+        v: Pair,
+        pushing: list[bool] | None,
+    ) -> tuple[list[Term], Pair]:
+        a = pair_acceleration(ops, terms, q, v, torque)
+        found: list[Term] = [0.0, 0.0]
+        for joint in (0, 1):
+            stop = self._acting[joint]
+            if stop is None:
+                continue
+            turn = stop.turn(q, v, a)
+            found[joint] = TIME_CONSTANT**2 * turn
+            if pushing[joint] if pushing is not None else turn > 0.0:
+                share = pair_share(ops, terms, q, stop.normal)
+                a = a[0] + share[0] * turn, a[1] + share[1] * turn
+        return found, a
+
+    def sign(self, joint: int) -> float:
+        """1 for a joint beyond its lower limit, -1 beyond its upper one, else 0."""
+        stop = self._acting[joint]
+        return 0.0 if stop is None else stop.sign

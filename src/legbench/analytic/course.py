@@ -1,0 +1,300 @@
+"""One compiled leg under way: from event to event, in order, each once.
+
+    course = Course(model, probe=(-0.7, 0.7))
+    course.start(state)
+    course.hold(motor)
+    what = course.go(until, Levels(upper=0.5))   # Watched, or None at `until`
+    if what is Watched.CONTACT:
+        course.switch()
+
+A condition that holds already when a piece begins, because something has jumped, is an event at
+that instant. A model on dual numbers (`ops=DUAL`) makes time, angles and rates dual, too: the
+variational equations then go the same way piece by piece (`variation`).
+"""
+
+from typing import final
+
+from legbench.analytic._heyoka import heyoka as hy
+from legbench.analytic.bumpers import Bumpers
+from legbench.analytic.compiled import (
+    TOLERANCE,
+    foot_from_centre,
+    parameters_of,
+    steady_point,
+    terms_of,
+)
+from legbench.analytic.contact import MIN_PHASE
+from legbench.analytic.dual import DUAL, floats, without_gradients
+from legbench.analytic.equations import (
+    Pair,
+    sweep,
+    sweep_rate,
+    touchdown_rates,
+)
+from legbench.analytic.lookout import (
+    CONTACT,
+    KINDS,
+    NEVER,
+    SEEN,
+    SILENT,
+    TIE,
+    TURN,
+    Levels,
+    Lookout,
+)
+from legbench.analytic.model import LegModel
+from legbench.analytic.places import HEIGHT, MOTOR, SPEED, Event, Kind, Watched
+from legbench.analytic.state import LegState, Regime
+from legbench.analytic.variation import Variation
+from legbench.analytic.watch import Watch
+from legbench.errors import PlantFault
+
+MAX_EVENTS = 10_000
+"""Largest number of events that one integration may pass [-]."""
+MAX_STEPS = 100_000
+"""Largest number of steps of one integration [-]; a leg takes about a hundred a second, a diverging
+one any number."""
+TIME_LIMIT = int(hy.taylor_outcome.time_limit)
+EVENTS = len(Event)
+"""Number of events that an integrator may watch [-]."""
+
+
+@final
+class Course:
+    """A leg that is followed through its regimes.
+
+    Attributes:
+        model: the leg.
+        plain: the leg without derivatives, on which decisions are made; so are `plain_q`, `plain_v`
+            and `plain_motor`.
+        time: where it is [s].
+        regime: which equations hold.
+        q: angles [rad].
+        v: rates [rad/s].
+        motor: motor positions [rad].
+        since: time at which the regime began [s].
+        point: the steady point when the present integration began (forward, up) [m].
+        drift: velocity of the steady point then [m/s].
+        watch: the compiled regime.
+        bumpers: the joint stops.
+        lookout: what is watched.
+        told: the state that was last told of, while the leg is still there.
+    """
+
+    def __init__(
+        self,
+        model: LegModel,
+        *,
+        probe: Pair | None = None,
+        tolerance: float = TOLERANCE,
+        min_phase: float = MIN_PHASE,
+    ) -> None:
+        self.model: LegModel = model
+        self.plain: LegModel = without_gradients(model)
+        self.probe: Pair = probe or (0.0, 0.0)
+        self.bumpers = Bumpers(self.plain)
+        self._tolerance, self._min_phase = tolerance, min_phase
+        self._arm = foot_from_centre(model)
+        self._watches: dict[tuple[Regime, bool], Watch] = {}
+        self._variation = Variation(tolerance) if model.ops is DUAL else None
+        self.lookout = Lookout(self, self.plain, min_phase)
+        self.motor: Pair = (0.0, 0.0)
+        self.told: LegState | None = None
+
+    def start(self, state: LegState) -> None:
+        """Put the leg somewhere."""
+        ops, along = self.model.ops, steady_point(self.model, state.regime)
+        x, z = sweep(ops, state.q, along)
+        height = 0.0 if state.regime.stands else state.trunk_pos[1] + z
+        point, drift = (state.trunk_pos[0] + x, height), (0.0, 0.0)
+        if state.regime is Regime.FLIGHT:
+            x, z = sweep_rate(ops, state.q, state.v, along)
+            drift = state.trunk_vel[0] + x, state.trunk_vel[1] + z
+        self.time, self.since = state.time, state.since
+        self._put(state.regime, state.q, state.v, point, drift)
+
+    def fly(self, q: Pair, v: Pair, centre: Pair, velocity: Pair, lean: float = NEVER) -> None:
+        """Put the leg into the air at time zero, by its centre of mass.
+
+        `lean` is the largest |q1 + q2|, twice the polar angle, of a leg that has not fallen [rad].
+        """
+        self.time, self.since = 0.0, -self._min_phase
+        self._put(Regime.FLIGHT, q, v, centre, velocity, lean)
+
+    def state(self) -> LegState:
+        """The leg as a state."""
+        ops, along = self.model.ops, steady_point(self.model, self.regime)
+        (x, z), (dx, dz) = self.centre() if self.watch.flies else (self.point, self.drift)
+        inner, inner_vel = sweep(ops, self.q, along), sweep_rate(ops, self.q, self.v, along)
+        self.told = LegState(
+            time=self.time,
+            regime=self.regime,
+            q=self.q,
+            v=self.v,
+            trunk_pos=(x - inner[0], z - inner[1]),
+            trunk_vel=(dx - inner_vel[0], dz - inner_vel[1]),
+            since=self.since,
+        )
+        return self.told
+
+    def centre(self) -> tuple[Pair, Pair]:
+        """Place [m] and velocity [m/s] of the centre of mass in flight."""
+        (x, z), (dx, dz) = self.point, self.drift
+        elapsed = self.time - self.began
+        fallen = self.model.floating.gravity * elapsed
+        return (x + dx * elapsed, z + (dz - 0.5 * fallen) * elapsed), (dx, dz - fallen)
+
+    def apex_time(self) -> float:
+        """Time at which the centre of mass is highest in this flight [s]."""
+        return self.began + self.drift[1] / self.model.floating.gravity
+
+    def foot_from_centre(self, q: Pair) -> Pair:
+        """Foot tip seen from the centre of mass (forward, up) [m]."""
+        return sweep(self.model.ops, q, self._arm)
+
+    def hold(self, motor: Pair) -> None:
+        """Put the motors somewhere [rad]."""
+        if motor != self.motor:
+            self.motor, self.plain_motor = motor, floats(motor)
+            self.watch.pars[MOTOR : MOTOR + 2] = motor
+            if self.bumpers.touched:
+                self.bumpers.decide(
+                    self.watch, self.terms, self.plain_motor, self.plain_q, self.plain_v
+                )
+
+    def switch(self) -> None:
+        """Go over to the other side of a touchdown or lift-off."""
+        ops, model = self.model.ops, self.model
+        arm, arm_vel = sweep(ops, self.q, self._arm), sweep_rate(ops, self.q, self.v, self._arm)
+        if self.watch.flies:
+            (x, _), (dx, dz) = self.centre()
+            # The ground is where it is, also for a foot that was not looked at on its way through.
+            self.point, self.drift = (x + arm[0], 0.0), (0.0, 0.0)
+            foot_vel = dx + arm_vel[0], dz + arm_vel[1]
+            self.v = touchdown_rates(ops, model.stance, model.floating, self.q, self.v, foot_vel)
+            regime = Regime.STANCE
+        else:
+            self.point = self.point[0] - arm[0], self.point[1] - arm[1]
+            self.drift = -arm_vel[0], -arm_vel[1]
+            regime = Regime.FLIGHT
+        self.since = self.time
+        self._enter(regime)
+
+    def go(self, until: float, levels: Levels = SILENT) -> Watched | None:
+        """Go on to `until` or to the first thing watched, just before it takes effect.
+
+        Raises:
+            PlantFault: the integration failed.
+        """
+        self.told = None
+        if levels is not self.lookout.levels:
+            self.lookout.lay(levels)
+        for _ in range(MAX_EVENTS):
+            event = self.lookout.due()
+            if event is None:
+                end = min(self.lookout.blind, until) if self.time < self.lookout.blind else until
+                if end > self.time:
+                    event = self._piece(end)
+            if event is not None:
+                seen = self._meaning(event)
+                if seen is not None:
+                    return seen
+            elif self.time >= until:
+                return None
+        why = f"integration failed at t = {self.time:.6f} s: the leg chatters"
+        raise PlantFault("integration failed", why)
+
+    def watches(self) -> list[Watch]:
+        """Compiled regimes that the leg has been in so far."""
+        return list(self._watches.values())
+
+    def march(self, step: float, count: int) -> None:
+        """Take steps of one length whatever the error, blind to events."""
+        for _ in range(count):
+            self.watch.integrator.step(step)
+        self.time = self.began + count * step
+        q1, q2, v1, v2 = self.watch.state.tolist()
+        self.q = self.plain_q = (q1, q2)
+        self.v = self.plain_v = (v1, v2)
+
+    def _piece(self, until: float) -> int | None:
+        """Integrate to `until` or to the next event."""
+        integrator = self.watch.integrator
+        # max_steps by its place: by name it costs a fifth of a short call.
+        outcome = int(integrator.propagate_until(float(until - self.began), MAX_STEPS)[0])
+        event = None if outcome == TIME_LIMIT else -outcome - 1
+        if event is not None and not 0 <= event < EVENTS:
+            at = self.began + float(integrator.time)
+            why = f"integration failed at t = {at:.6f} s: the state runs away"
+            raise PlantFault("integration failed", why)
+        q1, q2, v1, v2 = self.watch.state.tolist()
+        self.plain_q, self.plain_v = (q1, q2), (v1, v2)
+        if self._variation is not None:
+            self._variation.carry(self, self.plain_q, self.plain_v, until, event)
+            return event
+        self.q, self.v = self.plain_q, self.plain_v
+        # The end to the last bit, or whoever waits for it waits for ever.
+        self.time = until if event is None else self.began + float(integrator.time)
+        return event
+
+    def _meaning(self, event: int) -> Watched | None:
+        """What an event says to the outside; those of the stops are dealt with here."""
+        watch = self.watch
+        if event in SEEN:
+            return SEEN[event]
+        if event == TURN:
+            self.lookout.turned()
+            return Watched.TURN
+        if event <= Event.HIP_HIGH:
+            self.bumpers.cross(event)
+            self.bumpers.lay(watch)
+            self.bumpers.decide(
+                self.watch, self.terms, self.plain_motor, self.plain_q, self.plain_v
+            )
+        elif event == Event.RECOVER:
+            self._load(held=False)
+        elif event != CONTACT:
+            self.bumpers.flip(watch, event)
+        elif watch.flies or watch.held or self.lookout.released() > -TIE:
+            return Watched.CONTACT
+        else:
+            self._load(held=True)
+        return None
+
+    def _put(
+        self, regime: Regime, q: Pair, v: Pair, point: Pair, drift: Pair, lean: float = NEVER
+    ) -> None:
+        self.q, self.v, self.point, self.drift = q, v, point, drift
+        self.lookout.lean = lean
+        self.bumpers.find(floats(q), floats(v))
+        self._enter(regime)
+
+    def _enter(self, regime: Regime) -> None:
+        """Begin a regime here and now."""
+        self.regime, self.told = regime, None
+        self.terms = terms_of(self.plain, regime)
+        self.lookout.enter(regime, self.since)
+        self._load(held=False)
+
+    def _load(self, *, held: bool) -> None:
+        """Put where the leg is into the integrator of its regime."""
+        watch = self.watch = self._watch_of(held=held)
+        self.plain_q, self.plain_v = floats(self.q), floats(self.v)
+        self.plain_motor = floats(self.motor)
+        self.began = self.time
+        watch.integrator.time = 0.0
+        watch.integrator.reset_cooldowns()
+        watch.state[:] = (*self.plain_q, *self.plain_v)
+        watch.pars[MOTOR : MOTOR + 2] = self.plain_motor
+        if watch.flies:
+            watch.pars[HEIGHT], watch.pars[SPEED] = self.point[1], self.drift[1]
+        self.lookout.move_to(watch)
+        self.bumpers.decide(self.watch, self.terms, self.plain_motor, self.plain_q, self.plain_v)
+
+    def _watch_of(self, *, held: bool) -> Watch:
+        found = self._watches.get((self.regime, held))
+        if found is None:
+            kind = Kind.HELD if held else KINDS.get(self.regime, Kind.FIXED)
+            values = parameters_of(self.plain, self.regime, self.probe)
+            found = self._watches[self.regime, held] = Watch(kind, values, self._tolerance)
+        return found

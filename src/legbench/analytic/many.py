@@ -1,0 +1,105 @@
+"""Many legs at once: the equations of two angles on arrays, integrated in step by Runge-Kutta.
+
+Every leg has its own constants; its numbers do not depend on which others are computed with it.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from legbench.analytic.equations import (
+    ARRAY,
+    Pair,
+    damped,
+    pair_acceleration,
+    pair_solve,
+    spring_torque,
+)
+from legbench.analytic.model import LegModel
+from legbench.analytic.stops import Stop
+from legbench.analytic.terms import PairTerms
+from legbench.signals import Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ManyLegs:
+    """Constants of n legs that are held alike, each an array (n,) where `LegModel` has a number."""
+
+    terms: PairTerms
+    stiffness: Pair
+    """Stiffness of the springs on q1 and q2 [N m/rad]."""
+    damping: Pair
+    """Damping of q1 and q2 [N m s/rad]."""
+    stops: tuple[Stop, ...]
+
+    @classmethod
+    def of(cls, models: Sequence[LegModel], *, standing: bool) -> "ManyLegs":
+        """Collect the legs of some models, all with stops or all without.
+
+        They stand on a pinned foot, or hang from a fixed trunk if not `standing`.
+        """
+        pairs = [model.stance if standing else model.hanging for model in models]
+        stops = [
+            Stop(sign=few[0].sign, limit=np.array([stop.limit for stop in few]), on=few[0].on)  # pyright: ignore[reportArgumentType]
+            for few in zip(*(model.stops for model in models), strict=True)
+        ]
+        return cls(
+            terms=PairTerms(
+                inertia=_columns([terms.inertia for terms in pairs]),
+                coupling=np.array([terms.coupling for terms in pairs]),  # pyright: ignore[reportArgumentType]
+                moment=_columns([terms.moment for terms in pairs]),
+            ),
+            stiffness=_columns([model.stiffness for model in models]),
+            damping=_columns([model.damping for model in models]),
+            stops=tuple(stops),
+        )
+
+    def acceleration(self, motor: Pair, q: Pair, v: Pair) -> Pair:
+        """Accelerations of q1 and q2, joint stops included, two arrays (n,) [rad/s^2].
+
+        A stop acts by the law of `analytic.stops`, on the legs that are beyond it.
+        """
+        torque = damped(spring_torque(self.stiffness, motor, q), self.damping, v)
+        a = pair_acceleration(ARRAY, self.terms, q, v, torque)
+        for stop in self.stops:
+            beyond = stop.depth(q) > 0.0
+            if beyond.any():
+                answer = pair_solve(ARRAY, self.terms, q, stop.normal)
+                force = np.where(beyond, np.maximum(stop.push(q, v, a, answer), 0.0), 0.0)
+                a = a[0] + answer[0] * force, a[1] + answer[1] * force
+        return a
+
+
+def _columns(pairs: Sequence[Pair]) -> Pair:
+    first, second = np.array(pairs).T
+    return first, second
+
+
+def motion(
+    legs: ManyLegs, joint_pos: Floats, motor_pos: Floats, step: float, count: int
+) -> Iterator[tuple[Floats, Floats]]:
+    """Angles and rates (n, 2) after each of `count` steps of `step` [s], from rest at `joint_pos`.
+
+    Classical Runge-Kutta of order 4, motors held at `motor_pos` (n, 2) [rad]. A leg that runs away
+    becomes infinite or NaN, and no other leg notices.
+    """
+    motor = (motor_pos[:, 0], motor_pos[:, 1])
+    q, v = joint_pos.T.copy(), np.zeros_like(joint_pos.T)
+
+    def slope(at: Floats, rate: Floats) -> Floats:
+        return np.stack(legs.acceleration(motor, (at[0], at[1]), (rate[0], rate[1])))
+
+    half = 0.5 * step
+    with np.errstate(all="ignore"):
+        for _ in range(count):
+            a1 = slope(q, v)
+            v2 = v + half * a1
+            a2 = slope(q + half * v, v2)
+            v3 = v + half * a2
+            a3 = slope(q + half * v2, v3)
+            v4 = v + step * a3
+            a4 = slope(q + step * v3, v4)
+            q = q + step / 6.0 * (v + 2.0 * (v2 + v3) + v4)
+            v = v + step / 6.0 * (a1 + 2.0 * (a2 + a3) + a4)
+            yield q.T, v.T

@@ -1,0 +1,76 @@
+"""What events look at, on dual numbers: the compiled readings once more, to differentiate them."""
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from legbench.analytic.compiled import foot_from_centre, terms_of
+from legbench.analytic.dual import DUAL
+from legbench.analytic.equations import Term, contact_force, free_foot_acceleration, sweep
+from legbench.analytic.places import Event
+from legbench.design.statics import GRAVITY
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from legbench.analytic.course import Course
+
+
+def read(
+    course: "Course", event: int, state: "Sequence[Term]", elapsed: Term, *, plain: bool = False
+) -> Term:
+    """Reading of an event, in the unit of its level.
+
+    Args:
+        course: the leg, in the regime and with the stops of the piece that the event ends.
+        event: one of `places.Event`.
+        state: angles and rates (4,) [rad, rad/s].
+        elapsed: time since the piece began [s].
+        plain: take everything else without its derivatives.
+    """
+    q1, q2, v1, v2 = state
+    match event:
+        case Event.RISE | Event.FALL:
+            return course.probe[0] * q1 + course.probe[1] * q2
+        case Event.TURN:
+            return course.probe[0] * v1 + course.probe[1] * v2
+        case Event.FELL | Event.FELL_BACK:
+            return q1 + q2
+        case Event.KNEE_LOW | Event.KNEE_HIGH:
+            return q2 - q1
+        case Event.HIP_LOW | Event.HIP_HIGH:
+            return q1
+        case Event.CONTACT if course.watch.flies:
+            return _height(course, state, elapsed, plain=plain)
+        case _:
+            return _pressed(course, event, state, plain=plain)
+
+
+def _height(course: "Course", state: "Sequence[Term]", elapsed: Term, *, plain: bool) -> Term:
+    """Height of the foot in flight [m]."""
+    model, z, dz = course.model, course.point[1], course.drift[1]
+    if plain:
+        model, z, dz = course.plain, float(z), float(dz)
+    centre = z + (dz - 0.5 * model.floating.gravity * elapsed) * elapsed
+    return centre + sweep(DUAL, (state[0], state[1]), foot_from_centre(model))[1]
+
+
+def _pressed(course: "Course", event: int, state: "Sequence[Term]", *, plain: bool) -> Term:
+    """What the law asks of a stop, the force on the ground, or the rise of the released foot."""
+    model = replace(course.plain, ops=DUAL) if plain else course.model
+    motor = course.plain_motor if plain else course.motor
+    q, v = (state[0], state[1]), (state[2], state[3])
+    free = event >= Event.KNEE_FREE or (event == Event.CONTACT and course.watch.held)
+    terms = model.falling if free else terms_of(model, course.regime)
+    turns, a = course.bumpers.turns(DUAL, terms, model.torque(motor, q, v), q, v, free=free)
+    match event:
+        case Event.KNEE_PUSH | Event.HIP_PUSH:
+            joint = event - Event.KNEE_PUSH
+            return course.bumpers.sign(joint) * turns[joint]
+        case Event.KNEE_FREE | Event.HIP_FREE:
+            joint = event - Event.KNEE_FREE
+            return course.bumpers.sign(joint) * turns[joint]
+        case Event.CONTACT if free:
+            return free_foot_acceleration(DUAL, model.floating, q, v, a)[1] / GRAVITY
+        case _:
+            force = contact_force(DUAL, model.floating, q, v, a)[1]
+            return force / (model.floating.mass * GRAVITY)

@@ -1,0 +1,1 @@
+"""Electronic data sheets of drives (CiA 306): reading, judging, and proposing a bus file."""

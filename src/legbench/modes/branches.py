@@ -1,0 +1,121 @@
+"""Families that branch off where a mode changes its stability.
+
+At such an orbit a multiplier is +1, or -1, which is +1 for the orbit twice around. Its eigenvector
+shows where other closed orbits lie: straight aside if they stop at both ends like the mode, along
+the speeds if they circle. Both sides are tried; where the leg is symmetric they are mirror images.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from legbench.modes.continuation import AGAIN, LOST, MANY, Solution, Stride, trace
+from legbench.modes.family import Family, Passing
+from legbench.modes.monodromy import energy_slope
+from legbench.modes.periodic import CLOSED, PeriodicOrbit, Shooting
+from legbench.signals import Floats
+
+ASIDE = (0.02, 0.04, 0.01, 0.08)
+"""Distances from the mode at which a branch is looked for, in turn, scaled [-]."""
+LEFT = 0.3
+"""Share of that distance that a solution must keep, or it has fallen back on the mode [-]."""
+MOST = 25
+"""Orbits of a branch that are followed [-]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Branch:
+    """Orbits of another kind that leave a mode where its stability changes."""
+
+    passing: Passing
+    side: int
+    """1 or -1: which way along the eigenvector."""
+    orbits: tuple[PeriodicOrbit, ...]
+    """Orbits of the branch, by growing distance from the mode."""
+    ended: str
+    """Reason why there are no more, in words."""
+
+
+def branches(family: Family, *, most: int = MOST) -> tuple[Branch, ...]:
+    """Branches at all changes of stability of a family."""
+    found = []
+    for passing in family.passings:
+        if passing.changes:
+            for side in (1, -1):
+                branch = branch_at(family, passing, side, most=most)
+                if branch is not None:
+                    found.append(branch)
+    return tuple(found)
+
+
+def branch_at(family: Family, passing: Passing, side: int, *, most: int = MOST) -> Branch | None:
+    """The branch on one side of an orbit at which stability changes; none if nothing is found."""
+    carrier, orbit = family.shooting.carrier, passing.orbit
+    period = passing.periods * orbit.period
+    half = 0.25 * orbit.period
+    # Not at an end: there the speeds vanish, and with them the phase condition.
+    start = carrier.path(np.array([*orbit.start, 0.0, 0.0]), np.array([0.0, half]))[-1]
+    shooting = Shooting(carrier, orbit.period, start)
+    centre = shooting.unknown_of(start, period)
+    aside = np.zeros(6)
+    aside[:4] = side * _eigenvector(shooting, start, orbit.period, passing.periods)
+    for distance in ASIDE:
+        guess = centre + distance * aside
+        solved = shooting.correct(guess, aside)
+        if solved is not None and _left(solved.unknown - centre, aside, distance):
+            return _followed(shooting, solved, solved.unknown - centre, passing, side, most)
+    return None
+
+
+def _left(away: Floats, aside: Floats, distance: float) -> bool:
+    """Whether a solution has stayed away from the mode, and near enough to belong to it."""
+    across = float(np.linalg.norm(away[:4] - (away[:4] @ aside[:4]) * aside[:4]))
+    return abs(float(away @ aside)) > LEFT * distance and across < 10.0 * distance
+
+
+def _eigenvector(shooting: Shooting, start: Floats, period: float, periods: int) -> Floats:
+    """Direction (4,), scaled, in which neighbours of the same energy close up best."""
+    carrier, size = shooting.carrier, shooting.scale[:4]
+    matrix = carrier.carry(start, period).by_start * size / size[:, np.newaxis]
+    moving = carrier.rates(start) / size
+    energy = energy_slope(carrier, start) * size
+    known = np.stack([moving / np.linalg.norm(moving), energy / np.linalg.norm(energy)])
+    basis = np.linalg.svd(known)[2][2:]
+    sign = 1.0 if periods == 1 else -1.0
+    reduced = basis @ matrix @ basis.T - sign * np.eye(2)
+    return np.linalg.svd(reduced)[2][-1] @ basis
+
+
+def _followed(
+    shooting: Shooting,
+    first: Solution,
+    along: Floats,
+    passing: Passing,
+    side: int,
+    most: int,
+) -> Branch:
+    orbits = [shooting.orbit(first.unknown)]
+    halted = ""
+
+    def visit(found: Solution) -> str | None:
+        nonlocal halted
+        orbit = shooting.orbit(found.unknown)
+        if orbit.outside:
+            halted = f"{orbit.outside} beyond {orbits[-1].energy:.4g} J"
+            return AGAIN
+        orbits.append(orbit)
+        shooting.refer(orbit.start)
+        return None
+
+    begin = Solution(
+        unknown=first.unknown,
+        slope=first.slope,
+        tangent=first.tangent if first.tangent @ along > 0.0 else -first.tangent,
+    )
+    ended = trace(shooting.equations, begin, Stride(first=0.03, most=most), CLOSED, visit)
+    return Branch(
+        passing=passing,
+        side=side,
+        orbits=tuple(orbits),
+        ended={AGAIN: halted, LOST: "no orbit continues it", MANY: f"{most} orbits"}[ended],
+    )

@@ -1,0 +1,137 @@
+"""Flow of the two angles between events, with its derivatives: periodic orbits are made of it.
+
+One integrator serves every leg and every way of holding it, because inertias, gravity, springs,
+dampers and motors are parameters of it at run time. Joint stops do not act; who asks for an orbit
+says whether it stays within them.
+"""
+
+from dataclasses import dataclass
+from typing import Any, final
+
+import numpy as np
+
+from legbench.analytic import equations
+from legbench.analytic.compiled import varied_integrator
+from legbench.analytic.course import TIME_LIMIT
+from legbench.analytic.equations import Pair
+from legbench.analytic.places import DAMPING, MOTOR, PUSHES, SMOOTH
+from legbench.errors import ConfigError
+from legbench.modes.scene import Scene
+from legbench.signals import Floats
+
+STATES = 4
+"""Two angles and their rates [-]."""
+TOLERANCE = 1e-15
+"""Error of a step over the size of the state [-]."""
+MAX_STEPS = 20_000
+"""Largest number of steps of one integration [-]; an orbit takes some hundred."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Carried:
+    """A state after some time, and how it depends on where and how it began."""
+
+    end: Floats
+    """q1, q2, v1, v2 (4,) [rad, rad/s]."""
+    by_start: Floats
+    """Derivative by the state at the start (4, 4)."""
+    by_parameters: Floats
+    """Derivative by the parameters: inertias (2), coupling, gravity (2), stiffness (2), damping
+    (2), motors (2) (4, 11)."""
+    rate: Floats
+    """Time derivative of the state at the end (4,)."""
+
+
+@final
+class Carrier:
+    """A leg of a scene, on its way.
+
+    Args:
+        scene: the leg and how it is held.
+        damping: of both joints [N m s/rad]; none by default.
+    """
+
+    def __init__(self, scene: Scene, damping: Pair = (0.0, 0.0)) -> None:
+        self.scene = scene
+        self.damping: Floats = np.array(damping)
+        self._integrator = varied_integrator(TOLERANCE)
+        terms = scene.terms
+        self._parameters = np.array(
+            [
+                *terms.inertia,
+                terms.coupling,
+                *terms.moment,
+                *scene.model.stiffness,
+                *damping,
+                *scene.motor,
+            ]
+        )
+
+    def rates(self, state: Floats, extra: float = 0.0, motor: Floats | None = None) -> Floats:
+        """Time derivative (4,) of a state (4,), both dampers `extra` [N m s/rad] stronger."""
+        q1, q2, v1, v2 = state.tolist()
+        model, held = self.scene.model, self.scene.motor if motor is None else motor
+        torque = equations.damped(
+            equations.spring_torque(model.stiffness, (held[0], held[1]), (q1, q2)),
+            (self.damping[0] + extra, self.damping[1] + extra),
+            (v1, v2),
+        )
+        a = equations.pair_acceleration(
+            equations.SCALAR, self.scene.terms, (q1, q2), (v1, v2), torque
+        )
+        return np.array([v1, v2, *a])
+
+    def carry(
+        self, start: Floats, time: float, *, extra: float = 0.0, motor: Floats | None = None
+    ) -> Carried:
+        """Follow a state (4,) for a time [s], both dampers `extra` [N m s/rad] stronger.
+
+        The motors stand at `motor` (2,) [rad], by default where the scene has them.
+
+        Raises:
+            ConfigError: the leg runs away from there.
+        """
+        integrator = self._load(start, extra, motor)
+        outcome = int(integrator.propagate_until(float(time), MAX_STEPS)[0])
+        state = integrator.state.copy()
+        if outcome != TIME_LIMIT or not np.all(np.isfinite(state)):
+            raise ConfigError(f"the leg cannot be followed for {time:.3g} s: it runs away")
+        slopes = state[STATES:].reshape(STATES, STATES + SMOOTH)
+        return Carried(
+            end=state[:STATES],
+            by_start=slopes[:, :STATES],
+            by_parameters=slopes[:, STATES:],
+            rate=self.rates(state[:STATES], extra, motor),
+        )
+
+    def path(
+        self,
+        start: Floats,
+        times: Floats,
+        *,
+        extra: float = 0.0,
+        motor: Floats | None = None,
+    ) -> Floats:
+        """States (n, 4) at times (n,) that rise from 0 [s].
+
+        Raises:
+            ConfigError: the leg runs away from there.
+        """
+        integrator = self._load(start, extra, motor)
+        outcome, *_, states = integrator.propagate_grid(times)
+        if int(outcome) != TIME_LIMIT:
+            raise ConfigError(f"the leg cannot be followed for {times[-1]:.3g} s: it runs away")
+        return np.asarray(states)[:, :STATES]
+
+    def _load(self, start: Floats, extra: float, motor: Floats | None) -> Any:
+        """The integrator at a start, its derivatives those of the start by itself."""
+        integrator = self._integrator
+        integrator.time = 0.0
+        integrator.state[:STATES] = start
+        integrator.state[STATES:] = np.eye(STATES, STATES + SMOOTH).ravel()
+        integrator.pars[:SMOOTH] = self._parameters
+        integrator.pars[PUSHES:] = 0.0
+        integrator.pars[DAMPING:MOTOR] += extra
+        if motor is not None:
+            integrator.pars[MOTOR:SMOOTH] = motor
+        return integrator

@@ -1,0 +1,150 @@
+"""No event of a hop is lost, doubled or invented, and no stop pulls."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from legbench.analytic import LegModel
+from legbench.control import JumpConfig
+from legbench.design import LegDesign, load_design
+
+pytest.importorskip("heyoka")
+
+from brute_basins import differing, random_question  # pyright: ignore[reportMissingImports]
+from random_hops import compare, random_case  # pyright: ignore[reportMissingImports]
+
+from legbench.analytic.course import Course
+from legbench.analytic.lookout import Levels
+from legbench.analytic.places import PUSHES, Event
+from legbench.analytic.taylor import MAP_TOLERANCE, TaylorLeg, Watched
+from legbench.modes.drive import JumpLaw, Passive
+from legbench.modes.hop import FALLEN, Apex, Ending, return_map, settle
+
+MODELS = Path(__file__).parents[2] / "models"
+PROBE = (-math.sqrt(0.5), math.sqrt(0.5))
+
+
+def design_of(name: str) -> LegDesign:
+    return load_design(MODELS / f"{name}.toml")
+
+
+@pytest.mark.parametrize(
+    ("name", "z2", "dz2", "apex"),
+    [
+        ("optimal", 0.65, 0.1, 0.30088),
+        ("optimal", 0.8, 0.2, 0.43182),
+        ("table2", 0.55, 0.1, 0.29171),
+        ("table2", 0.8, 0.2, 0.43138),
+    ],
+)
+@pytest.mark.parametrize("tolerance", [1e-15, MAP_TOLERANCE])
+def test_legs_settle_that_cross_a_level_up_and_down_in_one_step(
+    name: str, z2: float, dz2: float, apex: float, tolerance: float
+) -> None:
+    design = design_of(name)
+    law = JumpLaw(JumpConfig(z2=z2, dz2=dz2), design)
+    leg = TaylorLeg(LegModel.of(design), probe=law.probe, tolerance=tolerance)
+    half = (z2 + dz2) * math.sqrt(0.5)
+    q = (-half, half)
+    standing = leg.model.mass_centre_from_hip(q)[1] - leg.model.foot_from_hip(q)[1]
+    start = Apex(height=standing + 0.03, speed=0.0, z1=0.0, z2=z2 + dz2, dz1=0.0, dz2=0.0)
+    apexes = settle(leg, law, start, 80)
+    assert len(apexes) == 81
+    assert abs(apexes[-1].height - apex) < 1e-5
+
+
+@pytest.mark.parametrize("first", range(0, 200, 40))
+def test_random_hops_are_told_as_dense_events_tell_them(first: int) -> None:
+    errors = []
+    for seed in range(first, first + 40):
+        verdict = compare(random_case(np.random.default_rng(seed)), MAP_TOLERANCE)
+        assert verdict is not None
+        assert verdict.same or verdict.grazes, (seed, verdict.why)
+        assert verdict.error < 1e-5 or verdict.grazes, (seed, verdict.why)
+        errors.append(verdict.error)
+    assert np.median(errors) < 1e-7
+
+
+def swinging() -> Course:
+    """A leg that is thrown against its knee stop and comes back, time and again."""
+    course = Course(LegModel.of(design_of("prototype"), undamped=True), probe=PROBE)
+    course.fly((-0.4, 0.4), (9.0, -7.0), (0.0, 3.0), (0.0, 0.0))
+    course.hold((-0.36, 0.36))
+    return course
+
+
+@pytest.mark.parametrize("tolerance", [1e-15, MAP_TOLERANCE])
+def test_a_stop_never_pulls(tolerance: float) -> None:
+    random, pushed = np.random.default_rng(41), 0
+    model = LegModel.of(design_of("prototype"))
+    for _ in range(40):
+        course = Course(model, tolerance=tolerance)
+        half = float(random.uniform(0.18, 0.5))
+        v1, v2 = (float(x) for x in random.uniform(-15.0, 15.0, 2))
+        course.fly((-half, half), (v1, v2), (0.0, 5.0), (0.0, 0.0))
+        motor = float(random.uniform(0.05, 0.4))
+        course.hold((-motor, motor))
+        for tick in range(1, 401):
+            course.go(5e-4 * tick)
+            for joint in (0, 1):
+                if course.watch.pars[PUSHES + 2 * joint] == 0.0:
+                    continue
+                pushed += 1
+                torque = model.torque(course.motor, course.q, course.v)
+                turns, _ = course.bumpers.turns(
+                    model.ops, model.falling, torque, course.q, course.v
+                )
+                assert turns[joint] > -1e-9
+    assert pushed > 100
+
+
+def test_a_level_is_crossed_as_often_as_the_probe_crosses_it() -> None:
+    course, level = swinging(), 0.5
+    crossings, wanted = [], Levels(lower=level)
+    while course.time < 0.5:
+        what = course.go(0.5, wanted)
+        if what is None:
+            break
+        crossings.append(what)
+        wanted = Levels(lower=level) if what is Watched.RISE else Levels(upper=level)
+    other, values = swinging(), []
+    for tick in range(20_001):
+        other.go(2.5e-5 * tick)
+        values.append(PROBE[0] * other.q[0] + PROBE[1] * other.q[1] - level)
+    signs = np.sign(values)
+    assert len(crossings) == np.count_nonzero(signs[1:] != signs[:-1]) >= 10
+    assert crossings[::2] == [crossings[0]] * len(crossings[::2])
+
+
+def test_a_condition_that_holds_already_is_an_event_at_once() -> None:
+    course = swinging()
+    assert course.go(0.1, Levels(upper=0.2)) is Watched.RISE
+    assert course.time == 0.0
+    assert course.go(0.1, Levels(lower=0.9)) is Watched.FALL
+    assert course.time == 0.0
+
+
+def test_a_leg_that_swings_over_between_two_events_has_fallen() -> None:
+    design = design_of("optimal")
+    held = Passive((-0.5, 0.5))
+    leg = TaylorLeg(LegModel.of(design, stops=False, undamped=True), probe=held.probe)
+    height = 3.0 - leg.model.foot_from_hip(held.motor)[1]
+    start = Apex(height=height, speed=0.0, z1=0.0, z2=0.7, dz1=30.0, dz2=0.0)
+    done = return_map(leg, held, start)
+    assert done.ending is Ending.FELL
+    course = leg.course
+    assert abs(abs(course.q[0] + course.q[1]) - 2.0 * FALLEN) < 1e-12
+    assert done.duration == course.time
+
+
+def test_every_reading_has_its_place() -> None:
+    assert [int(event) for event in Event] == list(range(len(Event)))
+
+
+@pytest.mark.parametrize(("name", "seed"), [("prototype", 3), ("optimal", 4)])
+def test_cells_of_a_basin_are_those_of_brute_force(name: str, seed: int) -> None:
+    question = random_question(design_of(name), seed, 9)
+    wrong, _ = differing(question, 3, seed)
+    assert wrong == []
