@@ -156,10 +156,12 @@ def arguments_with(flags: list[GuestFlag], defaults: Mapping[str, Any]) -> type[
 def quick(hint: Any) -> Any:
     """Type that tyro understands without its type checker, which is slow to import.
 
-    An enum becomes the choice of its values, `X | Y` becomes `Union[X, Y]`.
+    An enum becomes the choice of its values, `X | Y` becomes `Union[X, Y]`, None first: tyro takes
+    the first that a default fits, and asks its type checker about tuples.
     """
     if get_origin(hint) in (Union, UnionType):
-        return Union[tuple(quick(each) for each in get_args(hint))]  # noqa: UP007
+        members = sorted(get_args(hint), key=lambda each: each is not NoneType)
+        return Union[tuple(quick(each) for each in members)]  # noqa: UP007
     if isinstance(hint, type) and issubclass(hint, Enum):
         return Literal[tuple(member.value for member in hint)]  # pyright: ignore
     return hint

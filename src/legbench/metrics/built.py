@@ -1,16 +1,11 @@
 """The leg of a simulated run as it was built, and what its encoders would have shown unharmed."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
 from legbench.design import LegDesign
-from legbench.errors import ConfigError, FormatError
-from legbench.imperfections import Imperfections
 from legbench.metrics.source import Recorded
-from legbench.recording.description import RunDescription
 from legbench.signals import Floats
 
 
@@ -38,30 +33,10 @@ class Built:
         return 0.5 * np.square(self.stretch(shaft, joint)) @ np.asarray(self.design.stiffness)
 
 
-def imperfections_of(run: RunDescription) -> Imperfections:
-    """Imperfections that a run says it had; an older run, and one on the bench, says none.
-
-    Raises:
-        FormatError: no leg can have what it says.
-    """
-    table = run.experiment.get("imperfections", {})
-    known = {entry.name for entry in fields(Imperfections)}
-    if not isinstance(table, Mapping) or not known.issuperset(table):
-        raise FormatError(f"manifest imperfections are {table!r}; known are {', '.join(known)}")
-    try:
-        return Imperfections(**{name: _tuples(value) for name, value in table.items()})
-    except (ConfigError, TypeError, ValueError) as error:
-        raise FormatError(f"manifest imperfections: {error}") from None
-
-
-def _tuples(value: Any) -> Any:
-    return tuple(map(_tuples, value)) if isinstance(value, list) else value
-
-
 def built_of(recording: Recorded) -> Built:
     """The true leg of a simulated run, from what the run says of its imperfections."""
     run = recording.description
-    found = imperfections_of(run)
+    found = run.imperfections
     friction = np.asarray(found.coulomb_friction or (0.0, 0.0))
     guide = np.asarray(found.guide_damping or (0.0, 0.0))
     noisy = found.motor_noise is not None or found.link_noise is not None
