@@ -167,13 +167,15 @@ def describe(manifest: Mapping[str, Any], fallback_id: str = "") -> RunDescripti
         period=head.number("period"),
         looks_only=head.table("plant").table("bus").entries.get("read_only") is True,
         initial_state=_initial_state(head.table("initial_state")),
-        versions=MappingProxyType(
-            {str(name): str(text) for name, text in provenance.table("versions").entries.items()}
-        ),
+        versions=_versions(provenance.table("versions")),
         model_hash=provenance.text("mjcf_sha256"),
         imperfections=parse_imperfections(experiment.table("imperfections").entries),
         experiment=MappingProxyType(dict(experiment.entries)),
     )
+
+
+def _versions(table: Table) -> Mapping[str, str]:
+    return MappingProxyType({str(name): str(text) for name, text in table.entries.items()})
 
 
 def layout_of(manifest: Mapping[str, Any]) -> Layout:

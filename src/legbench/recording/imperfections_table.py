@@ -7,7 +7,6 @@ from typing import Any, Final
 from legbench.errors import ConfigError, FormatError
 from legbench.imperfections import Imperfections
 
-
 SHAPES: Final = {
     "trunk_mass_error": (),
     "mass_error": (3,),
