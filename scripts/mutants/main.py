@@ -30,6 +30,7 @@ from trial import PACKAGE, ROOT, Fault, Passed, noticed, prepare, trace
 EQUIVALENT = Path(__file__).with_name("equivalent.toml")
 TESTS = {
     "drives": ("tests/drives/test_[!c]*.py", "tests/drives/test_c[!a]*.py"),
+    "limits": ("tests/drives/test_[!c]*.py", "tests/drives/test_c[!a]*.py"),
     "commissioning": ("tests/drives/test_*.py",),
     "plant": ("tests/plant/test_*.py", "tests/drives/test_can_*.py"),
     "metrics": ("tests/metrics/test_*.py",),

@@ -97,7 +97,7 @@ def test_bars_converge_to_the_equations_as_their_mass_vanishes(kind: SetupKind) 
 def test_bars_with_their_mass_are_the_bars_of_the_equations(kind: SetupKind) -> None:
     setup, start, motor = case(kind)
     linkage = Linkage()
-    bars = Bars(density=linkage.bar_density, crank_length=linkage.crank_length)
+    bars = Bars(density=linkage.density(DESIGN), crank_length=linkage.crank_length)
     wanted = rollout(AnalyticPlant(DESIGN, setup, start, accuracy=FINE, bars=bars), motor)
     errors = [
         float(np.max(np.abs(rollout(simulated(setup, start, linkage, step), motor) - wanted)))

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import mujoco
 import pytest
-from commands import DESIGN, called, started
+from commands import DESIGN, MODELS, called, started
 
 from legbench import __version__
 from legbench.cli import COMMANDS
@@ -145,6 +145,59 @@ def test_replay_rates_again_what_run_rated(
     assert summary["rating_stance"]
     assert summary["rating_flight"]
     assert "P^r stance" in called(capfd, "replay", run_folder).out
+
+
+def test_a_run_whose_numerics_are_unsound_says_so(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Loop closures of 5 ms, a habit of other models, dissipate; the run ends all the same."""
+    words = (
+        "run",
+        "position-jump",
+        *DESIGN,
+        "--setup",
+        "ffs",
+        "--duration",
+        "1",
+        "--out",
+        tmp_path,
+    )
+    told = {}
+    for kind, settings in (
+        ("sound", ()),
+        ("unsound", ("--set", "numerics.loop_solref=[0.005, 1.0]")),
+    ):
+        done = called(capfd, *words, *settings, "--json")
+        told[kind] = json.loads(done.out)
+        assert (done.status, told[kind]["status"]) == (0, "complete")
+        assert told[kind]["numerics"] == kind
+        assert ("unsound" in done.err) is (kind == "unsound")
+    assert told["sound"]["warnings"] == []
+    energy, gap = told["unsound"]["warnings"]
+    assert energy.startswith("the numerics made or lost")
+    assert "um; up to 20 um" in gap
+    table = called(capfd, "replay", told["unsound"]["run"]).out
+    assert "complete, but its numerics are unsound" in table
+    assert energy in table
+
+
+def test_a_fixed_setup_is_rated_about_both_references(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Gravity's sag hides all else about the motor; about the equilibrium the rating decays."""
+    words = ("run", "position-jump", "--design", MODELS / "prototype.toml", "--setup", "ffs")
+    done = called(capfd, *words, "--duration", "3", "--out", tmp_path, "--json")
+    told = json.loads(done.out)
+    assert told["rating_reference"] == "equilibrium"
+    assert told["rating_periods"] == told["rating_periods_equilibrium"]
+    assert len(told["rating_periods"]) == len(told["rating_periods_motor"]) >= 4
+    assert min(told["rating_periods_motor"]) > 0.9999
+    assert told["rating_periods"][-1] < 0.995
+    lines = called(capfd, "replay", told["run"]).out.splitlines()
+    first, second = (line for line in lines if line.startswith("P^r periods"))
+    assert first.endswith("about the equilibrium")
+    assert second.endswith("about the motor")
+    assert "1.0000 " not in second
 
 
 def test_a_torn_run_is_replayed_as_far_as_it_goes_and_recovered(

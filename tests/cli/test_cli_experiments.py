@@ -169,7 +169,7 @@ def test_a_guests_flag_that_is_taken_keeps_its_prefix(
         ("slew_rate = 30.0", "slew_rate = 0", ("servo: servo slew_rate is 0 rad/s; it must be",)),
         ('kind = "ffs"', 'kind = "moon"', ("setup.kind: is 'moon'; known are hfts, vfts, ffs",)),
         ("bang-bang", "bang", ("no controller 'bang'; there are jump, bang-bang",)),
-        ("format = 1", "format = 2", ("format 2 was written by a newer legbench", "upgrade")),
+        ("format = 1", "format = 3", ("format 3 was written by a newer legbench", "upgrade")),
         ("leg.toml", "log.toml", ("design: ", "log.toml: no such design file")),
         ("[setup]", "[setup", ("not valid TOML",)),
     ],

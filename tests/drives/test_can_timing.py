@@ -131,8 +131,12 @@ def test_an_answer_that_is_missing_leaves_no_kink_in_joint_vel() -> None:
 
 def test_on_the_grid_nothing_has_changed() -> None:
     """The low-pass over even periods, computed here as its formula says."""
-    gain = 1.0 - np.exp(-2.0 * np.pi * VELOCITY_BANDWIDTH * load_bus(BUS).period)
-    with stage(experiment(BangBangConfig(), 0.4)) as it:
+    bench = load_bus(BUS)
+    # The answer to a request of a temperature may hold up a SYNC and cost an answer of the next
+    # cycle, which the estimate then bridges; here every reading is to be fresh.
+    nodes = tuple(replace(node, temperature_object=None) for node in bench.nodes)
+    gain = 1.0 - np.exp(-2.0 * np.pi * VELOCITY_BANDWIDTH * bench.period)
+    with stage(experiment(BangBangConfig(), 0.4), config=replace(bench, nodes=nodes)) as it:
         seen = it.plant.reset()
         it.controller.reset(seen)
         velocity, links = seen.joint_vel, seen.joint_pos

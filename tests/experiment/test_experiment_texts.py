@@ -8,6 +8,7 @@ import pytest
 from experiments import CONTROLLERS, PLANTS, experiment
 
 from legbench.design.setup import Setup, SetupKind
+from legbench.errors import ConfigError
 from legbench.experiment import (
     Experiment,
     canonical_text,
@@ -17,12 +18,16 @@ from legbench.experiment import (
     save_experiment,
 )
 from legbench.imperfections import Imperfections
+from legbench.mjcf import Linkage, Numerics
 from legbench.servo import ServoConfig
 
 GOLDEN = Path(__file__).parent / "golden"
+MODELS = Path(__file__).parents[2] / "models"
 FULL = replace(
     experiment("position-jump", "sim"),
     setup=Setup(kind=SetupKind.FFS, boom_radius=1.5),
+    linkage=Linkage(bar_density=0.006),
+    numerics=Numerics(timestep=0.00025, loop_solref=(0.00025, 1.0)),
     servo=ServoConfig(slew_rate=5.0, bandwidth=30.0, delay_cycles=2, encoder_counts=4096),
 )
 CASES = {
@@ -57,6 +62,26 @@ CASES = {
 def test_the_canonical_text_is_what_it_always_was(name: str, chosen: Experiment) -> None:
     golden = (GOLDEN / f"{name}.txt").read_text(encoding="utf-8")
     assert canonical_text(chosen) == golden
+
+
+def test_what_format_1_left_unsaid_keeps_its_meaning(tmp_path: Path) -> None:
+    """Format 1 had one step, one bar and one reference for every leg; format 2 fits them."""
+    old, new = tmp_path / "old.toml", tmp_path / "new.toml"
+    design = MODELS / "optimal.toml"
+    rest = f'design = "{design}"\ncontroller.kind = "jump"\n'
+    old.write_text(f"format = 1\n{rest}", encoding="utf-8")
+    new.write_text(f"format = 2\n{rest}", encoding="utf-8")
+    before, now = load_experiment(old), load_experiment(new)
+    assert before.numerics == Numerics(timestep=0.00025, loop_solref=(0.00025, 1.0))
+    assert before.linkage == Linkage(bar_density=0.006)
+    assert before.conventions.rating_reference == "motor"
+    assert (now.numerics, now.linkage) == (Numerics(), Linkage())
+    assert now.conventions.rating_reference == "setup"
+    old.write_text(f"format = 1\n{rest}numerics.timestep = 0.0005\n", encoding="utf-8")
+    assert load_experiment(old).numerics.timestep == 0.0005
+    old.write_text(f"format = 1\n{rest}numerics = 3\n", encoding="utf-8")
+    with pytest.raises(ConfigError, match="numerics"):
+        load_experiment(old)
 
 
 def test_the_file_says_units() -> None:

@@ -44,7 +44,7 @@ def test_literal_modes_are_the_polar_angle_and_the_half_angle() -> None:
         ({"design": {}}, r"manifest design: \[trunk\] is missing"),
         (
             {"conventions": {"rating_reference": "sky"}},
-            "rating_reference is 'sky'; known are motor, equilibrium",
+            "rating_reference is 'sky'; known are setup, motor, equilibrium",
         ),
     ],
 )

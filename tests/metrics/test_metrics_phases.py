@@ -78,9 +78,42 @@ def test_contact_that_begins_while_the_foot_rises_is_no_touchdown() -> None:
     contact = (time < 0.1) | (time >= 0.3)
     foot = np.interp(time, [0.0, 0.1, 0.2, 0.3, 0.4], [0.0, 0.0, 0.05, 0.0, 0.0])
     grazing = contact | ((time >= 0.12) & (time < 0.14))
-    np.testing.assert_array_equal(loaded_by_contact(time, grazing, foot), contact)
+    hip = np.interp(time, [0.0, 0.05, 0.2, 0.35, 0.4], [0.2, 0.18, 0.25, 0.18, 0.2])
+    np.testing.assert_array_equal(loaded_by_contact(time, grazing, foot, hip), contact)
     falling = contact | ((time >= 0.25) & (time < 0.27))
-    np.testing.assert_array_equal(loaded_by_contact(time, falling, foot), falling)
+    np.testing.assert_array_equal(
+        loaded_by_contact(time, falling, foot, hip), contact | (time >= 0.25)
+    )
+
+
+@pytest.mark.parametrize("landed_ms", [3, 20])
+@pytest.mark.parametrize("bounce_ms", [10, 16, 40])
+def test_a_foot_that_bounces_has_landed(landed_ms: int, bounce_ms: int) -> None:
+    """A foot that is back on the ground before the hip has turned ends no second flight."""
+    hop = Hop(stance=0.2)
+    clean = Analysis(hop.recording())
+    contact, foot = hop.signals()["contact"].copy(), hop.signals()["foot_pos"].copy()
+    for touchdown in clean.gait.flight.stop.tolist()[:-1]:
+        off = slice(touchdown + landed_ms, touchdown + landed_ms + bounce_ms)
+        contact[off], foot[off, 1] = False, 1e-3
+    seen = Analysis(hop.recording(contact=contact, foot_pos=foot)).gait
+    for kind in ("stance", "flight"):
+        np.testing.assert_array_equal(getattr(seen, kind).first, getattr(clean.gait, kind).first)
+        np.testing.assert_array_equal(getattr(seen, kind).stop, getattr(clean.gait, kind).stop)
+    np.testing.assert_allclose(seen.flight.end, clean.gait.flight.end, atol=1e-12)
+
+
+def test_a_foot_that_leaves_after_the_lower_apex_flies() -> None:
+    """Twenty milliseconds off the ground while the hip rises are a flight, however short."""
+    hop = Hop(stance=0.2)
+    contact, foot = hop.signals()["contact"].copy(), hop.signals()["foot_pos"].copy()
+    stance = Analysis(hop.recording()).gait.stance
+    risen = int(stance.first[0]) + 120
+    contact[risen : risen + 20] = False
+    foot[risen : risen + 20, 1] = np.linspace(2e-3, 1e-4, 20)
+    seen = Analysis(hop.recording(contact=contact, foot_pos=foot)).gait
+    assert risen in seen.flight.first
+    assert len(seen.flight) == 6
 
 
 def test_without_truth_the_controller_phases_give_the_same_gait() -> None:

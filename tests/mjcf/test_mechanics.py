@@ -110,7 +110,7 @@ def test_bars_add_their_own_kinetic_energy_and_no_other(optimal: LegDesign) -> N
     """Thin rods: the crank about the hip, both bars moved in parallel with a segment."""
     model = model_of(optimal, "hfts", "bars")
     linkage = Linkage()
-    arm, density = linkage.crank_length, linkage.bar_density
+    arm, density = linkage.crank_length, linkage.density(optimal)
     l1, l2, _ = optimal.lengths
     for joint_pos in postures():
         data = posed(model, optimal, joint_pos)

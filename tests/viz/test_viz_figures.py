@@ -9,6 +9,7 @@ from viz_runs import part
 
 from legbench.errors import ConfigError, RecordingError
 from legbench.metrics.analysis import Analysis
+from legbench.metrics.rating_text import shown as as_shown
 from legbench.recording.reader import Recording
 from legbench.viz import style
 from legbench.viz.print.figures import phase_figure
@@ -56,7 +57,14 @@ def test_the_title_says_over_how_many_jumps_it_rates(hop: Recording, rows: int) 
     ratings = Analysis(run).ratings.chosen
     shown = min(3, jumps)
     for name, values in (("st", ratings.stance), ("fl", ratings.flight)) if jumps else ():
-        assert f"$P^r_{{{name}}}$ = {np.nanmean(values[-shown:]):.3f}" in title
+        assert f"$P^r_{{{name}}}$ = {as_shown(float(np.nanmean(values[-shown:])))}" in title
+
+
+def test_the_title_rates_about_both_references(hop: Recording, swing: Recording) -> None:
+    for run, first, other in ((hop, "motor", "equilibrium"), (swing, "equilibrium", "motor")):
+        head, second = str(phase_figure(run).get_suptitle()).split("\n")
+        assert f"— about the {first}: $P^r" in head
+        assert second.startswith(f"about the {other}: $P^r")
 
 
 def test_periods_have_a_colour_each_and_a_bar(swing: Recording) -> None:
@@ -72,7 +80,8 @@ def test_panels_are_those_of_the_paper(hop: Recording) -> None:
     titles = [axes.get_title(loc="left") for axes in figure.axes]
     assert titles == ["(a) foot tip, polar", "(b) joint space", "(c) modal phase"]
     assert figure.axes[1].get_aspect() == 1.0
-    assert "prototype · jump · z2 = 1, dz2 = 0.15 — $P^r_{st}$ = 0." in figure.get_suptitle()
+    title = figure.get_suptitle()
+    assert "prototype · jump · z2 = 1, dz2 = 0.15 — about the motor: $P^r_{st}$ = 0." in title
 
 
 def test_a_real_leg_has_the_same_figure(hop: Recording, real_hop: Recording) -> None:

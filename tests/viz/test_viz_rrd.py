@@ -13,6 +13,7 @@ from legbench.design.setup import SetupKind
 from legbench.errors import FormatError, RecordingError
 from legbench.kinematics import joint_to_modal, joint_to_polar, leg_points
 from legbench.metrics.analysis import Analysis
+from legbench.metrics.source import Reference
 from legbench.recording.reader import Recording, described
 from legbench.viz.facts import facts_of
 from legbench.viz.live.axes import HEIGHT, WIDTH
@@ -132,11 +133,19 @@ def test_states_change_when_they_change(hop: Recording, shown: Entities) -> None
     ]
 
 
+def check_ratings(run: Recording, shown: Entities) -> None:
+    """Compare what is shown about both references with the metrics."""
+    for reference in Reference:
+        ratings = asdict(Analysis(run).ratings.about(reference))
+        for name in ("stance", "flight"):
+            values = np.array(shown[f"/series/rating/{reference.value}/{name}"]["scalars"]).ravel()
+            np.testing.assert_allclose(values, ratings[name], rtol=1e-12)
+            lost = np.array(shown[f"/series/lost/{reference.value}/{name}"]["scalars"]).ravel()
+            np.testing.assert_allclose(10.0**lost, 1.0 - np.array(ratings[name]), rtol=1e-6)
+
+
 def test_ratings_are_those_of_the_metrics(hop: Recording, shown: Entities) -> None:
-    ratings = asdict(Analysis(hop).ratings.chosen)
-    for name in ("stance", "flight"):
-        values = np.array(shown[f"/series/rating/{name}"]["scalars"]).ravel()
-        np.testing.assert_allclose(values, ratings[name], rtol=1e-12)
+    check_ratings(hop, shown)
 
 
 def test_contact_that_chatters_splits_no_rating(hop: Recording, tmp_path: Path) -> None:
@@ -145,11 +154,21 @@ def test_contact_that_chatters_splits_no_rating(hop: Recording, tmp_path: Path) 
     for event in np.flatnonzero(np.diff(contact))[:-1]:
         contact[event - 4 : event + 5] = chatter.random(9) < 0.5
     rough = replace(hop, columns={**hop.columns, "contact": contact.astype(np.int8)})
-    ratings = asdict(Analysis(rough).ratings.chosen)
-    shown = viz_rrd.temporal(write_rrd(rough, tmp_path / "rough.rrd"))
-    for name in ("stance", "flight"):
-        values = np.array(shown[f"/series/rating/{name}"]["scalars"]).ravel()
-        np.testing.assert_allclose(values, ratings[name], rtol=1e-12)
+    check_ratings(rough, viz_rrd.temporal(write_rrd(rough, tmp_path / "rough.rrd")))
+
+
+@pytest.mark.parametrize("landed_ms", [3, 20])
+def test_a_foot_that_bounces_splits_no_rating(
+    hop: Recording, landed_ms: int, tmp_path: Path
+) -> None:
+    contact = np.asarray(hop["contact"], dtype=bool)
+    for touchdown in Analysis(hop).gait.flight.stop.tolist()[:-1]:
+        contact[touchdown : touchdown + landed_ms] = True
+        contact[touchdown + landed_ms : touchdown + landed_ms + 18] = False
+        contact[touchdown + landed_ms + 18] = True
+    bounced = replace(hop, columns={**hop.columns, "contact": contact.astype(np.int8)})
+    assert len(Analysis(bounced).gait.flight) == len(Analysis(hop).gait.flight)
+    check_ratings(bounced, viz_rrd.temporal(write_rrd(bounced, tmp_path / "bounced.rrd")))
 
 
 def test_facts_tell_design_controller_and_ratings(fixed: Entities) -> None:
@@ -177,8 +196,8 @@ def test_slices_publish_what_the_whole_run_publishes(
         order = np.argsort(slices[path]["t"], kind="stable")
         for component, rows in columns.items():
             got = [slices[path][component][row] for row in order]
-            if component == "scalars" and "rating" in path:
-                np.testing.assert_allclose(np.array(got), np.array(rows), rtol=1e-12)
+            if component == "scalars" and path.startswith(("/series/rating", "/series/lost")):
+                np.testing.assert_allclose(np.array(got), np.array(rows), rtol=1e-9)
             elif component == "t":
                 np.testing.assert_array_equal(got, rows)
             else:

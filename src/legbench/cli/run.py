@@ -105,6 +105,7 @@ def _report(finished: "Finished", *, as_json: bool) -> int:
     """Print how a run has ended and its figures; returns the exit status."""
     from legbench.cli.table import limited, print_summary
     from legbench.metrics import summarise
+    from legbench.metrics.soundness import Soundness
     from legbench.recording.reader import load
 
     if finished.outcome.status == "interrupted" and finished.outcome.cycles == 0:
@@ -117,6 +118,11 @@ def _report(finished: "Finished", *, as_json: bool) -> int:
         note(
             f"legbench: the limits changed the command in {limited(summary)}: the leg ran "
             "something else than it was asked to; the event 'limited' in events.jsonl says more"
+        )
+    if summary.numerics == Soundness.UNSOUND:
+        note(
+            "legbench: the numerics of this run are unsound, its motion is not that of the leg; "
+            "its warnings say why"
         )
     if as_json:
         print_json(summary.to_json())

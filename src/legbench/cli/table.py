@@ -3,6 +3,8 @@
 import math
 
 from legbench.metrics import Comparison, Summary
+from legbench.metrics.rating_text import rated_lines
+from legbench.metrics.soundness import Soundness
 
 Row = tuple[str, float, str, float]
 """Row of a table: label, value, unit, and factor from SI to that unit."""
@@ -11,17 +13,13 @@ Row = tuple[str, float, str, float]
 def print_summary(summary: Summary) -> None:
     """Print the figures of a run; those that it does not show are left out."""
     print(f"run               {summary.run}")
-    ending = summary.status or "unknown"
-    print(f"ended             {ending}" + (f": {summary.cause}" if summary.cause else ""))
+    ending = (summary.status or "unknown") + (f": {summary.cause}" if summary.cause else "")
+    unsound = summary.numerics == Soundness.UNSOUND
+    print(f"ended             {ending}{', but its numerics are unsound' if unsound else ''}")
     if summary.limited_cycles:
         print(f"{'limited':<17} {limited(summary)}")
-    for name, values in (
-        ("P^r stance", summary.rating_stance),
-        ("P^r flight", summary.rating_flight),
-        ("P^r periods", summary.rating_periods),
-    ):
-        if values:
-            print(f"{name:<17} {_ratings(values)}")
+    for line in rated_lines(summary):
+        print(f"{f'P^r {line.kind}':<17} {line.text}")
     if summary.jumps:
         print(f"{'jumps':<17} {summary.jumps}")
     for label, value, unit, factor in _rows(summary):
@@ -57,10 +55,6 @@ def print_comparison(comparison: Comparison) -> None:
             print(f"{label:<17} {ends} of {len(known)} [{unit}]")
 
 
-def _ratings(values: list[float]) -> str:
-    return f"{min(values):.4f} lowest, {values[-1]:.4f} last of {len(values)}"
-
-
 def _rows(summary: Summary) -> tuple[Row, ...]:
     return (
         ("trunk excursion", summary.trunk_excursion, "mm", 1e3),
@@ -78,12 +72,13 @@ def _rows(summary: Summary) -> tuple[Row, ...]:
 def _differences(comparison: Comparison) -> tuple[Row, ...]:
     landing = f"rad before the first touchdown at {comparison.first_touchdown:.4g} s"
     common = f"rad over {comparison.duration:.4g} s"
+    means = f"between the means, about the {comparison.rating_reference}"
     return (
         ("|dq|, max", comparison.joint_before_touchdown, landing, 1.0),
         ("|dz2|, max", comparison.z2_before_touchdown, landing, 1.0),
         ("|dq|, max", comparison.joint_max, common, 1.0),
         ("|dz2|, max", comparison.z2_max, common, 1.0),
-        ("P^r stance", comparison.rating_stance, "between the means", 1.0),
-        ("P^r flight", comparison.rating_flight, "between the means", 1.0),
-        ("P^r periods", comparison.rating_periods, "between the means", 1.0),
+        ("P^r stance", comparison.rating_stance, means, 1.0),
+        ("P^r flight", comparison.rating_flight, means, 1.0),
+        ("P^r periods", comparison.rating_periods, means, 1.0),
     )

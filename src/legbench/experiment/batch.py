@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Hashable, Sequence
+from dataclasses import replace
 from typing import final
 
 import numpy as np
@@ -67,7 +68,11 @@ def _alike(experiment: Experiment) -> Hashable:
     """What legs that are stepped together have in common: parts of the model, readings, columns."""
     conventions = experiment.conventions
     signals = experiment.controller.describe().signals
-    return experiment.options, conventions.modal, conventions.setpoint, signals
+    options, built = experiment.options, experiment.imperfections.leg_of(experiment.design)
+    # Alone each leg has the step that suits it, so that only legs of one step are company.
+    fitted = options.numerics.fitted([built], options.linkage)
+    alike = replace(options, numerics=fitted)
+    return alike, conventions.modal, conventions.setpoint, signals
 
 
 def start_together(experiments: Sequence[Experiment]) -> tuple[AbstractController, Start]:

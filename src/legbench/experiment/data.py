@@ -31,8 +31,9 @@ class Conventions:
     """Reading of eq. (15), which scales the modal coordinates."""
     setpoint: SetpointMeaning = SetpointMeaning.LINK
     """Meaning of z2: the link's equilibrium, or the motor's position."""
-    rating_reference: Literal["motor", "equilibrium"] = "motor"
-    """Reference from which a deflection is measured, q_d of eq. (14)."""
+    rating_reference: Literal["setup", "motor", "equilibrium"] = "setup"
+    """Reference from which the rating that is shown first measures a deflection, q_d of eq. (14):
+    the motor, the equilibrium, or as suits the setup, the equilibrium unless the leg jumps."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

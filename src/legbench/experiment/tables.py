@@ -9,14 +9,19 @@ from legbench.control import CONTROLLERS
 from legbench.design import LegDesign, load_design
 from legbench.design.toml import UNITS, design_from_mapping, design_to_mapping
 from legbench.errors import ConfigError
+from legbench.experiment.format_1 import upgraded
 from legbench.experiment.reading import Reader, Special, placed
 from legbench.experiment.writing import Writer
 from legbench.guests import load_text
 from legbench.limits.safety import SafetyLimits
 
 Read = TypeVar("Read")
-FORMAT: Final = 1
-"""Version of the format; it rises when an older reader would misunderstand an experiment file."""
+FORMAT: Final = 2
+"""Version of the format; it rises when an older reader would misunderstand an experiment file.
+
+Since 2 a step, a loop closure and bars that are not there are those that suit the leg, and a rating
+reference that is not there is the one that suits the setup.
+"""
 USUAL_PLANT: Final = "sim"
 """Plant of an experiment whose file names none."""
 _SEGMENT: Final = {"mass": 0, "length": 0, "com": 0, "inertia": 0}
@@ -71,6 +76,8 @@ def read_tables(
             "upgrade"
         )
     content = {key: value for key, value in tables.items() if key != "format"}
+    if version == 1:
+        content = upgraded(content)
     reader = Reader(folder=folder, specials=SPECIALS, json=json)
     return reader.read(kind, _with_usual_setup(_with_usual_plant(content), folder))
 

@@ -70,6 +70,8 @@ class Comparison:
     """Difference of touchdown [s]."""
     apex_height: list[float]
     """Difference of the hip's height above the ground at the apex, over the run's [-]."""
+    rating_reference: str
+    """Reference of all ratings compared: that of the run, `motor` or `equilibrium`."""
     rating_stance: float
     """Difference of the mean P^r of all complete stances [-]."""
     rating_flight: float
@@ -174,8 +176,10 @@ def _flights(ours: Gait, theirs: Gait) -> dict[str, Any]:
 
 
 def _ratings(run: Analysis, other: Analysis) -> dict[str, Any]:
-    ours, theirs = run.ratings.chosen, other.ratings.chosen
+    reference = run.ratings.reference
+    ours, theirs = run.ratings.chosen, other.ratings.about(reference)
     return {
+        "rating_reference": reference.value,
         "rating_stance": _mean(theirs.stance) - _mean(ours.stance),
         "rating_flight": _mean(theirs.flight) - _mean(ours.flight),
         "rating_periods": _mean(theirs.periods) - _mean(ours.periods),

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from legbench.design.statics import GRAVITY
 from legbench.metrics.built import built_of
 from legbench.metrics.changes import changes
 from legbench.metrics.rows import runs_of
@@ -12,6 +13,11 @@ from legbench.signals import Bools, Floats
 
 STOP_MARGIN = 0.02
 """Distance to a joint stop from which it may act [rad]: stops are soft, and touch early."""
+
+
+AT_REST = 1e-6
+"""Share of weight times shank length that a leg at rest does not exceed in kinetic energy [-]: some
+microjoules, where the paper's smallest oscillations have millijoules."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,7 +91,9 @@ def clean_intervals(recording: Recorded) -> Bools:
     stops = stop_intervals(recording)
     if not recording.description.jumps:
         return ~stops
-    return ~(stops | _around(np.asarray(recording["contact"], dtype=bool)))
+    # A foot may touch and leave between two rows: it is then on the ground without a contact.
+    down = np.asarray(recording["contact"], dtype=bool) | (recording["foot_pos"][:, 1] <= 0.0)
+    return ~(stops | _around(down))
 
 
 def _around(rows: Bools) -> Bools:
@@ -99,7 +107,8 @@ def _around(rows: Bools) -> Bools:
 def energy_residual(recording: Recorded, flows: Flows) -> float:
     """Worst drift of the unexplained energy over a clean stretch, over the peak kinetic energy [-].
 
-    NaN without truth, motion or a clean stretch.
+    NaN without truth, motion or a clean stretch; a leg whose kinetic energy stays below `AT_REST`
+    of its weight times its length does not move.
     """
     clean = clean_intervals(recording)
     kinetic = recording["energy"][:, 1]
@@ -109,8 +118,9 @@ def energy_residual(recording: Recorded, flows: Flows) -> float:
     before = np.concatenate([[0.0], running])[runs.first]
     drift = np.abs(running - np.repeat(before, runs.stop - runs.first))
     worst = float(np.max(drift[clean]))
-    peak = float(kinetic.max())
-    return worst / peak if peak > 0.0 else np.nan
+    peak, design = float(kinetic.max()), recording.description.design
+    rest = AT_REST * GRAVITY * design.total_mass * design.shank.length
+    return worst / peak if peak > rest else np.nan
 
 
 def loop_gap_max(recording: Recorded) -> float:

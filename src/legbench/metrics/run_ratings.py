@@ -24,10 +24,21 @@ class RatingLists:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunRatings:
-    """Ratings of a run with the reference that it asks for, and with the equilibrium."""
+    """Ratings of a run about the motor and about the equilibrium, one of which comes first."""
 
-    chosen: RatingLists
+    reference: Reference
+    """Reference that the run is judged by."""
+    motor: RatingLists
     equilibrium: RatingLists
+
+    @property
+    def chosen(self) -> RatingLists:
+        """Ratings about the reference that the run is judged by."""
+        return self.about(self.reference)
+
+    def about(self, reference: Reference) -> RatingLists:
+        """Ratings about one of the two references."""
+        return self.motor if reference is Reference.MOTOR else self.equilibrium
 
 
 def rate_run(run: Recorded, gait: Gait, periods: Periods | None) -> RunRatings:
@@ -35,14 +46,14 @@ def rate_run(run: Recorded, gait: Gait, periods: Periods | None) -> RunRatings:
 
     A stance is carried by the foot, a flight by nothing, a period as its setup has it.
     """
+    reference = run.description.reference
     motor = _rate(run, gait, periods, Reference.MOTOR)
     carried = SUPPORTS[run.description.setup.kind]
     if carried is Support.NONE:
         # Springs that carry nothing have their equilibrium at the motor.
-        return RunRatings(chosen=motor, equilibrium=motor)
+        return RunRatings(reference=reference, motor=motor, equilibrium=motor)
     equilibrium = _rate(run, gait, periods, Reference.EQUILIBRIUM, flight=motor.flight)
-    wanted = run.description.reference is Reference.EQUILIBRIUM
-    return RunRatings(chosen=equilibrium if wanted else motor, equilibrium=equilibrium)
+    return RunRatings(reference=reference, motor=motor, equilibrium=equilibrium)
 
 
 def _rate(

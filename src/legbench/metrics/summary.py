@@ -11,16 +11,21 @@ from legbench.metrics.analysis import Analysis, analysed
 from legbench.metrics.caveats import warnings_of
 from legbench.metrics.energy import energy_residual, loop_gap_max
 from legbench.metrics.limited import limited_commands
+from legbench.metrics.soundness import judge_numerics
 from legbench.metrics.source import Recorded
 from legbench.strict_json import null_for_nan
+
+SPARSE = 1.5
+"""Time from row to row above which a run is thinned out, in periods of its own [-]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Summary:
     """Figures of one run; NaN where the run, its setup or a missing truth does not show them.
 
-    RatingLists hold every complete phase or period, in order; the lists without a suffix use the
-    reference that the run's conventions ask for, the motor unless they say otherwise.
+    Lists of ratings hold every complete phase or period, in order. Those without a suffix are about
+    `rating_reference`: what the run's conventions ask for, or else the equilibrium in a fixed
+    setup and the motor in a jump. Those with one are about the motor and about the equilibrium.
     """
 
     run: str
@@ -31,6 +36,9 @@ class Summary:
     """Status with which the run ended."""
     cause: str | None
     """Cause of an early end; none if the run came to its end."""
+    numerics: str
+    """Verdict on the numerics of a simulated run, `sound`, `unsound` or `unknown`: whether energy
+    residual and loop gap are within bounds. The warnings say which is not."""
     limited_cycles: int
     """Cycles in which the limits changed the command."""
     limited_max: list[float]
@@ -40,12 +48,16 @@ class Summary:
     real_time_factor: float
     """Ratio of the duration to the wall time of all cycles [-]."""
     rating_reference: str
+    """Reference of the ratings that come first, `motor` or `equilibrium`."""
     rating_stance: list[float]
     """P^r of each complete stance, eq. (14) [-]."""
     rating_flight: list[float]
     """P^r of each complete flight [-]."""
     rating_periods: list[float]
     """P^r of each oscillation period in a fixed setup [-]."""
+    rating_stance_motor: list[float]
+    rating_flight_motor: list[float]
+    rating_periods_motor: list[float]
     rating_stance_equilibrium: list[float]
     rating_flight_equilibrium: list[float]
     rating_periods_equilibrium: list[float]
@@ -109,8 +121,10 @@ def summarise(recording: Recorded) -> Summary:
     """
     run = analysed(recording)
     description, ratings = run.description, run.ratings
-    chosen, equilibrium = ratings.chosen, ratings.equilibrium
+    chosen, motor, equilibrium = ratings.chosen, ratings.motor, ratings.equilibrium
     periods = [] if description.jumps else (run.periods.end - run.periods.start).tolist()
+    energy, gap = _energy(run), loop_gap_max(run)
+    verdict = judge_numerics(energy["energy_residual"] if _dense(run) else math.nan, gap)
     return Summary(
         run=str(run.path),
         setup=description.setup.kind.value,
@@ -121,16 +135,28 @@ def summarise(recording: Recorded) -> Summary:
         rating_stance=chosen.stance,
         rating_flight=chosen.flight,
         rating_periods=chosen.periods,
+        rating_stance_motor=motor.stance,
+        rating_flight_motor=motor.flight,
+        rating_periods_motor=motor.periods,
         rating_stance_equilibrium=equilibrium.stance,
         rating_flight_equilibrium=equilibrium.flight,
         rating_periods_equilibrium=equilibrium.periods,
         periods=periods,
-        loop_gap_max=loop_gap_max(run),
-        warnings=warnings_of(run),
+        loop_gap_max=gap,
+        numerics=verdict.soundness.value,
+        warnings=[*warnings_of(run), *verdict.reasons],
         **limited_commands(run),
         **_clock(run),
         **_jumping(run),
-        **_energy(run),
+        **energy,
+    )
+
+
+def _dense(run: Analysis) -> bool:
+    """Whether the rows are those of every cycle; between sparser ones energy flows unseen."""
+    period = run.description.period
+    return len(run.time) > 1 and (
+        period is None or float(np.median(np.diff(run.time))) < SPARSE * period
     )
 
 

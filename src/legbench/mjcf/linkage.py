@@ -33,7 +33,7 @@ def _rod(body: mujoco.MjsBody, density: float, length: float) -> None:
 def add_bars(spec: mujoco.MjSpec, design: LegDesign, linkage: Linkage, numerics: Numerics) -> None:
     """Add crank and bars to the bodies trunk, thigh, shank and foot, and close both loops."""
     trunk, thigh = spec.body("trunk"), spec.body("thigh")
-    arm, density = linkage.crank_length, linkage.bar_density
+    arm, density = linkage.crank_length, linkage.density(design)
     l1, l2, _ = design.lengths
 
     crank = trunk.add_body(name="crank")

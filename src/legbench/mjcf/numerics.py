@@ -11,10 +11,11 @@ from legbench.mjcf.options import Numerics
 
 
 def apply_numerics(spec: mujoco.MjSpec, numerics: Numerics) -> None:
-    """Write the options into a spec."""
+    """Write the options into a spec; step and loop closure are those of `Numerics.fitted`."""
     option = spec.option
     option.integrator = mujoco.mjtIntegrator.mjINT_RK4
-    option.timestep = numerics.timestep
+    if numerics.timestep is not None:
+        option.timestep = numerics.timestep
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     option.solver = mujoco.mjtSolver.mjSOL_NEWTON
     option.iterations = numerics.iterations

@@ -1,6 +1,7 @@
 """What a model is made of besides the design; imports no simulator."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
@@ -8,9 +9,12 @@ from legbench.design import LegDesign
 from legbench.design.setup import Setup, SetupKind
 from legbench.errors import ConfigError
 from legbench.imperfections import Imperfections
-
-MIN_BAR_DENSITY = 5e-4
-"""Lighter bars make the loop's equations too stiff for the time step [kg/m]."""
+from legbench.mjcf.fitting import (
+    LIGHTEST_BAR,
+    fitted_bar_density,
+    parts_of_step,
+    step_in_parts,
+)
 
 
 class LinkageKind(StrEnum):
@@ -34,15 +38,17 @@ class Linkage:
 
     kind: LinkageKind = LinkageKind.BARS
     """Physical parallel bars, or the constraint they make."""
-    bar_density: float = 0.006
-    """Mass per length of crank and bars [kg/m]: a square PA6 rod of 2.3 mm."""
+    bar_density: float | None = None
+    """Mass per length of crank and bars; none: a square PA6 rod of 2.3 mm, which weighs 6 g/m, and
+    lighter ones for a leg with a lighter segment [kg/m]."""
     crank_length: float = 0.02
     """Length of hip crank and thigh extension [m]."""
 
     def __post_init__(self) -> None:
-        if not MIN_BAR_DENSITY <= self.bar_density < math.inf:
+        density = self.bar_density
+        if density is not None and not LIGHTEST_BAR <= density < math.inf:
             raise ConfigError(
-                f"bar_density is {self.bar_density:g} kg/m; from {MIN_BAR_DENSITY:g} kg/m on the "
+                f"bar_density is {density:g} kg/m; from {LIGHTEST_BAR:g} kg/m on the "
                 "loops can be integrated, for massless bars use linkage 'reduced'"
             )
         if not 0.0 < self.crank_length < math.inf:
@@ -50,12 +56,22 @@ class Linkage:
                 f"crank_length is {self.crank_length:g} m; it must be positive and finite"
             )
 
+    def density(self, design: LegDesign) -> float:
+        """Mass per length of crank and bars [kg/m]; raises as `fitted_bar_density`."""
+        return fitted_bar_density(design) if self.bar_density is None else self.bar_density
+
+    def parts_of_step(self, design: LegDesign) -> float:
+        """`fitting.parts_of_step` of a leg with this linkage; raises as `density`."""
+        if self.kind is LinkageKind.REDUCED:
+            return parts_of_step(design)
+        return parts_of_step(design, self.density(design), self.crank_length)
+
     def mass(self, design: LegDesign) -> float:
-        """Mass of everything that the linkage adds to a leg [kg]."""
+        """Mass of everything that the linkage adds to a leg [kg]; raises as `density`."""
         if self.kind is LinkageKind.REDUCED:
             return 0.0
         length = self.crank_length + design.thigh.length + design.shank.length
-        return self.bar_density * length
+        return self.density(design) * length
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,10 +111,12 @@ class Numerics:
         ConfigError: a time step that does not divide the 1 ms control period.
     """
 
-    timestep: float = 0.00025
-    """Time step, a whole part of the control period [s]."""
-    loop_solref: tuple[float, float] = (0.00025, 1.0)
-    """Time constant and damping ratio of loop closures, foot pin and joint equality [s, -]."""
+    timestep: float | None = None
+    """Time step, a whole part of the control period; none: 0.25 ms, or a whole part of it for a leg
+    whose foot is light or whose springs are stiff [s]."""
+    loop_solref: tuple[float, float] | None = None
+    """Time constant and damping ratio of loop closures, foot pin and joint equality; none: one time
+    step, and 1 [s, -]."""
     loop_solimp: tuple[float, float, float, float, float] = (0.9999, 0.9999, 0.001, 0.5, 2.0)
     """Impedance of the same: at zero, at the width, the width, midpoint, power
     [-, -, m, -, -]."""
@@ -117,10 +135,24 @@ class Numerics:
     """Improvement below which the solver stops [-]."""
 
     def __post_init__(self) -> None:
-        if not (0.0 < self.timestep < math.inf and _whole(0.001 / self.timestep)):
+        step = self.timestep
+        if step is not None and not (0.0 < step < math.inf and _whole(0.001 / step)):
             raise ConfigError(
-                f"timestep is {self.timestep:g} s; it must divide the control period of 0.001 s"
+                f"timestep is {step:g} s; it must divide the control period of 0.001 s"
             )
+
+    def fitted(self, designs: Sequence[LegDesign], linkage: Linkage) -> "Numerics":
+        """These settings with a step and a loop closure that suit all of some legs.
+
+        Raises:
+            ConfigError: no step or no bar suits one of them.
+        """
+        step = self.timestep
+        if step is None:
+            parts, name = max((linkage.parts_of_step(design), design.name) for design in designs)
+            step = step_in_parts(parts, name)
+        solref = (step, 1.0) if self.loop_solref is None else self.loop_solref
+        return replace(self, timestep=step, loop_solref=solref)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

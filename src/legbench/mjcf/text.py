@@ -13,6 +13,6 @@ def model_text(design: LegDesign, options: BuildOptions) -> str:
     """MJCF of a design; the last one is kept, since a run and its plant want the same.
 
     Raises:
-        ConfigError: the bars outweigh the trunk, or MuJoCo refuses a mass or an inertia.
+        ConfigError: as `build_spec`.
     """
     return to_xml(build_spec(design, options))

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import final
 
 import mujoco
@@ -34,7 +35,7 @@ FAILED = "simulation failed"
 
 @final
 class BatchPlant(AbstractPlant):
-    """Batch of legs that share setup, linkage, ground and numerics; all else is each leg's own.
+    """Batch of legs that share setup, linkage, ground and step; all else is each leg's own.
 
     A leg that faults does not stop the others: it keeps its cause and its cycle, and its
     observations mean nothing from then on.
@@ -51,7 +52,7 @@ class BatchPlant(AbstractPlant):
 
     Raises:
         ConfigError: no design, or starts, servos, imperfections or seeds that are not one for
-            each leg.
+            each leg, or a leg that no step suits.
     """
 
     def __init__(
@@ -70,7 +71,10 @@ class BatchPlant(AbstractPlant):
         servo = ServoConfig() if servo is None else servo
         _check(count, start, servo, flaws, chosen)
         self.period = PERIOD
-        models = _models(designs, options, flaws)
+        built = [each.leg_of(design) for each, design in zip(flaws, designs, strict=True)]
+        # Legs in step share the step of the one that needs the finest.
+        options = replace(options, numerics=options.numerics.fitted(built, options.linkage))
+        models = _models(built, options, flaws)
         self.model = models[0]
         self.threads = threads or os.cpu_count() or 1
         self._batch = batch.Batch(models[0], nsim=count, nthread=self.threads)
@@ -184,13 +188,12 @@ def _check(
 
 
 def _models(
-    designs: Sequence[LegDesign], options: BuildOptions, imperfections: Sequence[Imperfections]
+    built: Sequence[LegDesign], options: BuildOptions, imperfections: Sequence[Imperfections]
 ) -> list[mujoco.MjModel]:
     """Compiled model of each leg as it was built; equal ones share one."""
-    built = [
-        (flaws.leg_of(design), options.built(flaws))
-        for design, flaws in zip(designs, imperfections, strict=True)
+    legs = [
+        (design, options.built(flaws)) for design, flaws in zip(built, imperfections, strict=True)
     ]
-    dry = any(any(each.friction) for _, each in built)
-    compiled = {leg: bare_model(*leg, dry=dry) for leg in dict.fromkeys(built)}
-    return [compiled[leg] for leg in built]
+    dry = any(any(each.friction) for _, each in legs)
+    compiled = {leg: bare_model(*leg, dry=dry) for leg in dict.fromkeys(legs)}
+    return [compiled[leg] for leg in legs]

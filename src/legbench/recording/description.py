@@ -41,6 +41,16 @@ class Reference(StrEnum):
     """The posture at which the springs carry the leg for that motor position."""
 
 
+class ReferenceChoice(StrEnum):
+    """Reference that an experiment asks for: one of the two, or the one that suits its setup."""
+
+    SETUP = "setup"
+    """The equilibrium in a fixed setup, where gravity's sag would hide all else; the motor in a
+    jump."""
+    MOTOR = "motor"
+    EQUILIBRIUM = "equilibrium"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InitialState:
     """Posture that a run begins in, at rest."""
@@ -68,7 +78,7 @@ class RunDescription:
     convention: ModalConvention
     """Reading of eq. (15) in which the run's modal coordinates are shown."""
     reference: Reference
-    """Reference of the ratings that are shown first."""
+    """Reference of the ratings that are shown first; the other's are shown besides."""
     controller: str
     """Kind of controller, as a title alone."""
     phases: tuple[PhaseInfo, ...]
@@ -131,27 +141,26 @@ def describe(manifest: Mapping[str, Any], fallback_id: str = "") -> RunDescripti
         fallback_id: name of a run whose manifest does not tell it.
 
     Raises:
-        FormatError: it describes no leg or no controller that can be, names a setup, a modal
-            convention or a rating reference that does not exist, or has an entry of a wrong type.
+        FormatError: it describes no leg, controller or setup that can be, names a convention that
+            does not exist, or has an entry of a wrong type.
     """
-    if manifest.get("format", FORMAT) == 1:
-        manifest = upgraded(manifest)
-    head = Table(entries=manifest)
+    head = Table(entries=upgraded(manifest) if manifest.get("format", FORMAT) == 1 else manifest)
     # Messages leave out "experiment": the entries have the same names in either format.
     experiment = Table(entries=head.table("experiment").entries)
-    controller, conventions = experiment.table("controller"), experiment.table("conventions")
-    settings, provenance = controller.table("settings"), head.table("provenance")
+    controller, provenance = experiment.table("controller"), head.table("provenance")
+    settings, conventions = controller.table("settings"), experiment.table("conventions")
     kind = head.table("plant").text("kind") or experiment.table("plant").text("kind")
     said = parse_controller(head.table("controller"))
+    design, setup = _design(experiment.table("design")), _setup(experiment.table("setup"))
     return RunDescription(
         id=head.text("id") or fallback_id,
         created=head.text("created"),
-        design=_design(experiment.table("design")),
-        setup=_setup(experiment.table("setup")),
+        design=design,
+        setup=setup,
         linkage=None if kind in IDEAL_LINKAGE else experiment.table("linkage").text("kind"),
         crank_length=_crank_length(experiment.table("linkage")),
         convention=conventions.choice("modal", ModalConvention, ModalConvention.ORTHONORMAL),
-        reference=conventions.choice("rating_reference", Reference, Reference.MOTOR),
+        reference=_reference(conventions, setup.kind),
         controller=head.table("controller").text("kind") or controller.text("kind") or "",
         phases=said.phases,
         counting=said.counting,
@@ -204,6 +213,14 @@ def _setup(table: Table) -> Setup:
         return Setup(kind=table.choice("kind", SetupKind), boom_radius=table.number("boom_radius"))
     except ConfigError as error:
         raise FormatError(f"manifest setup: {error}") from None
+
+
+def _reference(conventions: Table, setup: SetupKind) -> Reference:
+    """Reference by which a run is judged."""
+    asked = conventions.choice("rating_reference", ReferenceChoice, ReferenceChoice.SETUP)
+    if asked is ReferenceChoice.SETUP:
+        return Reference.MOTOR if setup is SetupKind.JUMP else Reference.EQUILIBRIUM
+    return Reference(asked.value)
 
 
 def _crank_length(linkage: Table) -> float | None:

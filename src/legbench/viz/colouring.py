@@ -1,13 +1,17 @@
 """Colouring of a run's rows in a figure: by period, or by stance and flight."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 
 from legbench.metrics.analysis import Analysis, analysed
+from legbench.metrics.rating_text import shown
 from legbench.metrics.roles import STANCE
-from legbench.metrics.source import Recorded
+from legbench.metrics.run_ratings import RatingLists, RunRatings
+from legbench.metrics.source import Recorded, Reference
 from legbench.signals import Floats
 from legbench.viz import style
 
@@ -39,13 +43,13 @@ class Colouring:
 def colouring_of(recording: Recorded) -> Colouring:
     """Colour a jump's last jumps by stance and flight, any other run by period."""
     run = analysed(recording)
-    ratings, jumps = run.ratings.chosen, run.gait.jumps
+    ratings, jumps = run.ratings, run.gait.jumps
     if len(jumps):
         begin, end = jumps.start[-LAST_JUMPS:][0], jumps.end[-1]
         first, stop = np.searchsorted(run.time, [begin, end])
         return Colouring(
             stretches=_by_stance(run, int(first), int(stop)),
-            ratings=_jump_ratings(ratings.stance, ratings.flight, len(jumps)),
+            ratings=_both(ratings, partial(_jump_ratings, len(jumps))),
         )
     periods = run.periods
     count = len(periods)
@@ -58,7 +62,7 @@ def colouring_of(recording: Recorded) -> Colouring:
             )
         ),
         periods=count,
-        ratings=_period_ratings(ratings.periods),
+        ratings=_both(ratings, _period_ratings),
     )
 
 
@@ -75,24 +79,35 @@ def _by_stance(run: Analysis, first: int, stop: int) -> tuple[ColouredRows, ...]
     )
 
 
-def _jump_ratings(stance: list[float], flight: list[float], jumps: int) -> str:
+def _both(ratings: RunRatings, words: Callable[[RatingLists], str]) -> str:
+    """Ratings about the reference that comes first, and about the other one where they differ."""
+    first = ratings.reference
+    found = {each: words(ratings.about(each)) for each in (first, *Reference)}
+    if not found[first]:
+        return ""
+    said = [each for each in found if each is first or found[each] != found[first]]
+    return "\n".join(f"about the {each.value}: {found[each]}" for each in said)
+
+
+def _jump_ratings(jumps: int, ratings: RatingLists) -> str:
     """Means over the highlighted jumps, and how many these are of those of the run."""
-    shown = min(jumps, LAST_JUMPS)
+    latest = min(jumps, LAST_JUMPS)
     parts = [
-        f"$P^r_{{{name}}}$ = {np.nanmean(values[-shown:]):.3f}"
-        for name, values in (("st", stance), ("fl", flight))
-        if _any_finite(values[-shown:])
+        f"$P^r_{{{name}}}$ = {shown(float(np.nanmean(values[-latest:])))}"
+        for name, values in (("st", ratings.stance), ("fl", ratings.flight))
+        if _any_finite(values[-latest:])
     ]
-    number = f"{'last ' if shown < jumps else ''}{shown} jump{'' if shown == 1 else 's'}"
+    number = f"{'last ' if latest < jumps else ''}{latest} jump{'' if latest == 1 else 's'}"
     return f"{', '.join(parts)} ({number})" if parts else ""
 
 
-def _period_ratings(values: list[float]) -> str:
+def _period_ratings(ratings: RatingLists) -> str:
+    values = ratings.periods
     if not _any_finite(values):
         return ""
     last = len(values)
-    ends = f"$P^r_1$ = {values[0]:.3f}, $P^r_{{{last}}}$ = {values[-1]:.3f}"
-    return f"{ends}, mean {np.nanmean(values):.3f}"
+    ends = f"$P^r_1$ = {shown(values[0])}, $P^r_{{{last}}}$ = {shown(values[-1])}"
+    return f"{ends}, mean {shown(float(np.nanmean(values)))}"
 
 
 def _any_finite(values: list[float] | Floats) -> bool:

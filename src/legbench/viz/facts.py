@@ -9,6 +9,7 @@ import numpy as np
 
 from legbench.design.leg import LegDesign
 from legbench.kinematics import modal_to_joint
+from legbench.metrics.rating_text import rated_lines, rating_text
 from legbench.metrics.summary import Summary
 from legbench.recording.description import RunDescription
 
@@ -88,11 +89,6 @@ def _flat(entries: Mapping[str, Any]) -> Iterator[tuple[str, object]]:
 
 def _results(summary: Summary) -> dict[str, str]:
     """Ratings and figures that the run shows."""
-    ratings = {
-        "P^r stance": summary.rating_stance,
-        "P^r flight": summary.rating_flight,
-        "P^r periods": summary.rating_periods,
-    }
     figures = {
         "trunk excursion": (1e3 * summary.trunk_excursion, "mm"),
         "foot clearance": (1e3 * summary.foot_clearance, "mm"),
@@ -101,9 +97,8 @@ def _results(summary: Summary) -> dict[str, str]:
         "polar angle, max": (summary.polar_max, "rad"),
     }
     return {
-        name: f"{min(values):.4f} lowest, {values[-1]:.4f} last of {len(values)}"
-        for name, values in ratings.items()
-        if values
+        f"P^r {line.kind}, about the {line.reference}": rating_text(line.values)
+        for line in rated_lines(summary)
     } | {
         name: f"{value:.3g} {unit}"
         for name, (value, unit) in figures.items()

@@ -50,11 +50,11 @@ def _linkage_of(table: Table) -> Linkage:
     """
     usual = Linkage()
     kind = table.choice("kind", LinkageKind, usual.kind)
-    density, crank = table.number("bar_density"), table.number("crank_length")
+    crank = table.number("crank_length")
     try:
         return Linkage(
             kind=kind,
-            bar_density=usual.bar_density if density is None else density,
+            bar_density=table.number("bar_density"),
             crank_length=usual.crank_length if crank is None else crank,
         )
     except ConfigError as error:

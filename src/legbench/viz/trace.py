@@ -41,6 +41,31 @@ class TracedRows:
     """Numbers (n,) of the rows' oscillation periods, or jumps."""
     stance: Bools
     """Mask (n,) of the rows in which the foot carries the leg."""
+    hip: Floats
+    """Heights (n,) of the hip above the ground [m]; NaN without truth."""
+
+
+@final
+class TouchdownMemory:
+    """Memory of a leg that touches down, across slices of a run as if they were one."""
+
+    def __init__(self) -> None:
+        self._stance, self._hip, self._fell = False, np.nan, False
+
+    def bounces(self, hip: Floats, stance: Bools) -> Bools:
+        """Mask (n,) of the rows since a touchdown after which the hip has only fallen.
+
+        As in `metrics.stance`: a foot that is off the ground in such a row has bounced.
+        """
+        falls = np.diff(np.append(self._hip, hip)) < 0.0
+        before = np.append(self._stance, stance)
+        touches = before[1:] & ~before[:-1]
+        known = np.append(True, touches | ~falls)
+        last = np.maximum.accumulate(np.where(known, np.arange(len(known)), 0))
+        fell = np.append(self._fell, touches)[last]
+        if len(hip):
+            self._stance, self._hip, self._fell = bool(stance[-1]), float(hip[-1]), bool(fell[-1])
+        return fell[1:]
 
 
 @final
@@ -52,6 +77,7 @@ class Tracer:
         self._period, self._between = 0, False
         self._fastest = 0.0
         self._grounded = -np.inf
+        self._landing = TouchdownMemory()
 
     def extend(self, rows: Recorded) -> TracedRows:
         """Derive what pictures need of the next rows."""
@@ -60,24 +86,29 @@ class Tracer:
         z2 = joint_to_modal(joint, convention)[..., 1]
         rate = joint_to_modal(rows["joint_vel"], convention)[..., 1]
         stance = stance_of(rows, self._facts.run.setup.kind)
+        hip = rows["trunk_pos"][:, 1]
         return TracedRows(
             rows=rows,
             time=rows.time,
             joint=joint,
             polar=joint_to_polar(joint, self._facts.run.design.shank.length),
             modal=np.stack([z2, rate], axis=-1),
-            period=self._count_periods(*self._extremes(rows.time, stance, rate)),
+            period=self._count_periods(*self._extremes(rows.time, stance, rate, hip)),
             stance=stance,
+            hip=hip,
         )
 
-    def _extremes(self, time: Floats, stance: Bools, rate: Floats) -> tuple[Bools, Bools]:
+    def _extremes(
+        self, time: Floats, stance: Bools, rate: Floats, hip: Floats
+    ) -> tuple[Bools, Bools]:
         """Rows that may begin a period, and rows that must lie between two beginnings."""
         if self._facts.run.jumps:
             grounded = np.maximum.accumulate(
                 np.append(self._grounded, np.where(stance, time, -np.inf))
             )
             self._grounded = float(grounded[-1])
-            return stance, time - grounded[1:] >= MINIMUM_PHASE
+            off_for = time - grounded[1:]
+            return stance, (off_for >= MINIMUM_PHASE) & ~self._landing.bounces(hip, stance)
         fastest = np.maximum.accumulate(np.append(self._fastest, np.abs(rate)))
         self._fastest = float(fastest[-1])
         threshold = np.maximum(RATE_FLOOR, RATE_SHARE * fastest[1:])

@@ -71,7 +71,7 @@ def _series(own: Sequence[Signal], live: bool) -> rrb.Vertical:
             view("energy", "energy [J]"),
             *(view(f"own/{signal.name}", f"{signal.name} [{signal.unit}]") for signal in own),
         ),
-        view("rating", "P^r [-]"),
+        rrb.Tabs(view("rating", "P^r [-]"), view("lost", "log10(1 - P^r) [-]")),
         view("cycle", "control cycle [us]"),
     )
 
