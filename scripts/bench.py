@@ -22,14 +22,23 @@ import mujoco
 import numpy as np
 from mujoco import batch
 
-from legbench.control import Jump, JumpConfig, LegTargets
+from legbench.control import (
+    BangBangConfig,
+    Jump,
+    JumpConfig,
+    LegTargets,
+    PositionJumpConfig,
+)
 from legbench.design import LegDesign, load_design
+from legbench.design.setup import Setup, SetupKind
 from legbench.design.statics import Support
 from legbench.experiment import Experiment, record
+from legbench.experiment.batch import LegGroup, start_together
+from legbench.imperfections import Imperfections
 from legbench.kinematics import joint_to_modal, joint_to_polar, joint_to_polar_rate
 from legbench.loop import run
 from legbench.metrics import summarise
-from legbench.mjcf import BuildOptions
+from legbench.mjcf import BuildOptions, rest_qpos
 from legbench.plant.batch import BatchPlant
 from legbench.plant.sim import SimPlant
 from legbench.plant.start import Start
@@ -125,19 +134,80 @@ def bench_batch() -> Result:
     legs, cycles = 512, 60
     controller, start = hopping([prototype()] * legs)
     plant = BatchPlant([prototype()] * legs, BuildOptions(), start)
-    raw = batch.Batch(plant.model, nsim=legs, nthread=plant.threads)
+    bare = standing_batch(plant, start, cycles)
+    ratio, detail = ratio_of(lambda: run(plant, controller, cycles), bare)
+    return Result(
+        name="batch of 512 / mujoco.batch", value=ratio, bound=1.3, unit="x", detail=detail
+    )
 
-    def ours() -> None:
-        run(plant, controller, cycles)
+
+def standing_batch(plant: BatchPlant, start: Start, cycles: int) -> Callable[[], None]:
+    """Bare steps of as many legs of the plant's first model, which stand at their starts."""
+    legs = len(start.joint_pos)
+    raw = batch.Batch(plant.model, nsim=legs, nthread=plant.threads)
+    qpos, ctrl = raw.bind("qpos"), raw.bind("ctrl")
+    rest = np.array([rest_qpos(plant.model, prototype(), row) for row in start.joint_pos])
 
     def bare() -> None:
-        raw.reset(keyframe=0)
+        raw.reset()
+        qpos[:], ctrl[:] = rest, start.motor_pos
         for _ in range(cycles):
             raw.step(nstep=4)
 
-    ratio, detail = ratio_of(ours, bare)
+    return bare
+
+
+def bench_experiments() -> Result:
+    """Experiments of 280 legs, each at a set point of its own, with rows, against bare steps."""
+    legs, cycles = 280, 200
+    chosen = [
+        Experiment(
+            design=prototype(),
+            controller=BangBangConfig(z2=0.7 + 0.001 * leg, delay=0.01),
+            setup=Setup(kind=SetupKind.FFS),
+            duration=1e-3 * cycles,
+        )
+        for leg in range(legs)
+    ]
+    group = LegGroup(chosen)
+    _, start = start_together(chosen)
+    bare = standing_batch(group.open(), start, cycles)
+    ratio, detail = ratio_of(lambda: group.run(None, None, 0, cycles), bare)
     return Result(
-        name="batch of 512 / mujoco.batch", value=ratio, bound=1.3, unit="x", detail=detail
+        name="280 experiments / mujoco.batch",
+        value=ratio,
+        bound=1.0 / 0.85,
+        unit="x",
+        detail=detail,
+    )
+
+
+def bench_setup() -> Result:
+    """Setting up a batch of 280 legs that all differ, in CPU time for each leg."""
+    legs = 280
+    scale = 1.0 + 0.05 * np.linspace(-1.0, 1.0, legs)
+    chosen = [
+        Experiment(
+            design=prototype(),
+            controller=PositionJumpConfig(z2=0.9, dz2=0.1),
+            setup=Setup(kind=SetupKind.FFS),
+            imperfections=Imperfections(stiffness_error=(share - 1.0, 0.0)),
+        )
+        for share in scale.tolist()
+    ]
+    group = LegGroup(chosen)
+    times = []
+    for _ in range(PAIRS):
+        began = time.process_time()
+        start_together(chosen)
+        group.open()
+        times.append(1e3 * (time.process_time() - began) / legs)
+    return Result(
+        name="set-up of a leg of a batch",
+        value=min(times),
+        bound=1.0,
+        unit="ms",
+        detail=f"median {statistics.median(times):.2f} ms",
     )
 
 
@@ -312,6 +382,8 @@ def bench_first() -> Result:
 BENCHES = {
     "loop": bench_loop,
     "batch": bench_batch,
+    "experiments": bench_experiments,
+    "setup": bench_setup,
     "row": bench_row,
     "own": bench_own_signals,
     "summary": bench_summarise,

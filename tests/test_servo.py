@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from legbench.errors import ConfigError
-from legbench.servo import MAX_DELAY_CYCLES, Servo, ServoConfig
+from legbench.imperfections import MAX_DELAY_CYCLES
+from legbench.servo import Servo, ServoConfig
 from legbench.signals import Floats
 
 PERIOD = 0.001

@@ -6,16 +6,18 @@ is part of every result. The default is the perfect motor of the paper's equatio
 
 import math
 from collections import deque
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import final
+from typing import Final, TypeVar, final
 
 import numpy as np
 
 from legbench.errors import ConfigError
+from legbench.imperfections import MAX_DELAY_CYCLES, Imperfections
 from legbench.signals import Floats
 
-MAX_DELAY_CYCLES = 1000
-"""Largest delay, one second: a drive that reacts later is broken, not slow."""
+PERFECT: Final = Imperfections()
+"""Imperfections of motors and encoders that have none."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,40 +58,113 @@ class ServoConfig:
 
 @final
 class Servo:
-    """Servo of one leg or a batch, which computes motor positions cycle by cycle."""
+    """Servo of one leg or a batch, which computes motor positions cycle by cycle.
 
-    def __init__(self, config: ServoConfig, period: float) -> None:
-        self._ideal, self._delay = config.ideal, config.delay_cycles
-        self._step_max = math.inf if config.slew_rate is None else config.slew_rate * period
-        self._gain = (
-            1.0
-            if config.bandwidth is None
-            else 1.0 - math.exp(-2.0 * math.pi * config.bandwidth * period)
-        )
-        self._resolution = (
-            None if config.encoder_counts is None else 2.0 * math.pi / config.encoder_counts
-        )
-        self._waiting: deque[Floats] = deque()
-        self._position: Floats = np.zeros(2)
+    Positions are those that the motors' encoders count; `shaft` tells where the shafts are.
+
+    Attributes:
+        position: positions of the motors (..., 2) [rad].
+    """
+
+    def __init__(
+        self,
+        config: ServoConfig | Sequence[ServoConfig],
+        period: float,
+        imperfections: Imperfections | Sequence[Imperfections] = PERFECT,
+    ) -> None:
+        """Prepare the drives of a leg.
+
+        Args:
+            config: limits of both drives; one for each leg where legs differ.
+            period: control period [s].
+            imperfections: limits and zero error of each motor; one for each leg where they differ.
+        """
+        limits = _table(config, lambda each: _limits(each, period))
+        motors = _table(imperfections, lambda each: _motors(each, period))
+        step, gain, resolution, delay = np.moveaxis(limits, -2, 0)
+        slew, later, zero, low, high = np.moveaxis(motors, -2, 0)
+        self._step_max, self._gain = np.minimum(step, slew), gain
+        self._delay: Floats = delay + later
+        self._delays: list[int] = sorted({int(value) for value in self._delay.flat})
+        self._low, self._high = low, high
+        self._zero = zero if zero.any() else None
+        self._ranged = bool(np.isfinite(low).any() or np.isfinite(high).any())
+        lags = not (np.isinf(self._step_max).all() and (gain == 1.0).all())
+        self._ideal = not lags and self._delays == [0]
+        self._counts = np.isfinite(resolution)
+        self._resolution = np.where(self._counts, resolution, 1.0) if self._counts.any() else None
+        self._waiting: deque[Floats] = deque(maxlen=self._delays[-1] + 1)
+        self.position: Floats = np.zeros(2)
 
     def reset(self, position: Floats) -> None:
         """Stand still at `position` (..., 2) [rad], with nothing on the way."""
-        self._position = position.copy()
-        self._waiting = deque(position.copy() for _ in range(self._delay))
+        self.position = self._within(position.copy())
+        self._waiting.extend(position.copy() for _ in range(self._delays[-1] + 1))
 
     def follow(self, command: Floats) -> Floats:
         """Return motor positions (..., 2) [rad] held over the cycle that starts with `command`."""
         if self._ideal:
-            self._position = command
-            return command
+            self.position = self._within(command)
+            return self.position
         self._waiting.append(command.copy())
-        target = self._waiting.popleft()
-        move = self._gain * (target - self._position)
-        self._position = self._position + np.clip(move, -self._step_max, self._step_max)
-        return self._position
+        target = self._waiting[-1 - self._delays[0]]
+        for late in self._delays[1:]:
+            target = np.where(self._delay == late, self._waiting[-1 - late], target)
+        move = self._gain * (target - self.position)
+        moved = self.position + np.minimum(np.maximum(move, -self._step_max), self._step_max)
+        self.position = self._within(moved)
+        return self.position
+
+    def shaft(self, position: Floats) -> Floats:
+        """Return where the shafts are when the encoders count `position` (..., 2) [rad]."""
+        return position if self._zero is None else position + self._zero
 
     def encode(self, position: Floats) -> Floats:
         """Return an angle as the encoders show it: rounded to whole counts."""
-        if self._resolution is None:
+        resolution = self._resolution
+        if resolution is None:
             return position
-        return np.round(position / self._resolution) * self._resolution
+        return np.where(self._counts, np.round(position / resolution) * resolution, position)
+
+    def _within(self, position: Floats) -> Floats:
+        """A motor ends at its range, whatever it is told."""
+        if not self._ranged:
+            return position
+        return np.minimum(np.maximum(position, self._low), self._high)
+
+
+Settings = TypeVar("Settings", ServoConfig, Imperfections)
+
+
+def _table(settings: Settings | Sequence[Settings], row: Callable[[Settings], Floats]) -> Floats:
+    """Numbers of one leg's settings (k, 2), or of each leg's (n, k, 2)."""
+    if isinstance(settings, ServoConfig | Imperfections):
+        return row(settings)
+    return np.array([row(each) for each in settings])
+
+
+def _limits(config: ServoConfig, period: float) -> Floats:
+    """Longest way in a cycle, gain of the position loop, count of the encoders, delay (4, 2)."""
+    step = math.inf if config.slew_rate is None else config.slew_rate * period
+    gain = (
+        1.0
+        if config.bandwidth is None
+        else 1.0 - math.exp(-2.0 * math.pi * config.bandwidth * period)
+    )
+    count = math.inf if config.encoder_counts is None else 2.0 * math.pi / config.encoder_counts
+    return np.array([[value, value] for value in (step, gain, count, config.delay_cycles)])
+
+
+def _motors(imperfections: Imperfections, period: float) -> Floats:
+    """Longest way in a cycle, delay, zero error, lower and upper end of each motor (5, 2)."""
+    slew = imperfections.motor_slew_rate or (math.inf, math.inf)
+    ends = imperfections.motor_range or ((-math.inf, math.inf),) * 2
+    return np.array(
+        [
+            [rate * period for rate in slew],
+            imperfections.motor_delay_cycles or (0, 0),
+            imperfections.motor_zero or (0.0, 0.0),
+            [low for low, _ in ends],
+            [high for _, high in ends],
+        ]
+    )

@@ -284,3 +284,30 @@ def test_a_run_from_before_experiments_were_recorded_whole(
     shutil.copytree(OLD, run)
     called(capfd, "run", "--again", run).refused("before runs held their whole experiment")
     assert called(capfd, "replay", run).status == 0
+
+
+def test_imperfections_by_file_set_and_flag(
+    file: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    file.write_text(FILE + "\n[imperfections]\nlink_zero = [0.01, -0.02]\n", encoding="utf-8")
+    words = ["run", str(file), "--json", "--out", str(tmp_path / "runs"), "--duration", "0.02"]
+    setting = "imperfections.stiffness_error=[0.04, 0]"
+    flags = ["--motor-zero", "0.02", "-0.01", "--backlash", "0", "0.01"]
+    tables = ran(called(capfd, *words, "--set", setting, *flags))
+    assert entry(tables, "imperfections") == {
+        "stiffness_error": [0.04, 0.0],
+        "backlash": [0.0, 0.01],
+        "link_zero": [0.01, -0.02],
+        "motor_zero": [0.02, -0.01],
+    }
+
+
+def test_an_imperfection_that_is_none_is_wrong_usage(
+    file: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    done = called(capfd, "run", str(file), "--out", str(tmp_path), "--backlash", "-1", "0")
+    assert (done.status, done.out) == (2, "")
+    assert done.err == "legbench: backlash is (-1.0, 0.0); it must be 0 or more\n"
+    done = called(capfd, "run", str(file), "--out", str(tmp_path), "--set", "imperfections.zero=1")
+    assert done.status == 1
+    assert "imperfections.zero: unknown key; did you mean 'link_zero'? known are" in done.err

@@ -15,7 +15,9 @@ from legbench.experiment import (
     experiment_hash,
     experiment_text,
     load_experiment,
+    save_experiment,
 )
+from legbench.imperfections import Imperfections
 from legbench.mjcf import Linkage, Numerics
 from legbench.servo import ServoConfig
 
@@ -32,6 +34,27 @@ CASES = {
     **{controller: experiment(controller, "sim") for controller in CONTROLLERS},
     **{plant: experiment("jump", plant) for plant in PLANTS},
     "full": FULL,
+    "imperfect": replace(
+        experiment("position-jump", "sim"),
+        imperfections=Imperfections(
+            stiffness_error=(0.04, -0.02),
+            damping_error=(0.5, 0.0),
+            trunk_mass_error=0.01,
+            mass_error=(0.1, 0.0, -0.1),
+            com_error=(0.001, 0.0, 0.002),
+            inertia_error=(0.0, 0.2, 0.0),
+            coulomb_friction=(0.01, 0.006),
+            backlash=(0.01, 0.02),
+            guide_damping=(1.0, 0.5),
+            link_zero=(0.02, -0.01),
+            motor_zero=(0.0, 0.01),
+            link_noise=(0.001, 0.001),
+            motor_noise=(0.0005, 0.0005),
+            motor_slew_rate=(20.0, 9.0),
+            motor_delay_cycles=(2, 0),
+            motor_range=((-1.0, -0.25), (0.0, 2.0)),
+        ),
+    ),
 }
 
 
@@ -71,6 +94,20 @@ def test_the_file_says_units() -> None:
         "timestep = 0.00025  # [s]",
     ):
         assert f"\n{line}\n" in text
+
+
+def test_what_is_perfect_is_not_said() -> None:
+    assert "imperfections" not in canonical_text(FULL)
+    assert "imperfections" not in experiment_text(FULL)
+    text = experiment_text(CASES["imperfect"])
+    assert "\n[imperfections]\n" in text
+    assert "\nbacklash = [0.01, 0.02]  # [rad]\n" in text
+
+
+def test_a_file_holds_imperfections_bit_for_bit(tmp_path: Path) -> None:
+    path = tmp_path / "imperfect.toml"
+    save_experiment(CASES["imperfect"], path)
+    assert load_experiment(path) == CASES["imperfect"]
 
 
 def test_the_hash_is_that_of_the_text() -> None:

@@ -39,7 +39,7 @@ def test_a_linkage_needs_real_dimensions(value: float) -> None:
 
 def test_every_whole_part_of_the_period_is_a_time_step() -> None:
     for parts in range(1, 1000):
-        assert Numerics(timestep=0.001 / parts).timestep > 0.0
+        assert Numerics(timestep=0.001 / parts).timestep == 0.001 / parts
 
 
 @pytest.mark.parametrize("value", [0.0, -0.001, 0.0003, 0.002, 1.0, math.nan, math.inf])

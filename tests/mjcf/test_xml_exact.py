@@ -135,7 +135,7 @@ def test_every_setting_of_the_numerics_reaches_the_model(optimal: LegDesign) -> 
     spec = build_spec(optimal, replace(options("jump", "bars"), numerics=numerics))
     model = mujoco.MjModel.from_xml_string(to_xml(spec))
     assert (model.opt.timestep, model.opt.iterations, model.opt.tolerance) == (0.0005, 77, 1e-9)
-    assert np.array_equal(model.eq_solref, [numerics.loop_solref] * model.neq)
+    assert model.eq_solref.tolist() == [[0.001, 0.9]] * model.neq
     assert np.array_equal(model.eq_solimp, [numerics.loop_solimp] * model.neq)
     assert np.array_equal(model.pair_solref, [numerics.contact_solref])
     assert np.array_equal(model.pair_solimp, [numerics.contact_solimp])

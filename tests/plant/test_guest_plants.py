@@ -10,6 +10,7 @@ from legbench.design import LegDesign
 from legbench.design.setup import Setup, SetupKind
 from legbench.errors import ConfigError
 from legbench.experiment import Experiment, record
+from legbench.imperfections import Imperfections
 from legbench.plants import PLANTS, SimChoice
 from legbench.recording.reader import load
 
@@ -36,6 +37,22 @@ def test_a_plant_from_a_file_is_run_recorded_and_run_again(
     assert type(again.plant) is not type(chosen.plant)
     second = load(record(again, tmp_path / "second").path)
     assert np.array_equal(found["joint_pos"], second["joint_pos"])
+
+
+def test_a_plant_that_knows_no_imperfections_is_not_run_without_them(
+    prototype: LegDesign, tmp_path: Path
+) -> None:
+    chosen = Experiment(
+        design=prototype,
+        controller=BangBangConfig(),
+        setup=Setup(kind=SetupKind.FFS),
+        plant=PLANTS.find(STILL)(),
+        imperfections=Imperfections(link_zero=(0.01, 0.0)),
+        duration=0.1,
+    )
+    with pytest.raises(ConfigError, match="plant 'still' knows no imperfections: leave them out"):
+        record(chosen, tmp_path)
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_plants_that_come_along() -> None:

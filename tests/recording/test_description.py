@@ -11,6 +11,7 @@ from recorded_rows import append_rows
 from legbench.design.setup import Setup, SetupKind
 from legbench.design.toml import design_to_mapping, load_design
 from legbench.errors import FormatError
+from legbench.imperfections import Imperfections
 from legbench.kinematics import ModalConvention
 from legbench.phases import ControllerDescription, Counting, PhaseInfo, Role
 from legbench.recording.controller_table import controller_table
@@ -173,3 +174,27 @@ def test_runs_differ_by_the_entries_of_their_experiments() -> None:
     for entry in ("plant/kind", "linkage/crank_length", "duration"):
         value = "can" if entry == "plant/kind" else 2.0
         assert unlike(ours, describe(changed(f"experiment/{entry}", value))) == []
+
+
+def test_a_run_says_its_imperfections() -> None:
+    assert describe(GIVEN).imperfections.perfect
+    said = {"trunk_mass_error": 0.1, "link_zero": [0.01, 0], "motor_range": [[-1, 1], [0, 2.5]]}
+    found = describe(GIVEN | {"experiment": EXPERIMENT | {"imperfections": said}}).imperfections
+    assert found == Imperfections(
+        trunk_mass_error=0.1, link_zero=(0.01, 0.0), motor_range=((-1.0, 1.0), (0.0, 2.5))
+    )
+
+
+@pytest.mark.parametrize(
+    ("said", "message"),
+    [
+        ({"zero": 1}, "manifest imperfections: unknown zero; known are stiffness_error,"),
+        ({"link_zero": [1.0]}, r"imperfections.link_zero is \[1.0\]; it must be numbers of shape"),
+        ({"link_zero": ["a", 1.0]}, "it must be numbers of shape"),
+        ({"motor_range": [[0, 1], [1]]}, "it must be numbers of shape"),
+        ({"backlash": [-1, 0]}, "manifest imperfections: backlash is"),
+    ],
+)
+def test_imperfections_that_no_leg_can_have(said: dict[str, Any], message: str) -> None:
+    with pytest.raises(FormatError, match=message):
+        describe(GIVEN | {"experiment": EXPERIMENT | {"imperfections": said}})

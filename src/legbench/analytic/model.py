@@ -20,6 +20,7 @@ from legbench.analytic.equations import (
     sweep_rate,
     trunk_acceleration,
 )
+from legbench.analytic.losses import Losses
 from legbench.analytic.stops import Stop, make_stops, pushes
 from legbench.analytic.terms import (
     Bars,
@@ -51,6 +52,8 @@ class LegModel:
     """Joint stops; if there are none, joints turn freely, through the straight leg, too."""
     ops: Ops = SCALAR
     """The kind of numbers that the methods work on."""
+    losses: Losses | None = None
+    """Dry friction, damped guide and backlash, for plain floats alone; none for a perfect leg."""
 
     @classmethod
     def of(
@@ -61,6 +64,7 @@ class LegModel:
         bars: Bars | None = None,
         stops: bool = True,
         undamped: bool = False,
+        losses: Losses | None = None,
     ) -> "LegModel":
         """Collect the terms of a design; `gravity` in [m/s^2], bars without mass if not given."""
         floating = floating_terms(design, gravity, bars)
@@ -72,11 +76,17 @@ class LegModel:
             stiffness=design.stiffness,
             damping=(0.0, 0.0) if undamped else design.damping,
             stops=make_stops(design.limits) if stops else (),
+            losses=losses,
         )
 
     def torque(self, motor: Pair, q: Pair, v: Pair) -> Pair:
-        """Torque of springs and dampers on q1 and q2 [N m]."""
-        return damped(spring_torque(self.stiffness, motor, q), self.damping, v)
+        """Torque of springs, dampers and other losses on q1 and q2 [N m]."""
+        losses = self.losses
+        if losses is None:
+            return damped(spring_torque(self.stiffness, motor, q), self.damping, v)
+        spring = spring_torque(self.stiffness, losses.gear(motor, q), q)
+        torque, drag = damped(spring, self.damping, v), losses.drag(self.floating.reach, q, v)
+        return torque[0] + drag[0], torque[1] + drag[1]
 
     def acceleration(self, terms: PairTerms, motor: Pair, q: Pair, v: Pair) -> Pair:
         """Accelerations of q1 and q2 under the inertia `terms`, joint stops included [rad/s^2]."""
@@ -108,7 +118,11 @@ class LegModel:
     def stance_force(self, motor: Pair, q: Pair, v: Pair) -> Pair:
         """Contact force on the standing foot (forward, up) [N]."""
         a = self.stance_acceleration(motor, q, v)
-        return contact_force(self.ops, self.floating, q, v, a)
+        force = contact_force(self.ops, self.floating, q, v, a)
+        if self.losses is None:
+            return force
+        guide = self.losses.guide_force(self.floating.reach, q, v)
+        return force[0] - guide[0], force[1] - guide[1]
 
     def released_rise(self, motor: Pair, q: Pair, v: Pair) -> float:
         """Upward acceleration that the standing foot would have if it were released [m/s^2]."""

@@ -45,7 +45,7 @@ class CommonArguments:
     duration: float = 8.0
     """Length of the run [s]."""
     seed: int = 0
-    """Source of all randomness; recorded, nothing in a run is random yet."""
+    """Source of all randomness, which is the noise of encoders."""
     set: str | None = None
     """Replace an entry of the experiment, in the words of its file, such as
     design.springs.stiffness="[2.5, 2.3]"; may be repeated, other flags come after it."""
@@ -156,10 +156,12 @@ def arguments_with(flags: list[GuestFlag], defaults: Mapping[str, Any]) -> type[
 def quick(hint: Any) -> Any:
     """Type that tyro understands without its type checker, which is slow to import.
 
-    An enum becomes the choice of its values, `X | Y` becomes `Union[X, Y]`.
+    An enum becomes the choice of its values, `X | Y` becomes `Union[X, Y]`, None first: tyro takes
+    the first that a default fits, and asks its type checker about tuples.
     """
     if get_origin(hint) in (Union, UnionType):
-        return Union[tuple(quick(each) for each in get_args(hint))]  # noqa: UP007
+        members = sorted(get_args(hint), key=lambda each: each is not NoneType)
+        return Union[tuple(quick(each) for each in members)]  # noqa: UP007
     if isinstance(hint, type) and issubclass(hint, Enum):
         return Literal[tuple(member.value for member in hint)]  # pyright: ignore
     return hint

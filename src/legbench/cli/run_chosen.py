@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import MISSING, dataclass, field, fields
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any, Final, get_type_hints
 
 from legbench.cli.parse import parse
 from legbench.cli.run_arguments import (
@@ -22,6 +22,7 @@ from legbench.experiment.reading import placed
 from legbench.experiment.tables import read_tables, read_toml
 from legbench.experiment.writing import Writer
 from legbench.guests import Registry
+from legbench.imperfections import Imperfections
 from legbench.plants import PLANTS
 from legbench.servo import ServoConfig
 
@@ -170,12 +171,16 @@ def _command(scanned: Scan) -> str:
     return "run" if scanned.subject is None else f"run {scanned.subject}"
 
 
+_ROOMS: Final = {"servo": ServoConfig, "imperfections": Imperfections}
+"""Tables of an experiment all of whose entries are flags, and what they make."""
+
+
 def _flags(tables: Tables) -> list[GuestFlag]:
-    """Flags of the servo and of the chosen controller and plant."""
+    """Flags of servo and imperfections, and of the chosen controller and plant."""
     taken = {entry.name for entry in fields(CommonArguments)}
     found: list[GuestFlag] = []
     for place, kind in (
-        ("servo", ServoConfig),
+        *_ROOMS.items(),
         ("controller.settings", _kind(CONTROLLERS, tables, "controller")),
         ("plant.settings", _kind(PLANTS, tables, "plant")),
     ):
@@ -247,20 +252,22 @@ def _put_flags(tables: Tables, arguments: Any, flags: list[GuestFlag]) -> None:
             tables.put(key, tables.here(value))
         elif value != said_before[name]:
             tables.put(key, writer.plain(hints[name], value))
-    servo: dict[str, Any] = {}
+    given: dict[str, dict[str, Any]] = {room: {} for room in _ROOMS}
     for flag in flags:
         value = getattr(arguments, flag.attribute)
         if flag.default is MISSING or value != flag.default:
             told = tables.here(value) if isinstance(value, Path) else writer.plain(flag.hint, value)
             tables.put(flag.key, told)
-            if flag.attribute.startswith("servo_"):
-                servo[flag.attribute.removeprefix("servo_")] = value
-    _check_servo(servo)
+            room, _, name = flag.key.partition(".")
+            if room in _ROOMS:
+                given[room][name] = value
+    for room, kind in _ROOMS.items():
+        _check_room(kind, given[room])
 
 
-def _check_servo(given: dict[str, Any]) -> None:
-    """Refuse flags that describe no servo, as wrong usage."""
+def _check_room(kind: type[Any], given: dict[str, Any]) -> None:
+    """Refuse flags that describe no servo or no imperfections, as wrong usage."""
     try:
-        ServoConfig(**given)
+        kind(**given)
     except ConfigError as error:
         raise UsageError(str(error)) from None

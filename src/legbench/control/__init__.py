@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from legbench.control.abstract import AbstractController
 from legbench.control.registry import CONTROLLERS
 from legbench.control.setpoint import LegTargets, SetpointMeaning
-from legbench.control.settings import ControllerSettings, make_controller
+from legbench.control.settings import ControllerSettings, make_controller, make_controllers
 from legbench.design.setup import SetupKind
 from legbench.lazily import lazy_names
 from legbench.phases import ControllerDescription, Counting, PhaseInfo, Role
@@ -37,6 +37,7 @@ __all__ = [
     "SetupKind",
     "Signal",
     "make_controller",
+    "make_controllers",
 ]
 __getattr__ = lazy_names(
     __name__,

@@ -5,13 +5,15 @@ floats, a batch in arrays; both obey the same table, and their commands are equa
 """
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, final
 
 import numpy as np
 
 from legbench.control.abstract import AbstractController
-from legbench.control.jump_rules import JumpPhase, phase_exits, phase_infos
+from legbench.control.jump_rules import JumpPhase, PhaseExit, phase_exits, phase_infos
+from legbench.control.per_leg import each_config, setting
 from legbench.control.setpoint import LegTargets, check_delay
 from legbench.design import LegDesign
 from legbench.design.setup import SetupKind
@@ -51,6 +53,13 @@ class JumpConfig:
         """Make the controller for these legs; raises ConfigError where they refuse the settings."""
         return Jump(self, targets)
 
+    @classmethod
+    def build_each(
+        cls, settings: "Sequence[JumpConfig]", targets: LegTargets
+    ) -> AbstractController:
+        """Make the controller of a batch whose legs have settings of their own."""
+        return Jump(settings, targets)
+
     def describe(self) -> ControllerDescription:
         """Return its description: its phases, and that every period counts."""
         return ControllerDescription(phases=phase_infos(self))
@@ -68,14 +77,19 @@ class Jump(AbstractController):
             makes no sense, or a leg that does not stand.
     """
 
-    def __init__(self, config: JumpConfig, targets: LegTargets) -> None:
-        _check(config)
+    def __init__(self, config: JumpConfig | Sequence[JumpConfig], targets: LegTargets) -> None:
+        """Prepare for the legs of `targets`, all with the same settings or each with its own."""
+        for each in each_config(config):
+            _check(each)
         if targets.support is not Support.FOOT:
             raise ConfigError(STANDING_ONLY)
-        folded = targets.motor_at(config.z2 + config.dz2, "z2 + dz2")
-        stretched = targets.motor_at(config.z2 - config.dz2, "z2 - dz2")
-        one = isinstance(targets.designs, LegDesign)
-        self._law = (_OneLeg if one else _Batch)(config, targets, folded, stretched)
+        z2, dz2 = setting(config, "z2"), setting(config, "dz2")
+        folded = targets.motor_at(z2 + dz2, "z2 + dz2")
+        stretched = targets.motor_at(z2 - dz2, "z2 - dz2")
+        if isinstance(config, JumpConfig) and isinstance(targets.designs, LegDesign):
+            self._law = _OneLeg(config, targets, folded, stretched)
+        else:
+            self._law = _Batch(each_config(config), targets, folded, stretched)
         self._folded = folded
 
     @property
@@ -173,19 +187,24 @@ class _Batch:
     """Law of many legs in arrays, one row for each leg."""
 
     def __init__(
-        self, config: JumpConfig, targets: LegTargets, folded: Floats, stretched: Floats
+        self,
+        configs: Sequence[JumpConfig],
+        targets: LegTargets,
+        folded: Floats,
+        stretched: Floats,
     ) -> None:
-        self._targets, self._turn = targets, config.apex_turn
+        """Prepare for one set of settings for all legs, or one for each."""
+        self._targets = targets
+        self._turn = np.array([config.apex_turn for config in configs])
         self._folded, self._stretched = folded, stretched
         self._stiffness = targets.modal_stiffness()
-        exits = phase_exits(config)
-        self._next_of = np.zeros(max(exits) + 1, dtype=np.int64)
-        for phase, leave in exits.items():
-            self._next_of[phase] = leave.to
-        self._apex_of = _by_phase({phase: leave.apex for phase, leave in exits.items()})
-        self._sense_of = _by_phase({phase: leave.sense for phase, leave in exits.items()})
-        self._load_of = _by_phase({phase: leave.load for phase, leave in exits.items()})
-        self._dwell_of = _by_phase({phase: leave.dwell for phase, leave in exits.items()})
+        ends = [phase_exits(config) for config in configs]
+        self._rows = np.arange(len(ends)) if len(ends) > 1 else 0
+        self._next_of = _by_phase(ends, lambda leave: leave.to).astype(np.int64)
+        self._apex_of = _by_phase(ends, lambda leave: leave.apex)
+        self._sense_of = _by_phase(ends, lambda leave: leave.sense)
+        self._load_of = _by_phase(ends, lambda leave: leave.load)
+        self._dwell_of = _by_phase(ends, lambda leave: leave.dwell)
         self._standing: Floats = np.ones(folded.shape[:-1])
         self._begin()
 
@@ -211,23 +230,27 @@ class _Batch:
         leaving = at_apex | (holds & (observation.time - self._since >= self._dwell))
         if np.count_nonzero(leaving):
             self._since = np.where(leaving, observation.time, self._since)
-            self._enter(np.where(leaving, self._next_of[self._phase], self._phase))
+            self._enter(np.where(leaving, self._next_of[self._rows, self._phase], self._phase))
             self._furthest = np.where(leaving, self._apex * fold, self._furthest)
         return self._command
 
     def _enter(self, phase: Ints) -> None:
         """Look up what ends each leg's phase, and make the command that goes with it."""
         self._phase = phase
-        self._apex, self._dwell = self._apex_of[phase], self._dwell_of[phase]
-        self._sense, self._load = self._sense_of[phase], self._load_of[phase]
+        place = self._rows, phase
+        self._apex, self._dwell = self._apex_of[place], self._dwell_of[place]
+        self._sense, self._load = self._sense_of[place], self._load_of[place]
         pushing = (phase == JumpPhase.PUSH)[..., np.newaxis]
         motor_pos = np.where(pushing, self._stretched, self._folded)
         self._command = Command(motor_pos=motor_pos, phase=phase)
 
 
-def _by_phase(entries: dict[JumpPhase, float]) -> Floats:
-    """Phase -> value, as an array to be indexed with phases."""
-    table = np.zeros(max(entries) + 1)
-    for phase, value in entries.items():
-        table[phase] = value
+def _by_phase(
+    ends: Sequence[dict[JumpPhase, PhaseExit]], value: Callable[[PhaseExit], float]
+) -> Floats:
+    """Value by settings and phase, as an array (settings, phases) to be indexed with both."""
+    table = np.zeros((len(ends), max(JumpPhase) + 1))
+    for row, exits in enumerate(ends):
+        for phase, leave in exits.items():
+            table[row, phase] = value(leave)
     return table

@@ -1,13 +1,16 @@
 """One step of the equilibrium in modal space (section IV-B): shows the passive motion."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import partial
 from typing import ClassVar, final
 
 import numpy as np
 
 from legbench.control.abstract import AbstractController
-from legbench.control.setpoint import LegTargets, check_delay
+from legbench.control.per_leg import check_delays, setting
+from legbench.control.setpoint import LegTargets
 from legbench.design.setup import SetupKind
 from legbench.phases import ControllerDescription, Counting, PhaseInfo, Role
 from legbench.signals import Command, Floats, Observation
@@ -44,6 +47,13 @@ class PositionJumpConfig:
         """Make the controller for these legs; raises ConfigError where they refuse the settings."""
         return PositionJump(self, targets)
 
+    @classmethod
+    def build_each(
+        cls, settings: "Sequence[PositionJumpConfig]", targets: LegTargets
+    ) -> AbstractController:
+        """Make the controller of a batch whose legs have settings of their own."""
+        return PositionJump(settings, targets)
+
     def describe(self) -> ControllerDescription:
         """Return its phases, and that periods count above a tenth of the deflection."""
         return ControllerDescription(
@@ -70,11 +80,16 @@ class PositionJump(AbstractController):
         ConfigError: a set point that the leg cannot reach, or a delay that makes no sense.
     """
 
-    def __init__(self, config: PositionJumpConfig, targets: LegTargets) -> None:
-        self._before = targets.motor_at(config.z2 + config.dz2, "z2 + dz2")
-        self._after = targets.motor_at(config.z2, "z2")
-        check_delay(config.delay)
-        self._delay = config.delay
+    def __init__(
+        self, config: PositionJumpConfig | Sequence[PositionJumpConfig], targets: LegTargets
+    ) -> None:
+        """Prepare for the legs of `targets`, all with the same settings or each with its own."""
+        of = partial(setting, config)
+        self._before = targets.motor_at(of("z2") + of("dz2"), "z2 + dz2")
+        self._after = targets.motor_at(of("z2"), "z2")
+        check_delays(config)
+        self._delay = of("delay")
+        self._last = float(np.max(self._delay))
         shape = self._before.shape[:-1]
         self._rest = Command.holding(self._before)
         stepped = np.full(shape, PositionJumpPhase.STEPPED, dtype=np.int64)
@@ -90,4 +105,12 @@ class PositionJump(AbstractController):
 
     def step(self, observation: Observation) -> Command:
         """Command z2 + dz2 until `delay`, z2 afterwards."""
-        return self._rest if observation.time < self._delay else self._stepped
+        if observation.time >= self._last:
+            return self._stepped
+        waits = np.asarray(observation.time < self._delay)
+        if waits.all():
+            return self._rest
+        return Command(
+            motor_pos=np.where(waits[..., np.newaxis], self._before, self._after),
+            phase=np.where(waits, self._rest.phase, self._stepped.phase),
+        )

@@ -53,22 +53,29 @@ class LegTargets:
         for design in designs:
             yield replace(self, designs=design)
 
-    def motor_at(self, z2: float, name: str) -> Floats:
+    def motor_at(self, z2: float | Floats, name: str) -> Floats:
         """Motor positions (..., 2) [rad] for the set point `z2` [rad], called `name` in errors.
 
+        Args:
+            z2: the set point; of a batch, one for all or one for each leg (n,).
+            name: what to call it.
+
         Raises:
-            ConfigError: the leg has no equilibrium there, or it lies outside the joint limits.
+            ConfigError: a leg has no equilibrium there, or it lies outside the joint limits.
         """
         if isinstance(self.designs, LegDesign):
-            return self._motor_of(self.designs, z2, name)
-        return np.array([self._motor_of(design, z2, name) for design in self.designs])
+            return self._motor_of(self.designs, float(z2), name)
+        wanted = np.broadcast_to(np.asarray(z2, dtype=np.float64), len(self.designs))
+        motor = self._motors_of(self.designs, wanted)
+        if motor is None:
+            # One by one, so that the first leg that refuses says why.
+            pairs = zip(self.designs, wanted.tolist(), strict=True)
+            return np.array([self._motor_of(design, each, name) for design, each in pairs])
+        return motor
 
     def link_at_rest(self, motor_pos: Floats) -> Floats:
         """Link angles (..., 2) [rad] at which the supported leg rests for motor positions."""
-        if isinstance(self.designs, LegDesign):
-            return equilibrium(self.designs, motor_pos, self.support)
-        rows = zip(self.designs, motor_pos, strict=True)
-        return np.array([equilibrium(design, row, self.support) for design, row in rows])
+        return equilibrium(self.designs, motor_pos, self.support)
 
     def modal_stiffness(self) -> Floats:
         """Stiffness of the springs along z2, smallest over the joints (...) [N m/rad]."""
@@ -79,6 +86,27 @@ class LegTargets:
     def radial(self, joint: Floats) -> Floats:
         """The z2 component (...) of joint angles, rates or torques (..., 2), eq. (15)."""
         return self.convention.scale * (joint[..., 1] - joint[..., 0])
+
+    def _motors_of(self, designs: Sequence[LegDesign], z2: Floats) -> Floats | None:
+        """Motor positions (n, 2) of all legs at once; None if one of them refuses its own."""
+        if not np.isfinite(z2).all():
+            return None
+        target = modal_to_joint(np.stack([np.zeros_like(z2), z2], axis=-1), self.convention)
+        stiffness = np.array([design.stiffness for design in designs])
+        moment = np.array([gravity_load(design, self.support).moment for design in designs])
+        if self.meaning is SetpointMeaning.LINK:
+            link, motor = target, target + moment * np.sin(target) / stiffness
+            held = bool(np.all(stiffness + moment * np.cos(link) > 0.0))
+        else:
+            try:
+                link, motor, held = equilibrium(designs, target, self.support), target, True
+            except DesignError:
+                return None
+        hip = np.array([design.limits.hip for design in designs])
+        knee = np.array([design.limits.knee for design in designs])
+        for angle, ends in ((link[:, 0], hip), (link[:, 1] - link[:, 0], knee)):
+            held &= bool(np.all((ends[:, 0] <= angle) & (angle <= ends[:, 1])))
+        return motor if held else None
 
     def _motor_of(self, design: LegDesign, z2: float, name: str) -> Floats:
         if not math.isfinite(z2):

@@ -1,5 +1,6 @@
 """Settings of a controller, by which it is found, built and measured, for one leg or many."""
 
+from collections.abc import Sequence
 from typing import ClassVar, Protocol, runtime_checkable
 
 from legbench.control.abstract import AbstractController
@@ -44,3 +45,28 @@ def make_controller(settings: ControllerSettings, targets: LegTargets) -> Abstra
     if isinstance(targets.designs, LegDesign):
         return Checked(settings.build(targets), description)
     return EachLeg([Checked(settings.build(one), description) for one in targets.each()])
+
+
+def make_controllers(
+    settings: Sequence[ControllerSettings], targets: LegTargets
+) -> AbstractController:
+    """Make the controller of a batch whose legs have settings of their own.
+
+    Settings of one class that says `batched` make one law in arrays; laws of several classes, or of
+    a class that knows one leg alone, are stepped leg by leg.
+
+    Args:
+        settings: one for each leg.
+        targets: the legs, a batch.
+
+    Raises:
+        ConfigError: settings that a leg refuses.
+    """
+    kinds = {type(each) for each in settings}
+    if len(kinds) == 1:
+        kind = next(iter(kinds))
+        build = getattr(kind, "build_each", None) if getattr(kind, "batched", False) else None
+        if build is not None:
+            return build(settings, targets)
+    pairs = zip(settings, targets.each(), strict=True)
+    return EachLeg([make_controller(each, one) for each, one in pairs])

@@ -1,5 +1,6 @@
 """Statics of a leg: torques of gravity, and motor positions that hold a posture."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -96,21 +97,33 @@ def is_stable(stiffness: Floats, moment: Floats, motor_pos: Floats, joint_pos: F
     return (np.abs(residual) < 1e-9) & (slope > 0.0)
 
 
-def equilibrium(design: LegDesign, motor_pos: Floats, support: Support) -> Floats:
+def equilibrium(
+    design: LegDesign | Sequence[LegDesign], motor_pos: Floats, support: Support
+) -> Floats:
     """Link posture at which gravity balances the springs for `motor_pos` (..., 2) [rad].
 
     Newton's method starts at the motor position and follows the branch that continues into it when
-    gravity is turned up from zero.
+    gravity is turned up from zero. Legs of a sequence, one for each row of `motor_pos`, are solved
+    together, to the bit as alone.
 
     Raises:
-        DesignError: the springs are too soft to hold the leg at that motor position.
+        DesignError: the springs are too soft to hold a leg at that motor position; the message
+            shows the first one.
     """
-    stiffness = np.asarray(design.stiffness)
-    moment = np.asarray(gravity_load(design, support).moment)
+    if isinstance(design, LegDesign):
+        stiffness = np.asarray(design.stiffness)
+        moment = np.asarray(gravity_load(design, support).moment)
+    else:
+        stiffness = np.array([each.stiffness for each in design])
+        moment = np.array([gravity_load(each, support).moment for each in design])
     joint_pos = np.array(motor_pos, dtype=np.float64)
     for share in np.linspace(0.1, 1.0, 10):
         joint_pos = balance(stiffness, share * moment, motor_pos, joint_pos)
-    if not np.all(is_stable(stiffness, moment, motor_pos, joint_pos)):
+    stable = is_stable(stiffness, moment, motor_pos, joint_pos)
+    if not np.all(stable):
+        if not isinstance(design, LegDesign):
+            first = int(np.flatnonzero(~stable.all(axis=-1))[0])
+            design, motor_pos = design[first], motor_pos[first]
         raise DesignError(
             f"no stable equilibrium for motor positions {np.round(motor_pos, 3)} rad: stiffness "
             f"{design.stiffness} N m/rad does not carry the leg on its {support.value}"

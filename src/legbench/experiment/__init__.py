@@ -9,6 +9,7 @@ from legbench.lazily import lazy_names
 
 if TYPE_CHECKING:
     from legbench.control import ControllerSettings, make_controller
+    from legbench.experiment.batch import run_batch
     from legbench.experiment.canonical import canonical_text, experiment_hash
     from legbench.experiment.data import Conventions, Experiment
     from legbench.experiment.files import experiment_text, load_experiment, save_experiment
@@ -26,6 +27,7 @@ __all__ = [
     "load_experiment",
     "make_controller",
     "record",
+    "run_batch",
     "save_experiment",
     "start_of",
     "targets_of",
@@ -43,6 +45,7 @@ __getattr__ = lazy_names(
         "load_experiment": "legbench.experiment.files",
         "make_controller": "legbench.control",
         "record": "legbench.experiment.running",
+        "run_batch": "legbench.experiment.batch",
         "save_experiment": "legbench.experiment.files",
         "start_of": "legbench.experiment.start",
         "targets_of": "legbench.experiment.start",

@@ -11,12 +11,13 @@ from legbench.design.setup import Setup
 from legbench.errors import ConfigError
 from legbench.experiment.reading import REGISTRY
 from legbench.guests import load_text
+from legbench.imperfections import Imperfections
 from legbench.kinematics import ModalConvention
 from legbench.mjcf.options import BuildOptions, Ground, Linkage, Numerics
 from legbench.plant.opening import PlantSettings
 from legbench.plant.start import PERIOD
 from legbench.plants import PLANTS, SimChoice
-from legbench.servo import ServoConfig
+from legbench.servo import PERFECT, ServoConfig
 
 LARGEST_SEED: Final = (1 << 63) - 1
 """Largest seed: TOML and most generators hold no larger whole number."""
@@ -41,7 +42,8 @@ class Experiment:
 
     Raises:
         ConfigError: a duration that is shorter than a cycle, or endless; a seed that is negative;
-            a controller or plant that lacks something, or takes a built-in's name.
+            imperfections that leave no leg, or belong to another setup; a controller or plant
+            that lacks something, or takes a built-in's name.
     """
 
     design: LegDesign
@@ -58,6 +60,8 @@ class Experiment:
     """Numerics of the simulation."""
     servo: ServoConfig = field(default_factory=ServoConfig)
     """Limits of a simulated drive."""
+    imperfections: Imperfections = PERFECT
+    """What leg, encoders and motors have that the controller does not know of."""
     conventions: Conventions = field(default_factory=Conventions)
     """How the paper's formulas are read."""
     plant: PlantSettings = field(default_factory=SimChoice, metadata={REGISTRY: PLANTS})
@@ -65,8 +69,8 @@ class Experiment:
     duration: float = 8.0
     """Length of the run [s]."""
     seed: int = 0
-    """Source of all randomness of a run. Nothing in a run is random yet: it is recorded, and
-    changes the experiment's name, but no row."""
+    """Source of all randomness of a run, which is the noise of its encoders: experiments that
+    differ in anything but their seed share it. Without noise it changes no row."""
 
     def __post_init__(self) -> None:
         if not PERIOD <= self.duration < math.inf:
@@ -76,6 +80,8 @@ class Experiment:
             )
         if not 0 <= self.seed <= LARGEST_SEED:
             raise ConfigError(f"seed is {self.seed}; it must be 0 to {LARGEST_SEED}")
+        self.imperfections.leg_of(self.design)
+        self.options.built(self.imperfections)
         CONTROLLERS.check(type(self.controller))
         PLANTS.check(type(self.plant))
 

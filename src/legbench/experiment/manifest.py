@@ -66,7 +66,7 @@ def _reference(registry: Registry, guest: type[Any], copy: str) -> str:
 def manifest_of(
     experiment: Experiment,
     start: Start,
-    xml: str,
+    xml: str | None,
     period: float,
     facts: Mapping[str, Any],
     folder: Path | None,
@@ -76,7 +76,7 @@ def manifest_of(
     Args:
         experiment: what is to happen.
         start: the state that it begins in.
-        xml: the model.
+        xml: the model; None: its text was not made, and its hash is left out.
         period: time between two commands [s].
         facts: what the opened plant has to say.
         folder: the run folder, or one beside it; paths are told relative to it. None: the run is
@@ -96,7 +96,7 @@ def manifest_of(
         "plant": {"kind": experiment.plant.kind, **facts},
         "provenance": {
             "versions": {"python": platform.python_version(), **_versions()},
-            "mjcf_sha256": xml_hash(xml),
+            **({} if xml is None else {"mjcf_sha256": xml_hash(xml)}),
             "experiment_sha256": experiment_hash(experiment),
             "guests": {
                 guest.what: {"file": guest.name, "sha256": _sha256(guest.content)}

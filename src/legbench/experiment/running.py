@@ -136,6 +136,8 @@ def _prepared(experiment: Experiment) -> Iterator[Prepared]:
         options=experiment.options,
         start=start,
         servo=experiment.servo,
+        imperfections=experiment.imperfections,
+        seed=experiment.seed,
         needs=Needs(
             controller=experiment.controller.kind,
             signals=needs_of(experiment.controller),
@@ -143,7 +145,9 @@ def _prepared(experiment: Experiment) -> Iterator[Prepared]:
         ),
     )
     controller = make_controller(experiment.controller, targets_of(experiment))
-    xml = model_text(experiment.design, experiment.options)
+    imperfections = experiment.imperfections
+    built = imperfections.leg_of(experiment.design), experiment.options.built(imperfections)
+    xml = model_text(*built)
     opened = open_plant(experiment.plant, leg)
     with opened.plant:
         yield Prepared(

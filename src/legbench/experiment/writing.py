@@ -4,6 +4,7 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import Field, dataclass, fields, is_dataclass
 from enum import Enum
+from functools import lru_cache
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
@@ -12,9 +13,15 @@ from legbench.experiment.reading import REGISTRY, joined, tagged
 from legbench.guests import Registry
 
 
+@lru_cache(maxsize=256)
+def _hints(kind: type[Any]) -> dict[str, Any]:
+    """Types of the fields of a class; finding them out takes longer than writing them."""
+    return get_type_hints(kind)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Writer:
-    """Writer that makes tables of plain values; None is left out."""
+    """Writer that makes tables of plain values; None and tables without entries are left out."""
 
     tables_of: Mapping[type, Callable[[Any], dict[str, Any]]]
     """Classes whose tables have words of their own."""
@@ -29,12 +36,12 @@ class Writer:
         own = self.tables_of.get(kind)
         if own is not None:
             return own(value)
-        hints = get_type_hints(kind)
+        hints = _hints(kind)
         found = {}
         for entry in fields(kind):
             if entry.init and (self.where or not entry.metadata.get("where")):
                 content = self._field(entry, hints[entry.name], getattr(value, entry.name))
-                if content is not None:
+                if content is not None and content != {}:
                     found[entry.name] = content
         return found
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from legbench.design.leg import LegDesign
 from legbench.design.statics import GRAVITY
+from legbench.metrics.built import built_of
 from legbench.metrics.changes import changes
 from legbench.metrics.rows import runs_of
 from legbench.metrics.source import Recorded
@@ -24,6 +24,8 @@ microjoules, where the paper's smallest oscillations have millijoules."""
 class Flows:
     """Energy that flowed in each interval between two rows (n - 1,) [J]; NaN without truth.
 
+    They are NaN, too, where noise on the encoders hides it.
+
     `gain = motor_work - damper_loss + unexplained` holds by definition of the last.
     """
 
@@ -32,26 +34,25 @@ class Flows:
     motor_work: Floats
     """Work of the motors, U(theta_k+1, q_k) - U(theta_k, q_k), in an interval's first instant."""
     damper_loss: Floats
-    """Viscous loss in both joints."""
+    """Loss in both joints, viscous and dry, and in the trunk's guide."""
     unexplained: Floats
-    """Unexplained rest: contact, impact, stops, friction, and what the numerics make or lose."""
-
-
-def spring_energy(design: LegDesign, motor_pos: Floats, joint_pos: Floats) -> Floats:
-    """U = 1/2 sum k_i (theta_i - q_i)^2 of the series springs, positions (..., 2) [rad] -> [J]."""
-    return 0.5 * np.square(motor_pos - joint_pos) @ np.asarray(design.stiffness)
+    """Unexplained rest: contact, impact, stops, and what the numerics make or lose."""
 
 
 def energy_flows(recording: Recorded) -> Flows:
-    """Split the change of energy over each interval into work, loss and the unexplained."""
-    design = recording.description.design
-    motor, joint = recording["motor_pos"], recording["joint_pos"]
-    after_move = spring_energy(design, motor[1:], joint[:-1])
-    work = after_move - spring_energy(design, motor[:-1], joint[:-1])
+    """Split the change of energy over each interval into work, loss and the unexplained.
+
+    The leg is the one that was built, with the imperfections that the run says it had.
+    """
+    built = built_of(recording)
+    motor, joint = built.shaft, built.joint
+    after_move = built.spring_energy(motor[1:], joint[:-1])
+    work = after_move - built.spring_energy(motor[:-1], joint[:-1])
     energy = recording["energy"]
     passive = np.diff(energy[:, 0] + energy[:, 1])
-    passive += spring_energy(design, motor[1:], joint[1:]) - after_move
-    power = np.square(recording["joint_vel"]) @ np.asarray(design.damping)
+    passive += built.spring_energy(motor[1:], joint[1:]) - after_move
+    power = np.square(recording["joint_vel"]) @ np.asarray(built.design.damping)
+    power = power + built.other_power
     loss = _integral(recording.time, power, motor)
     return Flows(gain=work + passive, motor_work=work, damper_loss=loss, unexplained=passive + loss)
 

@@ -9,7 +9,7 @@ from legbench.lazily import lazy_names
 from legbench.mjcf.options import BuildOptions, Ground, Linkage, LinkageKind, Numerics
 
 if TYPE_CHECKING:
-    from legbench.mjcf.build import build_spec
+    from legbench.mjcf.build import bare_model, build_spec
     from legbench.mjcf.pose import rest_qpos
     from legbench.mjcf.text import model_text
     from legbench.mjcf.xml import to_xml, xml_hash
@@ -20,6 +20,7 @@ __all__ = [
     "Linkage",
     "LinkageKind",
     "Numerics",
+    "bare_model",
     "build_spec",
     "model_text",
     "rest_qpos",
@@ -29,6 +30,7 @@ __all__ = [
 __getattr__ = lazy_names(
     __name__,
     {
+        "bare_model": "legbench.mjcf.build",
         "build_spec": "legbench.mjcf.build",
         "model_text": "legbench.mjcf.text",
         "rest_qpos": "legbench.mjcf.pose",

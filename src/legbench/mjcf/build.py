@@ -12,6 +12,7 @@ from legbench.mjcf.ground import add_world
 from legbench.mjcf.linkage import (
     HINGE_AXIS,
     add_bars,
+    add_friction,
     add_reduced,
     linear_damping,
 )
@@ -31,6 +32,32 @@ def build_spec(design: LegDesign, options: BuildOptions) -> mujoco.MjSpec:
         ConfigError: the bars outweigh the trunk, no step or bar suits the leg, or MuJoCo refuses a
             mass or an inertia.
     """
+    spec = _assembled(design, options, dry=any(options.friction), seen=True)
+    model = _compiled(spec, design)
+    spec.add_key(name="bent", qpos=rest_qpos(model, design, BENT).tolist(), ctrl=BENT.tolist())
+    return spec
+
+
+def bare_model(
+    design: LegDesign, options: BuildOptions, *, dry: bool | None = None
+) -> mujoco.MjModel:
+    """Compile a model that moves to the bit as that of `build_spec`, and cannot be looked at.
+
+    Without textures, geoms to see and keyframe it takes a hundredth of the memory.
+
+    Args:
+        design: the leg.
+        options: setup, linkage, ground, numerics, friction.
+        dry: whether joints have dry friction, be it zero: models of one batch have the same parts.
+
+    Raises:
+        ConfigError: as `build_spec`.
+    """
+    dry = any(options.friction) if dry is None else dry
+    return _compiled(_assembled(design, options, dry=dry, seen=False), design)
+
+
+def _assembled(design: LegDesign, options: BuildOptions, *, dry: bool, seen: bool) -> mujoco.MjSpec:
     setup, numerics = options.setup, options.numerics.fitted([design], options.linkage)
     spec = mujoco.MjSpec()
     spec.modelname = f"{design.name}_{setup.kind}_{options.linkage.kind}"
@@ -39,7 +66,8 @@ def build_spec(design: LegDesign, options: BuildOptions) -> mujoco.MjSpec:
     spec.option.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
     flat = setup.kind is SetupKind.HFTS
     spec.option.gravity = GRAVITY * np.array([0.0, 1.0, 0.0] if flat else [0.0, 0.0, -1.0])
-    look.add_scenery(spec)
+    if seen:
+        look.add_scenery(spec)
 
     height = hip_height(design, BENT)
     _add_trunk(spec, design, options, height)
@@ -49,10 +77,14 @@ def build_spec(design: LegDesign, options: BuildOptions) -> mujoco.MjSpec:
     else:
         add_reduced(spec, design, numerics)
     _add_springs(spec, design, options.linkage.kind)
-    add_world(spec, setup, options.ground, numerics)
+    if dry:
+        add_friction(spec, options.friction, numerics)
+    if seen:
+        look.dress(spec, design, options.linkage)
+    add_world(spec, setup, options.ground, numerics, seen=seen)
     sensors.add_sensors(spec, setup.kind, bars=options.linkage.kind is LinkageKind.BARS)
-    look.add_camera(spec, 0.6 * height)
-    _add_keyframe(spec, design)
+    if seen:
+        look.add_camera(spec, 0.6 * height)
     return spec
 
 
@@ -67,16 +99,25 @@ def _add_trunk(
     trunk.ipos = np.array([0.0, 0.0, 0.03])
     trunk.inertia = np.array([5e-4, 7e-4, 7e-4])
     trunk.add_site(name="hip", size=[0.004] * 3, group=3)
-    look.add_trunk_box(trunk)
     if not setup.trunk_moves:
         return
     if setup.boom_radius:
         pivot = [0.0, -setup.boom_radius, 0.0]
-        trunk.add_joint(name="boom_yaw", pos=pivot, axis=[0.0, 0.0, 1.0])
-        trunk.add_joint(name="boom_roll", pos=pivot, axis=[1.0, 0.0, 0.0])
+        # A force c v at the end of an arm r turns the boom back by c r^2 omega.
+        yaw, roll = (value * setup.boom_radius**2 for value in options.guide_damping)
+        for name, axis, damping in (
+            ("boom_yaw", [0.0, 0.0, 1.0], yaw),
+            ("boom_roll", [1.0, 0.0, 0.0], roll),
+        ):
+            trunk.add_joint(name=name, pos=pivot, axis=axis, damping=linear_damping(damping))
         return
-    for name, axis in (("trunk_x", [1.0, 0.0, 0.0]), ("trunk_z", [0.0, 0.0, 1.0])):
-        trunk.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
+    forward, upward = options.guide_damping
+    for name, axis, damping in (
+        ("trunk_x", [1.0, 0.0, 0.0], forward),
+        ("trunk_z", [0.0, 0.0, 1.0], upward),
+    ):
+        slide = trunk.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
+        slide.damping = np.array(linear_damping(damping))
 
 
 def _trunk_mass(design: LegDesign, linkage: Linkage) -> float:
@@ -104,10 +145,7 @@ def _add_segments(spec: mujoco.MjSpec, design: LegDesign, numerics: Numerics) ->
             hinge.solref_limit = np.array(numerics.stop_solref)
             hinge.solimp_limit = np.array(numerics.stop_solimp)
         _set_inertia(body, segment)
-        look.add_capsule(body, name, segment.length, 0.006, look.GREY)
         parent, down = body, segment.length
-    look.add_servo(spec.body("thigh"), "servo_thigh", 0.0)
-    look.add_servo(spec.body("shank"), "servo_shank", 0.0)
     parent.add_site(name="tip", pos=[0.0, 0.0, -down], size=[0.004] * 3, group=3)
 
 
@@ -139,10 +177,9 @@ def _add_springs(spec: mujoco.MjSpec, design: LegDesign, kind: LinkageKind) -> N
         )
 
 
-def _add_keyframe(spec: mujoco.MjSpec, design: LegDesign) -> None:
+def _compiled(spec: mujoco.MjSpec, design: LegDesign) -> mujoco.MjModel:
     try:
-        model = spec.compile()
+        return spec.compile()
     except ValueError as error:
         why = " ".join(str(error).split())
         raise ConfigError(f"MuJoCo refuses the leg of design '{design.name}': {why}") from error
-    spec.add_key(name="bent", qpos=rest_qpos(model, design, BENT).tolist(), ctrl=BENT.tolist())

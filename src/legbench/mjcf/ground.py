@@ -12,14 +12,19 @@ HANGING_CLEARANCE = 0.1
 """Gap between the ground and the foot of a leg that hangs from a fixed trunk [m]."""
 
 
-def add_world(spec: mujoco.MjSpec, setup: Setup, ground: Ground, numerics: Numerics) -> None:
+def add_world(
+    spec: mujoco.MjSpec, setup: Setup, ground: Ground, numerics: Numerics, *, seen: bool
+) -> None:
     """Add ground or table, the foot tip, and the pin or the contact that holds it.
+
+    What is not to be `seen` has no material, and no table.
 
     The ground lies one tip radius below zero: a tip height of zero touches at every foot angle.
     """
     add_tip(spec, ground.tip_radius)
     if setup.kind is SetupKind.HFTS:
-        add_table(spec)
+        if seen:
+            add_table(spec)
         return
     drop = HANGING_CLEARANCE if setup.kind is SetupKind.VFTS else 0.0
     spec.worldbody.add_geom(
@@ -29,7 +34,7 @@ def add_world(spec: mujoco.MjSpec, setup: Setup, ground: Ground, numerics: Numer
         pos=[0.0, 0.0, -ground.tip_radius - drop],
         contype=0,
         conaffinity=0,
-        material="ground",
+        material="ground" if seen else "",
     )
     if setup.kind is SetupKind.JUMP:
         _add_contact(spec, ground, numerics)

@@ -10,13 +10,10 @@ import mujoco
 import numpy as np
 
 from legbench.design import LegDesign
-from legbench.mjcf.look import BLACK, GREEN, GREY, add_capsule
 from legbench.mjcf.options import Linkage, Numerics
 
 HINGE_AXIS = (0.0, -1.0, 0.0)
 """A positive angle swings a hanging segment forward (+x)."""
-BAR_SIDE = 0.014
-"""How far the bars run beside the segments; seen only, hinges stay in the plane [m]."""
 
 
 def linear_damping(coefficient: float) -> list[float]:
@@ -24,14 +21,13 @@ def linear_damping(coefficient: float) -> list[float]:
     return [coefficient, 0.0, 0.0]
 
 
-def _rod(body: mujoco.MjsBody, density: float, length: float, side: float, colour: str) -> None:
-    """Give a body the mass and the looks of a thin rod hanging from its origin."""
+def _rod(body: mujoco.MjsBody, density: float, length: float) -> None:
+    """Give a body the mass of a thin rod hanging from its origin."""
     body.explicitinertial = True
     body.mass = density * length
     body.ipos = np.array([0.0, 0.0, -0.5 * length])
     inertia = body.mass * length**2 / 12.0
     body.inertia = inertia * np.array([1.0, 1.0, 0.1])
-    add_capsule(body, f"{body.name}_rod", length, 0.003, colour, side=side)
 
 
 def add_bars(spec: mujoco.MjSpec, design: LegDesign, linkage: Linkage, numerics: Numerics) -> None:
@@ -42,15 +38,14 @@ def add_bars(spec: mujoco.MjSpec, design: LegDesign, linkage: Linkage, numerics:
 
     crank = trunk.add_body(name="crank")
     crank.add_joint(name="crank", axis=HINGE_AXIS, damping=linear_damping(design.damping[1]))
-    _rod(crank, density, arm, BAR_SIDE, GREEN)
+    _rod(crank, density, arm)
     along_thigh = crank.add_body(name="bar_thigh", pos=[0.0, 0.0, -arm])
     along_thigh.add_joint(name="bar_thigh", axis=HINGE_AXIS)
-    _rod(along_thigh, density, l1, BAR_SIDE, GREEN)
+    _rod(along_thigh, density, l1)
 
     along_shank = thigh.add_body(name="bar_shank", pos=[0.0, 0.0, -(l1 + arm)])
     along_shank.add_joint(name="bar_shank", axis=HINGE_AXIS)
-    _rod(along_shank, density, l2, -BAR_SIDE, BLACK)
-    add_capsule(thigh, "thigh_extension", arm, 0.003, GREY, start=l1, side=-BAR_SIDE)
+    _rod(along_shank, density, l2)
 
     _close(spec, "loop_thigh", (along_thigh, l1), (spec.body("shank"), arm), numerics)
     _close(spec, "loop_foot", (along_shank, l2), (spec.body("foot"), arm), numerics)
@@ -101,5 +96,22 @@ def add_reduced(spec: mujoco.MjSpec, design: LegDesign, numerics: Numerics) -> N
         solimp=numerics.loop_solimp,
     )
     tendon = spec.add_tendon(name="q2", damping=linear_damping(design.damping[1]))
+    tendon.wrap_joint("hip", 1.0)
+    tendon.wrap_joint("knee", 1.0)
+
+
+def add_friction(spec: mujoco.MjSpec, friction: tuple[float, float], numerics: Numerics) -> None:
+    """Add Coulomb friction on q1 and q2 [N m], as hard as the loops.
+
+    Friction on q2 acts on a tendon along hip and knee, which is the shank's absolute angle: on the
+    crank of the bars, which weighs next to nothing, it would be lost in the softness of the loop.
+    """
+    hip = spec.joint("hip")
+    hip.frictionloss = friction[0]
+    hip.solref_friction = np.array(numerics.loop_solref)
+    hip.solimp_friction = np.array(numerics.loop_solimp)
+    tendon = spec.add_tendon(name="q2_friction", frictionloss=friction[1])
+    tendon.solref_friction = np.array(numerics.loop_solref)
+    tendon.solimp_friction = np.array(numerics.loop_solimp)
     tendon.wrap_joint("hip", 1.0)
     tendon.wrap_joint("knee", 1.0)

@@ -3,7 +3,12 @@
 import mujoco
 import numpy as np
 
+from legbench.design import LegDesign
+from legbench.mjcf.options import Linkage, LinkageKind
+
 GREY, BLUE, GREEN, BLACK, ORANGE = "segment", "trunk", "bar_green", "bar_black", "servo"
+BAR_SIDE = 0.014
+"""How far the bars run beside the segments; seen only, hinges stay in the plane [m]."""
 MATERIALS = {
     GREY: (0.80, 0.80, 0.82, 1.0),
     BLUE: (0.16, 0.36, 0.62, 1.0),
@@ -55,6 +60,36 @@ def add_scenery(spec: mujoco.MjSpec) -> None:
     getattr(visual, "global").offwidth = 1920
     getattr(visual, "global").offheight = 1080
     visual.quality.shadowsize = 2048
+
+
+def dress(spec: mujoco.MjSpec, design: LegDesign, linkage: Linkage) -> None:
+    """Give every body of the leg something to see, and the foot its rubber ball."""
+    add_trunk_box(spec.body("trunk"))
+    names = ("thigh", "shank", "foot")
+    for name, length in zip(names, design.lengths, strict=True):
+        add_capsule(spec.body(name), name, length, 0.006, GREY)
+    add_servo(spec.body("thigh"), "servo_thigh", 0.0)
+    add_servo(spec.body("shank"), "servo_shank", 0.0)
+    if linkage.kind is LinkageKind.BARS:
+        arm, (l1, l2, _) = linkage.crank_length, design.lengths
+        rods = (
+            ("crank", arm, BAR_SIDE, GREEN),
+            ("bar_thigh", l1, BAR_SIDE, GREEN),
+            ("bar_shank", l2, -BAR_SIDE, BLACK),
+        )
+        for name, length, side, colour in rods:
+            add_capsule(spec.body(name), f"{name}_rod", length, 0.003, colour, side=side)
+        thigh = spec.body("thigh")
+        add_capsule(thigh, "thigh_extension", arm, 0.003, GREY, start=l1, side=-BAR_SIDE)
+    _visual(
+        spec.body("foot").add_geom(
+            name="tip_ball",
+            type=mujoco.mjtGeom.mjGEOM_SPHERE,
+            pos=spec.site("tip").pos.tolist(),
+            size=[0.006, 0.0, 0.0],
+            material="tip",
+        )
+    )
 
 
 def add_camera(spec: mujoco.MjSpec, height: float) -> None:
@@ -116,11 +151,9 @@ def add_trunk_box(body: mujoco.MjsBody) -> None:
 
 
 def add_tip(spec: mujoco.MjSpec, radius: float) -> None:
-    """The foot tip: a rubber ball to see, and the sphere of `radius` [m] that touches."""
+    """The foot tip: the sphere of `radius` [m] that touches."""
     foot, end = spec.body("foot"), spec.site("tip").pos.tolist()
     sphere = mujoco.mjtGeom.mjGEOM_SPHERE
-    size = [0.006, 0.0, 0.0]
-    _visual(foot.add_geom(name="tip_ball", type=sphere, pos=end, size=size, material="tip"))
     tip = foot.add_geom(name="tip", type=sphere, pos=end, size=[radius, 0.0, 0.0], group=3)
     tip.contype, tip.conaffinity, tip.mass = 0, 0, 0.0
 

@@ -6,8 +6,9 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from legbench.design import LegDesign
-from legbench.design.setup import Setup
+from legbench.design.setup import Setup, SetupKind
 from legbench.errors import ConfigError
+from legbench.imperfections import Imperfections
 from legbench.mjcf.fitting import (
     LIGHTEST_BAR,
     fitted_bar_density,
@@ -156,9 +157,32 @@ class Numerics:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BuildOptions:
-    """What a model is made of besides the design."""
+    """What a model is made of besides the design.
+
+    Raises:
+        ConfigError: a damped guide where nothing guides the trunk.
+    """
 
     setup: Setup = field(default_factory=Setup)
     linkage: Linkage = field(default_factory=Linkage)
     ground: Ground = field(default_factory=Ground)
     numerics: Numerics = field(default_factory=Numerics)
+    friction: tuple[float, float] = (0.0, 0.0)
+    """Coulomb friction on q1 and q2 [N m]."""
+    guide_damping: tuple[float, float] = (0.0, 0.0)
+    """Viscous damping of the trunk's guide, forward and upward [N s/m]."""
+
+    def __post_init__(self) -> None:
+        if any(self.guide_damping) and self.setup.kind is not SetupKind.FFS:
+            raise ConfigError(
+                f"guide_damping is {self.guide_damping} N s/m; setup {self.setup.kind} has no "
+                "guide, only ffs has"
+            )
+
+    def built(self, imperfections: Imperfections) -> "BuildOptions":
+        """Options of the model of a leg that is built with these imperfections."""
+        return replace(
+            self,
+            friction=imperfections.coulomb_friction or self.friction,
+            guide_damping=imperfections.guide_damping or self.guide_damping,
+        )

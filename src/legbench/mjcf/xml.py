@@ -20,10 +20,18 @@ EXACT: dict[str, dict[str, str]] = {
         "pos": "pos",
         "solreflimit": "solref_limit",
         "solimplimit": "solimp_limit",
+        "frictionloss": "frictionloss",
+        "solreffriction": "solref_friction",
+        "solimpfriction": "solimp_friction",
     },
     "site": {"pos": "pos"},
     "geom": {"pos": "pos", "size": "size"},
-    "fixed": {"damping": "damping"},
+    "fixed": {
+        "damping": "damping",
+        "frictionloss": "frictionloss",
+        "solreffriction": "solref_friction",
+        "solimpfriction": "solimp_friction",
+    },
     "connect": {"solref": "solref", "solimp": "solimp"},
     "pair": {"solref": "solref", "solimp": "solimp", "friction": "friction"},
     "general": {"gainprm": "gainprm", "biasprm": "biasprm"},
@@ -90,6 +98,7 @@ def _write_fields(element: ET.Element, held: object, fields: dict[str, str]) -> 
     for attribute, field in fields.items():
         always = attribute in ("solref", "solimp")
         always |= attribute in ("solreflimit", "solimplimit") and "range" in element.attrib
+        always |= attribute.endswith("friction") and "frictionloss" in element.attrib
         if not always and attribute not in element.attrib:
             continue
         value = getattr(held, field)

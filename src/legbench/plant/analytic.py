@@ -7,15 +7,19 @@ from typing import final
 import numpy as np
 
 from legbench.analytic import HybridLeg, LegModel, LegState, Regime, Transition, standing
+from legbench.analytic.losses import Losses
 from legbench.analytic.smooth import Accuracy
 from legbench.analytic.terms import Bars
 from legbench.design import LegDesign
 from legbench.design.setup import Setup, SetupKind
 from legbench.design.statics import GRAVITY
+from legbench.encoders import EncoderErrors
 from legbench.errors import ConfigError, PlantFault
+from legbench.imperfections import Imperfections
+from legbench.mjcf.options import BuildOptions
 from legbench.plant.abstract import AbstractPlant
 from legbench.plant.start import PERIOD, Start
-from legbench.servo import Servo, ServoConfig
+from legbench.servo import PERFECT, Servo, ServoConfig
 from legbench.signals import Command, Floats, Observation, Truth
 
 STRAIGHT_MARGIN = 0.02
@@ -32,11 +36,15 @@ class AnalyticPlant(AbstractPlant):
     the bars have no mass unless `bars` says so. The contact force is that of the instant; contact
     is told also for a touch that began and ended within the cycle.
 
+    What moves is the leg as it was built, with its imperfections; springs are read as those of
+    the design.
+
     Attributes:
         transitions: touchdowns and lift-offs since the reset, in order.
 
     Raises:
-        ConfigError: a setup with a boom, which these equations do not know.
+        ConfigError: a setup with a boom, which these equations do not know, or imperfections that
+            leave no leg or need another setup.
     """
 
     def __init__(
@@ -47,6 +55,9 @@ class AnalyticPlant(AbstractPlant):
         servo: ServoConfig | None = None,
         accuracy: Accuracy | None = None,
         bars: Bars | None = None,
+        *,
+        imperfections: Imperfections = PERFECT,
+        seed: int = 0,
     ) -> None:
         if setup.boom_radius is not None:
             raise ConfigError(
@@ -56,24 +67,30 @@ class AnalyticPlant(AbstractPlant):
         self.period = PERIOD
         self.transitions: list[Transition] = []
         gravity = 0.0 if setup.kind is SetupKind.HFTS else GRAVITY
-        self._model = LegModel.of(design, gravity=gravity, bars=bars)
+        BuildOptions(setup=setup).built(imperfections)
+        built = imperfections.leg_of(design)
+        losses = Losses.of(imperfections)
+        self._model = LegModel.of(built, gravity=gravity, bars=bars, losses=losses)
         self._leg = HybridLeg(self._model, accuracy)
         self._setup, self._start = setup, start
-        self._servo = Servo(servo or ServoConfig(), PERIOD)
+        self._servo = Servo(servo or ServoConfig(), PERIOD, imperfections)
+        self._errors = EncoderErrors(imperfections, seed)
         self._stiffness = np.asarray(design.stiffness)
         self._state = self._first_state()
-        self._motor = start.motor_pos
+        self._shaft = start.motor_pos
         self._touched = False
         self._cycle = 0
 
     def reset(self) -> Observation:
         """Put the leg at rest in its start posture."""
-        self._state, self._motor = self._first_state(), self._start.motor_pos
-        self._servo.reset(self._motor)
+        self._state = self._first_state()
+        self._servo.reset(self._start.motor_pos)
+        self._shaft = self._servo.shaft(self._servo.position)
+        self._errors.reset()
         self.transitions = []
         self._touched = False
         self._cycle = 0
-        return self._observe(Command.holding(self._motor))
+        return self._observe(Command.holding(self._start.motor_pos))
 
     def step(self, command: Command) -> Observation:
         """Apply a command over one period.
@@ -81,9 +98,9 @@ class AnalyticPlant(AbstractPlant):
         Raises:
             PlantFault: the integration failed, or the leg straightened or folded through.
         """
-        self._motor = self._servo.follow(command.motor_pos)
+        self._shaft = self._servo.shaft(self._servo.follow(command.motor_pos))
         self._cycle += 1
-        motor = (float(self._motor[0]), float(self._motor[1]))
+        motor = (float(self._shaft[0]), float(self._shaft[1]))
         self._state, happened = self._leg.advance(self._state, self._cycle * PERIOD, motor)
         self._touched = bool(happened)
         self.transitions += happened
@@ -119,8 +136,11 @@ class AnalyticPlant(AbstractPlant):
 
     def _observe(self, command: Command) -> Observation:
         state = self._state
-        joint_pos = self._servo.encode(np.array(state.q))
-        motor_pos = self._servo.encode(self._motor.copy())
+        joint_pos, motor_pos = np.array(state.q), self._servo.position.copy()
+        if not self._errors.exact:
+            self._errors.advance()
+            motor_pos, joint_pos = motor_pos + self._errors.motor, joint_pos + self._errors.link
+        motor_pos, joint_pos = self._servo.encode(motor_pos), self._servo.encode(joint_pos)
         return Observation(
             time=self._cycle * PERIOD,
             motor_pos=motor_pos,
@@ -137,7 +157,7 @@ class AnalyticPlant(AbstractPlant):
         tip = (state.trunk_pos[0] + foot[0], state.trunk_pos[1] + foot[1])
         force = (0.0, 0.0)
         if state.regime.stands:
-            motor = (float(self._motor[0]), float(self._motor[1]))
+            motor = (float(self._shaft[0]), float(self._shaft[1]))
             force, tip = model.stance_force(motor, state.q, state.v), (tip[0], 0.0)
         if state.regime is Regime.HANGING:
             energy = model.pair_energy(model.hanging, state.q, state.v)

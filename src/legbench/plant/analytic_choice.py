@@ -14,6 +14,7 @@ class AnalyticChoice:
     """Settings of the analytic plant, which computes the paper's equations."""
 
     kind: ClassVar[str] = "analytic"
+    imperfect: ClassVar[bool] = True
     limits: SafetyLimits | None = None
     """Safety limits, by default none [a limits file]."""
 
@@ -25,6 +26,14 @@ class AnalyticChoice:
         """
         make = load_text("legbench.plant.analytic:AnalyticPlant")
         accuracy = load_text("legbench.analytic.smooth:Accuracy")()
-        plant = make(leg.design, leg.options.setup, leg.start, leg.servo, accuracy)
+        plant = make(
+            leg.design,
+            leg.options.setup,
+            leg.start,
+            leg.servo,
+            accuracy,
+            imperfections=leg.imperfections,
+            seed=leg.seed,
+        )
         opened = open_limited(plant, self.limits, leg)
         return replace(opened, facts={"accuracy": asdict(accuracy)} | opened.facts)

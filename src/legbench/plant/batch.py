@@ -10,30 +10,49 @@ import numpy as np
 from mujoco import batch
 
 from legbench.design import LegDesign
+from legbench.encoders import EncoderErrors
 from legbench.errors import ConfigError
-from legbench.mjcf import BuildOptions, build_spec, rest_qpos, to_xml
+from legbench.imperfections import Imperfections
+from legbench.mjcf import BuildOptions, bare_model, rest_qpos
 from legbench.plant.abstract import AbstractPlant
-from legbench.plant.observe import LiveArrays, Observer, branch_fault_mask
+from legbench.plant.backlash import Backlash
+from legbench.plant.observe import (
+    LiveArrays,
+    Observer,
+    branch_fault,
+    branch_fault_mask,
+    branch_message,
+)
 from legbench.plant.start import PERIOD, Start
-from legbench.servo import Servo, ServoConfig
+from legbench.servo import PERFECT, Servo, ServoConfig
 from legbench.signals import Bools, Command, Floats, Observation
+
+NOT_FINITE = "command not finite"
+"""Cause of a leg whose command was no number."""
+FAILED = "simulation failed"
+"""Cause of a leg that MuJoCo could not step."""
 
 
 @final
 class BatchPlant(AbstractPlant):
-    """Batch of legs that differ in design but share setup, linkage, servo and step.
+    """Batch of legs that share setup, linkage, ground and step; all else is each leg's own.
 
-    A leg that leaves its branch does not stop the others: it is marked in `faulted` and its
+    A leg that faults does not stop the others: it keeps its cause and its cycle, and its
     observations mean nothing from then on.
 
     Attributes:
-        model: the first leg's compiled model.
+        model: the first leg's compiled model, without what can only be seen.
         threads: how many threads step the legs.
         faulted: which legs have left their branch, diverged or had a command that was no
             number (n,).
+        causes: cause of each leg's fault, as `SimPlant` names it; None for a leg without one.
+        messages: what to tell a user of each fault.
+        fault_cycles: number of cycles that each leg was commanded until its fault, that of the
+            fault included; -1 for a leg without one.
 
     Raises:
-        ConfigError: no design, a start that is not one row a leg, or a leg that no step suits.
+        ConfigError: no design, or starts, servos, imperfections or seeds that are not one for
+            each leg, or a leg that no step suits.
     """
 
     def __init__(
@@ -41,34 +60,32 @@ class BatchPlant(AbstractPlant):
         designs: Sequence[LegDesign],
         options: BuildOptions,
         start: Start,
-        servo: ServoConfig | None = None,
+        servo: ServoConfig | Sequence[ServoConfig] | None = None,
         threads: int | None = None,
+        imperfections: Sequence[Imperfections] | None = None,
+        seeds: Sequence[int] | None = None,
     ) -> None:
-        if not designs:
-            raise ConfigError("a batch needs at least one design")
-        for what, array in (("posture", start.joint_pos), ("motors", start.motor_pos)):
-            if array.shape != (len(designs), 2):
-                raise ConfigError(
-                    f"start {what} has shape {array.shape}; {len(designs)} designs need "
-                    f"({len(designs)}, 2)"
-                )
+        count = len(designs)
+        flaws = [PERFECT] * count if imperfections is None else list(imperfections)
+        chosen = [0] * count if seeds is None else list(seeds)
+        servo = ServoConfig() if servo is None else servo
+        _check(count, start, servo, flaws, chosen)
         self.period = PERIOD
+        built = [each.leg_of(design) for each, design in zip(flaws, designs, strict=True)]
         # Legs in step share the step of the one that needs the finest.
-        options = replace(options, numerics=options.numerics.fitted(designs, options.linkage))
-        models = _models(designs, options)
+        options = replace(options, numerics=options.numerics.fitted(built, options.linkage))
+        models = _models(built, options, flaws)
         self.model = models[0]
         self.threads = threads or os.cpu_count() or 1
-        self._batch = batch.Batch(models[0], nsim=len(models), nthread=self.threads)
+        self._batch = batch.Batch(models[0], nsim=count, nthread=self.threads)
         self._batch.set_models(models)
-        self._substeps = round(PERIOD / models[0].opt.timestep)
         self._start = start
-        self._start_qpos = np.array(
-            [
-                rest_qpos(model, design, posture)
-                for model, design, posture in zip(models, designs, start.joint_pos, strict=True)
-            ]
-        )
-        self._servo = Servo(servo or ServoConfig(), PERIOD)
+        rows = zip(models, designs, start.joint_pos, strict=True)
+        self._start_qpos = np.array([rest_qpos(*row) for row in rows])
+        self._servo = Servo(servo, PERIOD, flaws)
+        self._errors, self._backlash = EncoderErrors(flaws, chosen), Backlash(flaws)
+        substeps = round(PERIOD / models[0].opt.timestep)
+        self._rounds, self._at_once = (1, substeps) if self._backlash.none else (substeps, 1)
         self._arrays = LiveArrays(
             qpos=self._batch.bind("qpos"),
             qvel=self._batch.bind("qvel"),
@@ -76,32 +93,35 @@ class BatchPlant(AbstractPlant):
             sensordata=self._batch.bind("sensordata"),
             energy=self._batch.bind("energy"),
         )
-        stiffness = np.array([design.stiffness for design in designs])
-        self._observer = Observer(models[0], self._arrays, stiffness, self._servo)
-        self.faulted: Bools = np.zeros(len(designs), dtype=np.bool_)
+        believed = np.array([design.stiffness for design in designs])
+        self._observer = Observer(models[0], self._arrays, believed, self._servo, self._errors)
         self._cycle = 0
+        self._forget_faults()
 
     def reset(self) -> Observation:
         """Put every leg at rest in its start posture."""
         self._batch.reset(stage=int(mujoco.mjtStage.mjSTAGE_NONE))
         self._arrays.qpos[:] = self._start_qpos
-        self._arrays.ctrl[:] = self._start.motor_pos
         self._servo.reset(self._start.motor_pos)
+        self._errors.reset()
+        self._arrays.ctrl[:] = self._servo.shaft(self._servo.position)
         self._batch.forward()
-        self.faulted = np.zeros(len(self._start_qpos), dtype=np.bool_)
         self._cycle = 0
+        self._forget_faults()
         return self._observer.look(0.0, self._start.motor_pos)
 
     def step(self, command: Command) -> Observation:
         """Apply each leg's command over one period of substeps."""
-        self.faulted = self.faulted | ~np.isfinite(command.motor_pos).all(axis=-1)
-        self._arrays.ctrl[:] = self._servo.follow(command.motor_pos)
-        try:
-            self._batch.step(nstep=self._substeps, stage=int(mujoco.mjtStage.mjSTAGE_VEL))
-        except batch.SimulationError:
-            self.faulted |= np.asarray(self._batch.status) != 0
         self._cycle += 1
-        self.faulted |= branch_fault_mask(self._observer.joints, self._arrays.qpos)
+        self._note(~np.logical_and.reduce(np.isfinite(command.motor_pos), axis=-1), NOT_FINITE)
+        shaft = self._servo.shaft(self._servo.follow(command.motor_pos))
+        for _ in range(self._rounds):
+            self._push(shaft)
+            try:
+                self._batch.step(nstep=self._at_once, stage=int(mujoco.mjtStage.mjSTAGE_VEL))
+            except batch.SimulationError:
+                self._note(np.asarray(self._batch.status) != 0, FAILED)
+        self._note(branch_fault_mask(self._observer.joints, self._arrays.qpos), None)
         return self._observer.look(self._cycle * PERIOD, command.motor_pos)
 
     def rest(self, motor_pos: Floats, interrupted: Callable[[], bool]) -> None:
@@ -110,12 +130,70 @@ class BatchPlant(AbstractPlant):
     def close(self) -> None:
         """Nothing to release."""
 
+    def _push(self, shaft: Floats) -> None:
+        """Put the springs where the shafts (n, 2) [rad] hold them."""
+        if self._backlash.none:
+            self._arrays.ctrl[:] = shaft
+            return
+        joint_pos, joint_vel = self._observer.links()
+        step = self.model.opt.timestep
+        self._arrays.ctrl[:] = self._backlash.flank(shaft, joint_pos, joint_vel, step)
 
-def _models(designs: Sequence[LegDesign], options: BuildOptions) -> list[mujoco.MjModel]:
-    """Compiled model of each leg; equal designs share one."""
-    compiled: dict[LegDesign, mujoco.MjModel] = {}
-    for design in designs:
-        if design not in compiled:
-            xml = to_xml(build_spec(design, options))
-            compiled[design] = mujoco.MjModel.from_xml_string(xml)
-    return [compiled[design] for design in designs]
+    def _forget_faults(self) -> None:
+        count = len(self._start_qpos)
+        self.faulted: Bools = np.zeros(count, dtype=np.bool_)
+        self.causes: list[str | None] = [None] * count
+        self.messages: list[str | None] = [None] * count
+        self.fault_cycles = np.full(count, -1, dtype=np.int64)
+
+    def _note(self, faults: Bools, cause: str | None) -> None:
+        """Keep the first fault of each leg; without a cause it is that of its posture."""
+        new = faults & ~self.faulted
+        if not new.any():
+            return
+        self.faulted = self.faulted | new
+        for leg in np.flatnonzero(new).tolist():
+            posture = branch_fault(self._observer.joints, self._arrays.qpos[leg])
+            named = cause or posture or FAILED
+            time = self._cycle * PERIOD
+            self.causes[leg] = named
+            at = f"{named} at t = {time:.3f} s"
+            self.messages[leg] = branch_message(named, time) if cause is None else at
+            self.fault_cycles[leg] = self._cycle
+
+
+def _check(
+    count: int,
+    start: Start,
+    servo: ServoConfig | Sequence[ServoConfig],
+    imperfections: Sequence[Imperfections],
+    seeds: Sequence[int],
+) -> None:
+    """Refuse what is not one for each leg."""
+    if count == 0:
+        raise ConfigError("a batch needs at least one design")
+    for what, array in (("posture", start.joint_pos), ("motors", start.motor_pos)):
+        if array.shape != (count, 2):
+            raise ConfigError(
+                f"start {what} has shape {array.shape}; {count} designs need ({count}, 2)"
+            )
+    servos = count if isinstance(servo, ServoConfig) else len(servo)
+    for what, length in (
+        ("servos", servos),
+        ("imperfections", len(imperfections)),
+        ("seeds", len(seeds)),
+    ):
+        if length != count:
+            raise ConfigError(f"{length} {what} for {count} designs; each leg needs one")
+
+
+def _models(
+    built: Sequence[LegDesign], options: BuildOptions, imperfections: Sequence[Imperfections]
+) -> list[mujoco.MjModel]:
+    """Compiled model of each leg as it was built; equal ones share one."""
+    legs = [
+        (design, options.built(flaws)) for design, flaws in zip(built, imperfections, strict=True)
+    ]
+    dry = any(any(each.friction) for _, each in legs)
+    compiled = {leg: bare_model(*leg, dry=dry) for leg in dict.fromkeys(legs)}
+    return [compiled[leg] for leg in legs]

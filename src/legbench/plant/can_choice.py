@@ -28,6 +28,7 @@ class CanChoice:
     """Settings of the CAN plant: servo drives on a bus, real or emulated."""
 
     kind: ClassVar[str] = "can"
+    imperfect: ClassVar[bool] = True
     bus: Path = field(default=Path("hardware/leg.toml"), metadata=_WHERE)
     """Bus file, which describes the drives."""
     interface: str | None = field(default=None, metadata=_WHERE)

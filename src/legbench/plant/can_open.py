@@ -22,7 +22,7 @@ from legbench.drives.transport.realtime import Granted
 from legbench.errors import ConfigError
 from legbench.limits.safety import SafetyLimits
 from legbench.plant.can import CanPlant
-from legbench.plant.can_choice import BUS_LOG, LIMITS_NAME, CanChoice
+from legbench.plant.can_choice import BUS_LOG, EMULATED, LIMITS_NAME, CanChoice
 from legbench.plant.can_events import bus_events
 from legbench.plant.can_needs import check_needs
 from legbench.plant.design_limits import joint_ranges, limits_events, limits_within
@@ -101,6 +101,11 @@ def _checked(choice: CanChoice, leg: Leg) -> tuple[BusConfig, SafetyLimits]:
             "slew_rate, bandwidth, delay_cycles and encoder_counts out"
         )
     config = load_bus(choice.bus)
+    if not (leg.imperfections.perfect or choice.is_virtual(config)):
+        raise ConfigError(
+            "imperfections describe an emulated leg; the leg on the bench has its own: leave them "
+            f"out, or give --interface {EMULATED}"
+        )
     if len(config.nodes) != 2:
         raise ConfigError(f"{choice.bus}: {len(config.nodes)} nodes; a leg has 2")
     if config.period_us not in RUN_PERIODS_US:
@@ -182,8 +187,8 @@ def _emulated(config: BusConfig, choice: CanChoice, leg: Leg | None) -> Sequence
         if several:
             return emulate_channels(config, idle, configured=choice.read_only)
         return [emulate(config, idle, configured=choice.read_only)]
-    drives = [Behaviour(start_pos=float(value)) for value in leg.start.motor_pos]
-    body = EmulatedLeg(leg.design, leg.options, leg.start)
+    body = EmulatedLeg(leg.design, leg.options, leg.start, leg.imperfections, leg.seed)
+    drives = [_behaviour(leg, body, place) for place in range(len(leg.start.motor_pos))]
     faults, configured = choice.faults, choice.read_only
     if several:
         return emulate_channels(
@@ -203,3 +208,21 @@ def _emulated(config: BusConfig, choice: CanChoice, leg: Leg | None) -> Sequence
         configured=configured,
     )
     return [network]
+
+
+def _behaviour(leg: Leg, body: EmulatedLeg, place: int) -> Behaviour:
+    """Behaviour of the drive of one motor, with the imperfections of that motor."""
+    imperfections, start = leg.imperfections, float(leg.start.motor_pos[place])
+    slew, delay = imperfections.motor_slew_rate, imperfections.motor_delay_cycles
+    if imperfections.motor_range is None:
+        stops = None
+    else:
+        low, high = stops = imperfections.motor_range[place]
+        start = min(max(start, low), high)
+    return Behaviour(
+        start_pos=start,
+        hard_stop=stops,
+        slew_rate=None if slew is None else slew[place],
+        setpoint_delay=0 if delay is None else delay[place],
+        motor_noise=None if imperfections.motor_noise is None else lambda: body.motor_noise[place],
+    )

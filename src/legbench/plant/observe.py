@@ -7,6 +7,7 @@ from typing import final
 import mujoco
 import numpy as np
 
+from legbench.encoders import EncoderErrors
 from legbench.mjcf.sensors import SensorLayout
 from legbench.servo import Servo
 from legbench.signals import Bools, Floats, Observation, Truth
@@ -68,6 +69,14 @@ def branch_fault(layout: JointLayout, qpos: Floats) -> str | None:
     return None
 
 
+def branch_message(cause: str, time: float) -> str:
+    """What to tell a user of a leg that left its branch at `time` [s]."""
+    return (
+        f"{cause} at t = {time:.3f} s: the leg is no longer on the branch it was assembled on; "
+        "push less (--dz2) or limit the servo (--slew-rate)"
+    )
+
+
 def branch_fault_mask(layout: JointLayout, qpos: Floats) -> Bools:
     """Which legs of a batch (n, nq) `branch_fault` would name; (n,)."""
     knee = qpos[:, layout.knee]
@@ -96,20 +105,43 @@ class Observer:
     """Maker of observations of the current state, which alias neither simulation nor command."""
 
     def __init__(
-        self, model: mujoco.MjModel, arrays: LiveArrays, stiffness: Floats, servo: Servo
+        self,
+        model: mujoco.MjModel,
+        arrays: LiveArrays,
+        stiffness: Floats,
+        servo: Servo,
+        errors: EncoderErrors,
     ) -> None:
-        """Look the layout up once; `stiffness` is (..., 2) [N m/rad]."""
+        """Look the layout up once.
+
+        Args:
+            model: the compiled model.
+            arrays: its live state.
+            stiffness: what springs are taken for when their torque is read (..., 2) [N m/rad].
+            servo: drives, which know where the motors' encoders are.
+            errors: what the encoders show beside that.
+        """
         self.joints = JointLayout.of(model)
         self._sensors = SensorLayout.of(model).views(arrays.sensordata)
         self._relative = relative(self.joints, arrays.qpos)
         self._rates = relative(self.joints, arrays.qvel)
         self._arrays, self._stiffness, self._servo = arrays, stiffness, servo
+        self._errors = errors
+
+    def links(self) -> tuple[Floats, Floats]:
+        """Return true link angles [rad] and velocities [rad/s] (..., 2) of this instant."""
+        joint_pos = np.add.accumulate(self._relative, axis=-1)
+        return joint_pos, np.add.accumulate(self._rates, axis=-1)
 
     def look(self, time: float, applied_pos: Floats) -> Observation:
         """Return the observation at `time` [s], after the command `applied_pos` (..., 2) [rad]."""
         arrays, sensors = self._arrays, self._sensors
-        joint_pos = self._servo.encode(np.add.accumulate(self._relative, axis=-1))
-        motor_pos = self._servo.encode(arrays.ctrl.copy())
+        joint_pos, joint_vel = self.links()
+        motor_pos = self._servo.position.copy()
+        if not self._errors.exact:
+            self._errors.advance()
+            motor_pos, joint_pos = motor_pos + self._errors.motor, joint_pos + self._errors.link
+        motor_pos, joint_pos = self._servo.encode(motor_pos), self._servo.encode(joint_pos)
         truth = Truth(
             trunk_pos=sensors.trunk_pos.copy(),
             trunk_vel=sensors.trunk_vel.copy(),
@@ -123,7 +155,7 @@ class Observer:
             time=time,
             motor_pos=motor_pos,
             joint_pos=joint_pos,
-            joint_vel=np.add.accumulate(self._rates, axis=-1),
+            joint_vel=joint_vel,
             spring_torque=self._stiffness * (motor_pos - joint_pos),
             applied_pos=applied_pos.copy(),
             truth=truth,

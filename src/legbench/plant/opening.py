@@ -6,10 +6,12 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
 
 from legbench.clock import AbstractClock, VirtualClock
 from legbench.design import LegDesign
+from legbench.errors import ConfigError
+from legbench.imperfections import Imperfections
 from legbench.mjcf.options import BuildOptions
 from legbench.plant.abstract import AbstractPlant
 from legbench.plant.start import Start
-from legbench.servo import ServoConfig
+from legbench.servo import PERFECT, ServoConfig
 
 if TYPE_CHECKING:
     from legbench.recording.writer import RunWriter
@@ -37,9 +39,15 @@ class Leg:
     """Leg that the plant is to be."""
 
     design: LegDesign
+    """Design that the controller believes."""
     options: BuildOptions
+    """Options of the model of that design."""
     start: Start
     servo: ServoConfig
+    imperfections: Imperfections = PERFECT
+    """What the leg has that its controller does not know of."""
+    seed: int = 0
+    """Source of all randomness."""
     needs: Needs = field(default_factory=Needs)
     """What its controller needs; by default nothing is asked for."""
 
@@ -92,9 +100,15 @@ def open_plant(settings: PlantSettings, leg: Leg) -> OpenPlant:
     """Open the plant of some settings; nothing moves before its `reset`.
 
     Raises:
-        ConfigError: a file or a setting makes no sense, or limits are looser than the design's.
+        ConfigError: a file or a setting makes no sense, limits are looser than the design's, or
+            the plant cannot have the leg's imperfections.
         BusError: the interface is not there, is down, or has a master.
         DriveError: a drive is missing, is another one, or refuses its configuration.
     """
+    if not (leg.imperfections.perfect or getattr(type(settings), "imperfect", False)):
+        raise ConfigError(
+            f"plant '{settings.kind}' knows no imperfections: leave them out, or give its settings "
+            "`imperfect: ClassVar[bool] = True` once it obeys `leg.imperfections`"
+        )
     opened = settings.open(leg)
     return opened if isinstance(opened, OpenPlant) else OpenPlant(plant=opened)

@@ -14,10 +14,12 @@ class SimChoice:
     """Settings of the simulated plant, in MuJoCo."""
 
     kind: ClassVar[str] = "sim"
+    imperfect: ClassVar[bool] = True
     limits: SafetyLimits | None = None
     """Safety limits, by default none [a limits file]."""
 
     def open(self, leg: Leg) -> OpenPlant:
         """Open the leg in MuJoCo; raises ConfigError if the limits are looser than the design."""
         plant = load_text("legbench.plant.sim:SimPlant")
-        return open_limited(plant(leg.design, leg.options, leg.start, leg.servo), self.limits, leg)
+        opened = plant(leg.design, leg.options, leg.start, leg.servo, leg.imperfections, leg.seed)
+        return open_limited(opened, self.limits, leg)

@@ -10,11 +10,13 @@ from legbench.design.leg import LegDesign
 from legbench.design.setup import Setup, SetupKind
 from legbench.design.toml import design_from_mapping
 from legbench.errors import ConfigError, DesignError, FormatError
+from legbench.imperfections import Imperfections
 from legbench.kinematics import ModalConvention
 from legbench.phases import Counting, PhaseInfo
 from legbench.recording.columns import ONE_LEG, Layout
 from legbench.recording.controller_table import declared_signals, parse_controller
 from legbench.recording.format_1 import upgraded
+from legbench.recording.imperfections_table import parse_imperfections
 from legbench.recording.layout import COMPLETE, FORMAT
 from legbench.recording.tables import Table
 
@@ -110,6 +112,8 @@ class RunDescription:
     """Version by package."""
     model_hash: str | None
     """SHA-256 of the run's MJCF."""
+    imperfections: Imperfections
+    """What the leg had that its controller did not know of."""
     experiment: Mapping[str, Any]
     """Tables of the experiment as its file has them, for those who want to run it again."""
 
@@ -172,12 +176,15 @@ def describe(manifest: Mapping[str, Any], fallback_id: str = "") -> RunDescripti
         period=head.number("period"),
         looks_only=head.table("plant").table("bus").entries.get("read_only") is True,
         initial_state=_initial_state(head.table("initial_state")),
-        versions=MappingProxyType(
-            {str(name): str(text) for name, text in provenance.table("versions").entries.items()}
-        ),
+        versions=_versions(provenance.table("versions")),
         model_hash=provenance.text("mjcf_sha256"),
+        imperfections=parse_imperfections(experiment.table("imperfections").entries),
         experiment=MappingProxyType(dict(experiment.entries)),
     )
+
+
+def _versions(table: Table) -> Mapping[str, str]:
+    return MappingProxyType({str(name): str(text) for name, text in table.entries.items()})
 
 
 def layout_of(manifest: Mapping[str, Any]) -> Layout:

@@ -55,6 +55,10 @@ class MemoryRun:
         if self._block.count == BATCH_ROWS:
             self._take_block()
 
+    def extend(self, columns: Floats) -> None:
+        """Remember whole rows (columns with time, rows), laid out as `Block.columns` does."""
+        self._parts.append(columns)
+
     def event(self, time: float, name: str, **detail: Any) -> None:
         """Remember that `name` happened at plant time `time` [s], with any detail."""
         self._events.append(plain({"time": time, "name": name, **detail}))

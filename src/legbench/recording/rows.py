@@ -174,3 +174,51 @@ class Block:
             f"the controller's own signals have shape {shape}; it declared"
             f" {(*layout.shape[:-1], layout.own)}"
         )
+
+
+@final
+class LegRows:
+    """Fifty rows of many legs, each laid out as one leg's, which are taken out leg by leg.
+
+    Attributes:
+        count: how many of the rows are filled.
+    """
+
+    def __init__(self, legs: int, layout: RowLayout = ONE_LEG_ROWS) -> None:
+        """Make room for rows of legs that all have the columns of `layout`."""
+        self._layout, self.count = layout, 0
+        self._values: Floats = np.zeros((BATCH_ROWS, legs, layout.size))
+        self._no_signals = np.full((legs, layout.own), np.nan)
+
+    def put(self, command: Command, seen: Observation, cycle_us: float) -> None:
+        """Copy one cycle of all legs (n, ...); raises ConfigError without a simulation's truth."""
+        row, time = self._values[self.count], self._layout.time
+        truth = seen.truth
+        if truth is None:
+            raise ConfigError("rows of many legs are those of a simulation; these lack its truth")
+        own = self._no_signals if command.signals is None else command.signals
+        arrays = (
+            command.motor_pos,
+            seen.applied_pos,
+            seen.motor_pos,
+            seen.joint_pos,
+            seen.joint_vel,
+            seen.spring_torque,
+            truth.trunk_pos,
+            truth.trunk_vel,
+            truth.foot_pos,
+            truth.contact_force,
+            truth.energy,
+            truth.loop_gap,
+            own,
+        )
+        np.concatenate(arrays, -1, row[:, :time])
+        row[:, time] = seen.time
+        row[:, time + 1] = command.phase
+        row[:, time + 2] = truth.contact
+        row[:, -2], row[:, -1] = cycle_us, 0.0
+        self.count += 1
+
+    def columns(self, leg: int, rows: int) -> Floats:
+        """Return the first rows of a leg (columns with time, rows), as `Block.columns` does."""
+        return np.ascontiguousarray(self._values[:rows, leg].T[self._layout.disk_order])

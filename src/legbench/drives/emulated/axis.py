@@ -218,6 +218,8 @@ class Axis:
 
     def sense(self, link_pos: float, spring_torque: float) -> None:
         """Take over the state of the body: link angle [rad] and spring torque [N m]."""
+        if self._behaviour.motor_noise is not None:
+            self.sensors.motor.disturb(self._behaviour.motor_noise())
         node = self._node
         self._torque = node.motor.sign * spring_torque
         if node.link is not None:

@@ -1,5 +1,6 @@
 """Settings of an emulated drive: latencies, lags, limits, and reaction to missing targets."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
@@ -38,6 +39,12 @@ class Behaviour:
     """Delay of the statusword, rounded to whole motion cycles [us]."""
     bandwidth: float | None = None
     """Corner frequency of the position loop [Hz]; none stands for a loop without lag."""
+    slew_rate: float | None = None
+    """Highest speed of the motor, whatever 6080h allows [rad/s]; none: as fast as it is told."""
+    setpoint_delay: int = 0
+    """Number of targets that wait in the drive before one is followed."""
+    motor_noise: Callable[[], float] | None = None
+    """Function that returns the error of the motor's reading in this period of the body [rad]."""
     mode_lag_us: int = 2000
     """Delay of the mode display (6061h) after a mode change (6060h) [us]."""
     mode_needs_power: bool = False

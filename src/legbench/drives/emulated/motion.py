@@ -1,6 +1,7 @@
 """Motion of an emulated motor: interpolation of set points, ramps, position loop, encoder."""
 
 import math
+from collections import deque
 from typing import final
 
 from legbench.drives.emulated.behaviour import Behaviour, MissingSetpoint
@@ -41,6 +42,7 @@ class Motion:
         self._from = self._to = self.actual
         self._since_ns = 0
         self._late_ms = 0.0
+        self._waiting: deque[float] = deque()
 
     def _stops(self) -> tuple[float, float]:
         stops = self._behaviour.hard_stop
@@ -74,6 +76,7 @@ class Motion:
         """Hold the motor where it is and drop the interpolated way to a target."""
         self.demand = self._from = self._to = self.actual
         self.speed, self._since_ns, self.missing = 0.0, now_ns, 0
+        self._waiting.clear()
 
     def latch(self, target: int | None, now_ns: int) -> None:
         """Start the interpolated way to a target [counts] at SYNC, or count that none came."""
@@ -84,10 +87,17 @@ class Motion:
             goal = 2.0 * self._to - self._from
         else:
             self.missing = 0
-            goal = float(target)
+            goal = self._late(float(target))
         goal = self._limit(goal)
         self._from = self.demand if self._behaviour.interpolate else goal
         self._to, self._since_ns = goal, now_ns
+
+    def _late(self, target: float) -> float:
+        """Target that is followed now [counts]: the one that has waited for long enough."""
+        self._waiting.append(target)
+        if len(self._waiting) <= self._behaviour.setpoint_delay:
+            return self._to
+        return self._waiting.popleft()
 
     def _limit(self, goal: float) -> float:
         low, high = self._values[0x607D, 1], self._values[0x607D, 2]
@@ -139,6 +149,9 @@ class Motion:
         top = self._values[0x6080, 0]
         if top:
             move = min(max(move, -top * step), top * step)
+        if self._behaviour.slew_rate is not None:
+            reach = self._behaviour.slew_rate * abs(self._units.counts_per_rad) * step
+            move = min(max(move, -reach), reach)
         low, high = self._hard
         self.actual = min(max(self.actual + move, low), high)
 
@@ -168,3 +181,4 @@ class Motion:
         self.demand += shift
         self._from += shift
         self._to += shift
+        self._waiting = deque(target + shift for target in self._waiting)

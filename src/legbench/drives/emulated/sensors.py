@@ -31,7 +31,7 @@ class Encoder:
         """Make an encoder without a fault."""
         self._counts_per_rad = counts_per_rad
         self._ailment: Ailment | None = None
-        self._size = self._offset = 0.0
+        self._size = self._offset = self._noise = 0.0
         self._shown = 0
 
     def fail(self, ailment: Ailment | None, size: float = 0.0) -> None:
@@ -45,10 +45,14 @@ class Encoder:
         elif self._ailment is Ailment.STEP:
             self._offset = self._size
 
+    def disturb(self, error: float) -> None:
+        """Read wrong by an angle from now on, beside any fault [rad]."""
+        self._noise = error
+
     def show(self, counts: int) -> int:
         """Return the reading for a true position [counts]."""
         if self._ailment is not Ailment.FROZEN:
-            self._shown = counts + round(self._offset * self._counts_per_rad)
+            self._shown = counts + round((self._offset + self._noise) * self._counts_per_rad)
         return self._shown
 
 
