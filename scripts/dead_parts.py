@@ -21,7 +21,7 @@ from legbench.commissioning.dead_parts import (
     Bench,
     Death,
     Emulation,
-    Found,
+    TrialOutcome,
     try_dead_part,
     watch_healthy,
 )
@@ -82,7 +82,7 @@ def rows(emulations: list[Emulation], onsets: int, seed: int) -> Iterator[Row]:
                     )
 
 
-def try_row(row: Row) -> list[Found]:
+def try_row(row: Row) -> list[TrialOutcome]:
     """Let the part of a line die at every moment."""
     where = bench()
     return [
@@ -97,7 +97,7 @@ def try_row(row: Row) -> list[Found]:
     ]
 
 
-def line(row: Row, found: list[Found]) -> str:
+def line(row: Row, found: list[TrialOutcome]) -> str:
     """Return one line of the table."""
     times = [one.time for one in found if one.time is not None]
     since = [one.since_death for one in found if one.since_death is not None]

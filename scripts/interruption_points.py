@@ -16,7 +16,7 @@ HOME = str(ROOT)
 TRACED = ("drives", "plant", "commissioning", "loop.py", "plants.py", "experiment", "limits")
 HARDWARE = ("emulated", "bus.py", "wire.py", "timebase.py", "pacer.py")
 """What stands for the drives and their wire: no signal reaches into a real drive."""
-STOPPING = ("close", "stop", "end", "unpower", "__exit__", "_tell")
+STOPPING = ("close", "stop", "end", "unpower", "__exit__", "_write_controlword")
 RUNNING = ("_cycle", "_to_rest", "move_to", "await_end", "_script")
 
 

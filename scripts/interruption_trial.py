@@ -64,7 +64,7 @@ class Trial:
 
 
 @final
-class Theatre:
+class TrialBench:
     """Plays commands on an emulated leg, with files in a folder of their own."""
 
     def __init__(self, folder: Path) -> None:

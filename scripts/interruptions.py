@@ -21,7 +21,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from interruption_points import Injector, Point
-from interruption_trial import Theatre
+from interruption_trial import TrialBench
 
 from legbench.interrupts import STOP_SIGNALS, stop_on_interrupt
 
@@ -103,16 +103,16 @@ def main() -> int:
     seen, bad, missed = Counter[tuple[str, str, bool]](), 0, 0
     began = time.monotonic()
     with tempfile.TemporaryDirectory() as name:
-        theatre = Theatre(Path(name))
+        bench = TrialBench(Path(name))
         found: dict[str, Injector] = {}
         for command in chosen.commands:
-            theatre.play(command)  # What is imported late is there afterwards.
-            found[command] = theatre.play(command, lines=True).injector
+            bench.play(command)  # What is imported late is there afterwards.
+            found[command] = bench.play(command, lines=True).injector
         with stop_on_interrupt() as stop, contextlib.suppress(KeyboardInterrupt):
             for count, point in enumerate(points(found, chosen.points, chosen.seed), start=1):
                 if stop.is_set:
                     break
-                trial = theatre.play(point.command, point)
+                trial = bench.play(point.command, point)
                 if not trial.injector.struck:
                     missed += 1
                 else:

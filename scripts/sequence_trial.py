@@ -23,7 +23,7 @@ from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.emulated.network import Network
 from legbench.drives.emulated.network_time import NetworkTime
 from legbench.drives.emulated.power import POWERED
-from legbench.drives.master.stop import StopLadder
+from legbench.drives.master.stop import StopSequence
 from legbench.drives.setup.bus_file import load_bus
 from legbench.errors import LegbenchError, PlantFault
 from legbench.experiment import Experiment, record
@@ -268,7 +268,7 @@ def _watched(seen: Seen, interrupts: list[Interrupt]) -> Iterator[None]:
             phase(loop, "_start", "start"),
             phase(loop, "_cycle", "run"),
             phase(loop, "_to_rest", "rest"),
-            phase(StopLadder, "run", "stop"),
+            phase(StopSequence, "run", "stop"),
         ):
             stack.enter_context(patch)
         yield

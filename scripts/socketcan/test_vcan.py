@@ -244,7 +244,7 @@ def order(shaper: subprocess.Popen[str], words: str) -> None:
 def session() -> Session:
     choice = CanChoice(bus=ROOT / "hardware" / "leg.toml", interface="socketcan", channel=CHANNEL)
     made = open_session(load_bus(choice.bus), choice)
-    made.be_punctual()
+    made.request_realtime()
     return made
 
 

@@ -14,7 +14,7 @@ from legbench.errors import ConfigError, PlantFault
 pytest.importorskip("heyoka")
 
 from legbench.analytic.lanes import Friction, Lanes
-from legbench.analytic.places import COUPLING, DAMPING, INERTIA, MOMENT, STIFFNESS
+from legbench.analytic.parameters import COUPLING, DAMPING, INERTIA, MOMENT, STIFFNESS
 
 PROTOTYPE = load_design(Path(__file__).parents[2] / "models" / "prototype.toml")
 FINE = Accuracy(rtol=1e-12, atol=1e-14)

@@ -183,7 +183,7 @@ def test_what_moves_asks_for_real_time_and_says_what_was_granted(
     granted = Granted(
         fifo="refused (no)", mlockall="granted", affinity="", spin_us=0, kernel="", preemption=""
     )
-    monkeypatch.setattr(Session, "be_punctual", lambda _session: granted)
+    monkeypatch.setattr(Session, "request_realtime", lambda _session: granted)
     done = drives(*command)
     assert done.status == 0, done.err
     assert "SCHED_FIFO refused (no); locked memory granted" in done.err

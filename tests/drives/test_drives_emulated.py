@@ -265,7 +265,7 @@ def test_fault_reset_needs_an_edge_and_a_cause_that_has_gone() -> None:
     bench.word = 0x80
     bench.cycle(5)
     assert bench.axis is DriveState.FAULT
-    bench.drive.untrip(UNDER_VOLTAGE)
+    bench.drive.clear_trip(UNDER_VOLTAGE)
     bench.cycle(5)
     assert bench.axis is DriveState.FAULT
     bench.word = 0x00

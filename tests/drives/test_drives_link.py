@@ -294,7 +294,7 @@ def test_a_drive_in_fault_is_refused_and_reset_only_when_asked(tmp_path: Path) -
         with rig(tmp_path) as it:
             it.network.advance(10 * MS)
             it.network.drives[1].trip(0x3220, it.network.now_ns)
-            it.network.drives[1].untrip(0x3220)
+            it.network.drives[1].clear_trip(0x3220)
             if clear:
                 it.link.start(clear_faults=True)
                 assert it.states == [OE, OE]

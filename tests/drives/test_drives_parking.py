@@ -68,7 +68,7 @@ def test_without_parking_the_log_does_move_them(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What the test above would show if the drives were left as they are."""
-    monkeypatch.setattr("legbench.drives.master.ending.park", lambda *_arguments: [])
+    monkeypatch.setattr("legbench.drives.master.link_end.park", lambda *_arguments: [])
     with stage(experiment(JumpConfig())) as it:
         frames = recorded(it, tmp_path / "bus.log")
         stood, furthest = angles(it), 0.0

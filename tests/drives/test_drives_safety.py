@@ -221,7 +221,7 @@ def test_a_listener_that_fails_hears_nothing_more_and_stops_nothing(tmp_path: Pa
         def full(_message: can.Message) -> None:
             raise RuntimeError("no more room")
 
-        it.link.tell(full)
+        it.link.show_frames_to(full)
         it.run(20)
         assert it.link.listener_error == "RuntimeError: no more room"
         assert [watch.lost_total for watch in it.link.cycle.watches] == [0, 0]

@@ -214,7 +214,7 @@ def test_renaming_a_position_moves_nothing() -> None:
     made = motor(hard_stop=(-0.4, 0.6), start_pos=0.2, objects={(0x60C2, 1): 2})
     made.latch(310, 0)
     target = (310 - made.actual) / PER_RAD
-    made.call_it(5000)
+    made.set_position(5000)
     assert made.actual == 5000
     assert made.angle == pytest.approx(0.2)
     made.follow(STEP_NS, STEP_NS)

@@ -434,7 +434,7 @@ def test_two_causes_must_both_go_before_a_fault_is_reset() -> None:
         bench.drive.trip(code, bench.now_ns)
     bench.cycle(3)
     for code, state in ((UNDER_VOLTAGE, DriveState.FAULT), (OVER_TEMPERATURE, SOD)):
-        bench.drive.untrip(code)
+        bench.drive.clear_trip(code)
         for word in (0x00, 0x80):
             bench.word = word
             bench.cycle(2)

@@ -11,7 +11,7 @@ from legbench.drives.protocol.cia402 import DriveState
 def test_one_rising_edge_resets_a_fault_whose_cause_is_gone() -> None:
     session, network = opened()
     network.drives[0].trip(UNDER_VOLTAGE, network.now_ns)
-    network.drives[0].untrip(UNDER_VOLTAGE)
+    network.drives[0].clear_trip(UNDER_VOLTAGE)
     with session:
         done = reset(session, session.config.nodes)
     assert [(one.node, one.in_fault) for one in done] == [("motor1", False), ("motor2", False)]
@@ -40,7 +40,7 @@ def test_a_fault_that_comes_back_is_told(monkeypatch: pytest.MonkeyPatch) -> Non
     session, network = opened()
     drive = network.drives[0]
     drive.trip(UNDER_VOLTAGE, network.now_ns)
-    drive.untrip(UNDER_VOLTAGE)
+    drive.clear_trip(UNDER_VOLTAGE)
     real = EmulatedDrive.tick
     left: list[int] = []
 
@@ -63,7 +63,7 @@ def test_a_fault_that_comes_back_is_told(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_a_drive_with_power_is_stopped_before_another_one_is_reset() -> None:
     session, network = opened()
     network.drives[0].trip(UNDER_VOLTAGE, network.now_ns)
-    network.drives[0].untrip(UNDER_VOLTAGE)
+    network.drives[0].clear_trip(UNDER_VOLTAGE)
     network.drives[1].axis.power.state = DriveState.OPERATION_ENABLED
     with session:
         reset(session, session.config.nodes)

@@ -23,7 +23,7 @@ from legbench.drives.emulated.faults import (
     NodeFaultKind,
 )
 from legbench.drives.emulated.power import PowerStage
-from legbench.drives.master.ending import Ending
+from legbench.drives.master.link_end import LinkEnd
 from legbench.drives.master.stop_report import StopReport
 from legbench.limits.guard import Guard
 
@@ -177,7 +177,7 @@ def test_a_drive_that_does_not_hear_its_master_has_longer() -> None:
 
 def never_stops(patch: pytest.MonkeyPatch) -> None:
     """Drives that no loss of their master stops, and a master that does not stop them."""
-    patch.setattr(Ending, "stop", lambda end: setattr(end._status, "stopped", StopReport()))
+    patch.setattr(LinkEnd, "stop", lambda end: setattr(end._status, "stopped", StopReport()))
     patch.setattr(PowerStage, "connection_lost", lambda _stage: None)
 
 

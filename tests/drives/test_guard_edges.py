@@ -123,7 +123,7 @@ def test_a_jump_is_measured_from_the_last_wish_until_that_is_forgotten() -> None
         guard = started(limits, (0.0, 0.0))
         assert guard.command((0.5, 0.0)) == (STEP, 0.0)
         if forgets:
-            guard.forget_wish()
+            guard.restart_from_applied()
         # From the wish it is 0.25, from what was applied 0.625.
         assert (fault(guard.command, (0.75, 0.0)) is None) is not forgets
         guard.start_at((-1.0, 0.0))

@@ -62,7 +62,7 @@ def interrupted_at(count: int, action: str, monkeypatch: pytest.MonkeyPatch) -> 
     else:
         session, network = opened()
         network.drives[0].trip(UNDER_VOLTAGE, network.now_ns)
-        network.drives[0].untrip(UNDER_VOLTAGE)
+        network.drives[0].clear_trip(UNDER_VOLTAGE)
     real, sent = LockstepBus.send, 0
 
     def send(self: LockstepBus, msg: can.Message, timeout: float | None = None) -> None:

@@ -211,7 +211,7 @@ def test_a_drive_that_is_ahead_of_its_word_is_given_the_word_that_keeps_it() -> 
         machine.step(0x40)
         words = [machine.step(shown).controlword for _ in range(4)]
         assert words[1:] == [word] * 3
-        # And again one rung below, whose word has just been sent.
+        # And again one state below, whose word has just been sent.
         machine = PowerMachine()
         machine.seek(Goal.ENABLED)
         for status in (0x40, 0x40, 0x31, 0x37):

@@ -117,7 +117,7 @@ def test_a_fault_reset_that_is_not_heard_is_refused_and_nothing_is_enabled(
         with rig(tmp_path, behaviours=behaviours) as it:
             it.link.open()
             it.network.drives[place].trip(0x3220, it.network.now_ns)
-            it.network.drives[place].untrip(0x3220)
+            it.network.drives[place].clear_trip(0x3220)
             words = f"drive '{NAMES[place]}' .* does not leave its fault, whose cause still stands"
             with pytest.raises(DriveError, match=words):
                 it.link.start(clear_faults=True)
@@ -131,7 +131,7 @@ def test_after_a_reset_the_drive_rests_before_both_are_enabled(tmp_path: Path, p
     with rig(tmp_path) as it:
         it.link.open()
         it.network.drives[place].trip(0x3220, it.network.now_ns)
-        it.network.drives[place].untrip(0x3220)
+        it.network.drives[place].clear_trip(0x3220)
         it.link.start(clear_faults=True)
         assert it.states == [OE, OE]
         said = [word for word, _ in runs(it, place + 1)]

@@ -3,7 +3,7 @@
 import pytest
 
 from legbench.drives.errors import StopError
-from legbench.drives.master.stop_report import Lead, StopReport, add_trouble
+from legbench.drives.master.stop_report import DriveLeader, StopReport, add_trouble
 
 POWERED = StopReport(powered=("hip",), states=("0237h: operation enabled",))
 SILENT = StopReport(silent=("knee",))
@@ -16,7 +16,7 @@ MUTE = (
 )
 
 
-class Leader(Lead):
+class Leader(DriveLeader):
     """Closes as a test says."""
 
     def __init__(self, stopped: StopReport | None, late: BaseException | None = None) -> None:

@@ -78,10 +78,10 @@ def test_a_second_master_ends_a_run_wherever_it_is_looked_for() -> None:
     for look in ("bus", "alone"):
         scene = Scene()
         watched = scene.supervisor()
-        assert cause(watched.alone) is None
+        assert cause(watched.check_no_other_master) is None
         scene.stranger = 0x77E
         with pytest.raises(PlantFault, match="somebody else sends 77Eh") as caught:
-            watched.bus(tick()) if look == "bus" else watched.alone()
+            watched.bus(tick()) if look == "bus" else watched.check_no_other_master()
         assert caught.value.cause == "second master"
 
 

@@ -42,11 +42,11 @@ def test_a_drive_is_lost_after_three_heartbeats_have_not_come(heartbeat_ms: int)
         "heartbeat lost",
         f"{WHO}: no heartbeat for {3 * heartbeat_ms} ms",
     )
-    made.hear_heartbeat(b"\x05", 100 * MS)
+    made.take_heartbeat(b"\x05", 100 * MS)
     assert made.trouble(100 * MS + patience, NEVER) is None
     # What is no heartbeat proves nothing.
-    made.hear_heartbeat(b"\x06", 200 * MS)
-    made.hear_heartbeat(b"\x05\x05", 200 * MS)
+    made.take_heartbeat(b"\x06", 200 * MS)
+    made.take_heartbeat(b"\x05\x05", 200 * MS)
     assert made.trouble(101 * MS + patience, NEVER) is not None
     made.arm(300 * MS)
     assert made.trouble(300 * MS + patience, NEVER) is None
@@ -66,12 +66,12 @@ def test_a_heartbeat_tells_of_a_drive_that_left_operational(
     byte: int, cause: str | None, text: str
 ) -> None:
     made = watch()
-    made.hear_heartbeat(bytes((byte,)), MS)
+    made.take_heartbeat(bytes((byte,)), MS)
     assert made.trouble(MS, NEVER) == (None if cause is None else (cause, f"{WHO} {text}"))
     # A reset stays one, whatever the drive says afterwards; other states are as last heard.
-    made.hear_heartbeat(b"\x05", MS)
+    made.take_heartbeat(b"\x05", MS)
     assert (made.trouble(MS, NEVER) is None) == (byte != 0)
-    made.hear_heartbeat(bytes((byte,)), MS)
+    made.take_heartbeat(bytes((byte,)), MS)
     made.arm(MS)
     assert made.state is None
     assert made.trouble(MS, NEVER) is None
@@ -80,11 +80,11 @@ def test_a_heartbeat_tells_of_a_drive_that_left_operational(
 def test_the_first_emergency_counts_and_all_are_remembered() -> None:
     made = watch()
     clear, over, under = bytes(8), bytes.fromhex("1043090000000000"), b"\x20\x32\x05" + bytes(5)
-    made.hear_emergency(clear)
-    made.hear_emergency(over[:7])
+    made.take_emergency(clear)
+    made.take_emergency(over[:7])
     assert made.trouble(0, NEVER) is None
     for data in (over, under, clear):
-        made.hear_emergency(data)
+        made.take_emergency(data)
     text = f"{WHO}: EMCY 4310h drive over-temperature of node 2"
     assert made.trouble(0, NEVER) == ("drive emergency", text)
     assert [told.code for told in made.history] == [0x0000, 0x4310, 0x3220, 0x0000]

@@ -106,7 +106,7 @@ def told_by_compiled(leg: TaylorLeg, law: JumpLaw, start: Apex) -> Story:
             story.ending = "fell"
             return story
         elif what is Watched.TURN:
-            law.happen(what, value, course.time)
+            law.on_event(what, value, course.time)
         elif what is not None:
             told = names[what]
             if phase == "compress" or (phase == "push" and what is Watched.RISE):
@@ -114,10 +114,10 @@ def told_by_compiled(leg: TaylorLeg, law: JumpLaw, start: Apex) -> Story:
             elif phase == "push":
                 told = "released"
             story.events.append((told, course.time))
-            law.happen(what, value, course.time)
+            law.on_event(what, value, course.time)
         elif course.time >= law.alarm:
             story.events.append(("touched" if phase == "flight" else "waited", course.time))
-            law.ring(value, course.time)
+            law.on_alarm(value, course.time)
             if phase == "release" and law.alarm < math.inf:  # loaded already when it begins to fly
                 story.events.append(("loaded", course.time))
         elif until == reach:

@@ -16,8 +16,8 @@ from brute_basins import differing, random_question  # pyright: ignore[reportMis
 from random_hops import compare, random_case  # pyright: ignore[reportMissingImports]
 
 from legbench.analytic.course import Course
-from legbench.analytic.lookout import Levels
-from legbench.analytic.places import PUSHES, Event
+from legbench.analytic.event_detector import Levels
+from legbench.analytic.parameters import PUSHES, Event
 from legbench.analytic.taylor import MAP_TOLERANCE, TaylorLeg, Watched
 from legbench.modes.drive import JumpLaw, Passive
 from legbench.modes.hop import FALLEN, Apex, Ending, return_map, settle
@@ -93,7 +93,7 @@ def test_a_stop_never_pulls(tolerance: float) -> None:
                     continue
                 pushed += 1
                 torque = model.torque(course.motor, course.q, course.v)
-                turns, _ = course.bumpers.turns(
+                turns, _ = course.stop_switches.turns(
                     model.ops, model.falling, torque, course.q, course.v
                 )
                 assert turns[joint] > -1e-9

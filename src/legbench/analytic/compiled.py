@@ -17,7 +17,7 @@ from legbench.analytic._heyoka import heyoka as hy
 from legbench.analytic.equations import Pair
 from legbench.analytic.formulas import STATE, events, smooth_system, stopped_system
 from legbench.analytic.model import LegModel
-from legbench.analytic.places import (
+from legbench.analytic.parameters import (
     ALONG,
     COUPLING,
     DAMPING,

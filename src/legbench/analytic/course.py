@@ -15,7 +15,6 @@ angles and rates are dual: the variational equations then follow piece by piece 
 from typing import final
 
 from legbench.analytic._heyoka import heyoka as hy
-from legbench.analytic.bumpers import Bumpers
 from legbench.analytic.compiled import (
     TOLERANCE,
     foot_from_centre,
@@ -31,7 +30,7 @@ from legbench.analytic.equations import (
     sweep_rate,
     touchdown_rates,
 )
-from legbench.analytic.lookout import (
+from legbench.analytic.event_detector import (
     CONTACT,
     KINDS,
     NEVER,
@@ -39,12 +38,13 @@ from legbench.analytic.lookout import (
     SILENT,
     TIE,
     TURN,
+    EventDetector,
     Levels,
-    Lookout,
 )
 from legbench.analytic.model import LegModel
-from legbench.analytic.places import HEIGHT, MOTOR, SPEED, Event, Kind, Watched
+from legbench.analytic.parameters import HEIGHT, MOTOR, SPEED, Event, Kind, Watched
 from legbench.analytic.state import LegState, Regime
+from legbench.analytic.stop_switches import StopSwitches
 from legbench.analytic.variation import Variation
 from legbench.analytic.watch import Watch
 from legbench.errors import PlantFault
@@ -76,8 +76,8 @@ class Course:
         point: steady point of the angles at the beginning of the piece (forward, up) [m].
         drift: velocity of the steady point then [m/s].
         watch: the compiled regime.
-        bumpers: the joint stops.
-        lookout: the events that are watched.
+        stop_switches: the joint stops.
+        detector: the events that are watched.
         told: the state that `state` last returned; None once the leg has moved on.
     """
 
@@ -92,12 +92,12 @@ class Course:
         self.model: LegModel = model
         self.plain: LegModel = without_gradients(model)
         self.probe: Pair = probe or (0.0, 0.0)
-        self.bumpers = Bumpers(self.plain)
+        self.stop_switches = StopSwitches(self.plain)
         self._tolerance, self._min_phase = tolerance, min_phase
         self._arm = foot_from_centre(model)
         self._watches: dict[tuple[Regime, bool], Watch] = {}
         self._variation = Variation(tolerance) if model.ops is DUAL else None
-        self.lookout = Lookout(self, self.plain, min_phase)
+        self.detector = EventDetector(self, self.plain, min_phase)
         self.motor: Pair = (0.0, 0.0)
         self.told: LegState | None = None
 
@@ -157,8 +157,8 @@ class Course:
         if motor != self.motor:
             self.motor, self.plain_motor = motor, floats(motor)
             self.watch.pars[MOTOR : MOTOR + 2] = motor
-            if self.bumpers.touched:
-                self.bumpers.decide(
+            if self.stop_switches.touched:
+                self.stop_switches.decide(
                     self.watch, self.terms, self.plain_motor, self.plain_q, self.plain_v
                 )
 
@@ -187,12 +187,12 @@ class Course:
             PlantFault: the integration failed.
         """
         self.told = None
-        if levels is not self.lookout.levels:
-            self.lookout.lay(levels)
+        if levels is not self.detector.levels:
+            self.detector.lay(levels)
         for _ in range(MAX_EVENTS):
-            event = self.lookout.due()
+            event = self.detector.due()
             if event is None:
-                end = min(self.lookout.blind, until) if self.time < self.lookout.blind else until
+                end = min(self.detector.blind, until) if self.time < self.detector.blind else until
                 if end > self.time:
                     event = self._piece(end)
             if event is not None:
@@ -243,19 +243,19 @@ class Course:
         if event in SEEN:
             return SEEN[event]
         if event == TURN:
-            self.lookout.turned()
+            self.detector.turned()
             return Watched.TURN
         if event <= Event.HIP_HIGH:
-            self.bumpers.cross(event)
-            self.bumpers.lay(watch)
-            self.bumpers.decide(
+            self.stop_switches.cross(event)
+            self.stop_switches.lay(watch)
+            self.stop_switches.decide(
                 self.watch, self.terms, self.plain_motor, self.plain_q, self.plain_v
             )
         elif event == Event.RECOVER:
             self._load(held=False)
         elif event != CONTACT:
-            self.bumpers.flip(watch, event)
-        elif watch.flies or watch.held or self.lookout.released() > -TIE:
+            self.stop_switches.flip(watch, event)
+        elif watch.flies or watch.held or self.detector.released() > -TIE:
             return Watched.CONTACT
         else:
             self._load(held=True)
@@ -265,15 +265,15 @@ class Course:
         self, regime: Regime, q: Pair, v: Pair, point: Pair, drift: Pair, lean: float = NEVER
     ) -> None:
         self.q, self.v, self.point, self.drift = q, v, point, drift
-        self.lookout.lean = lean
-        self.bumpers.find(floats(q), floats(v))
+        self.detector.lean = lean
+        self.stop_switches.find(floats(q), floats(v))
         self._enter(regime)
 
     def _enter(self, regime: Regime) -> None:
         """Begin a regime at the present time."""
         self.regime, self.told = regime, None
         self.terms = terms_of(self.plain, regime)
-        self.lookout.enter(regime, self.since)
+        self.detector.enter(regime, self.since)
         self._load(held=False)
 
     def _load(self, *, held: bool) -> None:
@@ -288,8 +288,10 @@ class Course:
         watch.pars[MOTOR : MOTOR + 2] = self.plain_motor
         if watch.flies:
             watch.pars[HEIGHT], watch.pars[SPEED] = self.point[1], self.drift[1]
-        self.lookout.move_to(watch)
-        self.bumpers.decide(self.watch, self.terms, self.plain_motor, self.plain_q, self.plain_v)
+        self.detector.move_to(watch)
+        self.stop_switches.decide(
+            self.watch, self.terms, self.plain_motor, self.plain_q, self.plain_v
+        )
 
     def _watch_of(self, *, held: bool) -> Watch:
         found = self._watches.get((self.regime, held))

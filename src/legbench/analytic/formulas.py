@@ -13,7 +13,7 @@ from legbench.analytic.equations import (
     sweep,
     sweep_acceleration,
 )
-from legbench.analytic.places import (
+from legbench.analytic.parameters import (
     ALONG,
     COUPLING,
     DAMPING,

@@ -24,7 +24,7 @@ from legbench.analytic.compiled import (
     smooth_seeds,
 )
 from legbench.analytic.model import LegModel
-from legbench.analytic.places import FRICTION, MOTOR, SHARPNESS, SMOOTH
+from legbench.analytic.parameters import FRICTION, MOTOR, SHARPNESS, SMOOTH
 from legbench.analytic.state import Regime
 from legbench.errors import ConfigError, PlantFault
 from legbench.signals import Floats

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from legbench.analytic.compiled import foot_from_centre, terms_of
 from legbench.analytic.dual import DUAL
 from legbench.analytic.equations import Term, contact_force, free_foot_acceleration, sweep
-from legbench.analytic.places import Event
+from legbench.analytic.parameters import Event
 from legbench.design.statics import GRAVITY
 
 if TYPE_CHECKING:
@@ -61,14 +61,14 @@ def _pressed(course: "Course", event: int, state: "Sequence[Term]", *, plain: bo
     q, v = (state[0], state[1]), (state[2], state[3])
     free = event >= Event.KNEE_FREE or (event == Event.CONTACT and course.watch.held)
     terms = model.falling if free else terms_of(model, course.regime)
-    turns, a = course.bumpers.turns(DUAL, terms, model.torque(motor, q, v), q, v, free=free)
+    turns, a = course.stop_switches.turns(DUAL, terms, model.torque(motor, q, v), q, v, free=free)
     match event:
         case Event.KNEE_PUSH | Event.HIP_PUSH:
             joint = event - Event.KNEE_PUSH
-            return course.bumpers.sign(joint) * turns[joint]
+            return course.stop_switches.sign(joint) * turns[joint]
         case Event.KNEE_FREE | Event.HIP_FREE:
             joint = event - Event.KNEE_FREE
-            return course.bumpers.sign(joint) * turns[joint]
+            return course.stop_switches.sign(joint) * turns[joint]
         case Event.CONTACT if free:
             return free_foot_acceleration(DUAL, model.floating, q, v, a)[1] / GRAVITY
         case _:

@@ -13,9 +13,9 @@ from legbench.analytic.contact import MIN_PHASE
 from legbench.analytic.course import Course
 from legbench.analytic.dual import DUAL
 from legbench.analytic.equations import Pair
-from legbench.analytic.lookout import KINDS, SILENT, Levels
+from legbench.analytic.event_detector import KINDS, SILENT, Levels
 from legbench.analytic.model import LegModel
-from legbench.analytic.places import Kind, Watched
+from legbench.analytic.parameters import Kind, Watched
 from legbench.analytic.state import LegState, Regime, Transition
 from legbench.errors import ConfigError
 

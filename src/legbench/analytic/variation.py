@@ -13,7 +13,7 @@ import numpy as np
 from legbench.analytic.compiled import parameters_of, varied_integrator
 from legbench.analytic.dual import Dual, gradient
 from legbench.analytic.equations import SCALAR, Pair
-from legbench.analytic.places import HEIGHT, MOTOR, PROBE, SMOOTH, SPEED
+from legbench.analytic.parameters import HEIGHT, MOTOR, PROBE, SMOOTH, SPEED
 from legbench.analytic.readings import read
 from legbench.signals import Floats
 
@@ -50,7 +50,7 @@ class Variation:
         start = [*course.q, *course.v]
         moved = self._moved(start, watch.pars, time, [*varied, *course.motor])
         torque = plain.torque(course.plain_motor, q, v)
-        a = course.bumpers.turns(SCALAR, course.terms, torque, q, v)[1]
+        a = course.stop_switches.turns(SCALAR, course.terms, torque, q, v)[1]
         values, rates = [*q, *v], np.array([*v, *a])
         if event is None:
             shift = gradient(until - course.began)

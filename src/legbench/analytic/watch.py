@@ -12,7 +12,7 @@ until the function is `NUDGE` below zero; the event then happens that much later
 from typing import final
 
 from legbench.analytic.compiled import event_integrator
-from legbench.analytic.places import GAIN, LEVEL, Event, Kind
+from legbench.analytic.parameters import GAIN, LEVEL, Event, Kind
 from legbench.signals import Floats
 
 NUDGE = 1e-13

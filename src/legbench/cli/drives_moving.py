@@ -106,7 +106,7 @@ class Home:
         from legbench.commissioning.home import home
 
         with bench.session(leads=True) as session:
-            granted = session.be_punctual()
+            granted = session.request_realtime()
             homed = home(session, _node(session, self.node), self.method, timeout=self.timeout)
         if bench.json:
             print_json({**asdict(homed), "granted": granted and asdict(granted)})
@@ -141,7 +141,7 @@ class Jog:
         limits = limits_for(path, design)
         tell_waived(None, limits)
         with bench.session(leads=True) as session:
-            granted = session.be_punctual()
+            granted = session.request_realtime()
             jogged = jog(
                 session,
                 limits,

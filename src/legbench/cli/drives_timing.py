@@ -48,7 +48,7 @@ class Jitter:
             bench.session(leads=True, read_only=True) as session,
             self._writer(session) as writer,
         ):
-            granted = session.be_punctual(self.cpu)
+            granted = session.request_realtime(self.cpu)
             if writer is not None:
                 found[WITH] = measure(session, stiffness, self.cycles, writer)
             if self.recording != WITH:

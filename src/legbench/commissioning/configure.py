@@ -58,7 +58,7 @@ def write(session: Session) -> Written:
     up = session.bring_up()
     up.listen()
     up.identify()
-    up.glance()
+    up.poll_frames()
     up.pre_operational()
     outcomes = {node.name: up.configure(node) for node in session.config.nodes}
     check_taken(session.config, outcomes)

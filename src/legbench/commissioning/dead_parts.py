@@ -87,7 +87,7 @@ class Death:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Found:
+class TrialOutcome:
     """What came of a run."""
 
     cause: str | None
@@ -118,7 +118,7 @@ class _Stage:
 
 def try_dead_part(
     bench: Bench, emulation: Emulation, controller: str, death: Death, servo: ServoConfig
-) -> Found:
+) -> TrialOutcome:
     """Run a controller, let a part die, and measure when the limits end the run.
 
     Raises:
@@ -138,7 +138,7 @@ def try_dead_part(
                 if cycle < onset:
                     raise
                 cycles = 0 if contradicted is None else cycle - contradicted
-                return Found(
+                return TrialOutcome(
                     cause=error.cause,
                     time=cycles * stage.plant.period,
                     since_death=(cycle - onset) * stage.plant.period,
@@ -146,7 +146,7 @@ def try_dead_part(
                 )
             if contradicted is None and cycle >= onset and stage.contradiction() > EXCITATION:
                 contradicted = cycle
-    return Found(cause=None, time=None, since_death=None, excited=contradicted is not None)
+    return TrialOutcome(cause=None, time=None, since_death=None, excited=contradicted is not None)
 
 
 def watch_healthy(
@@ -198,7 +198,7 @@ def _alone(
     return _Stage(limited, controller, broken.break_part, lambda: broken.contradiction)
 
 
-class _Witness:
+class _RunObserver:
     """The leg on the shafts, which remembers where its links truly are."""
 
     def __init__(self, leg: EmulatedLeg) -> None:
@@ -220,7 +220,7 @@ def _on_bus(
     death: Death | None,
 ) -> _Stage:
     config, start = _with_encoders(load_bus(bench.bus_file), servo), start_of(chosen)
-    witness = _Witness(EmulatedLeg(bench.design, chosen.options, start))
+    witness = _RunObserver(EmulatedLeg(bench.design, chosen.options, start))
     behaviours = [
         Behaviour(start_pos=float(value), bandwidth=servo.bandwidth) for value in start.motor_pos
     ]

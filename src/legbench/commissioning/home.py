@@ -13,7 +13,7 @@ from legbench.drives.master.preparation import is_homed
 from legbench.drives.master.sdo_port import SdoPort
 from legbench.drives.master.sdo_stop import SdoStop, leave_operational
 from legbench.drives.master.session import Session
-from legbench.drives.master.stop_report import Lead, StopReport
+from legbench.drives.master.stop_report import DriveLeader, StopReport
 from legbench.drives.protocol.cia402 import (
     DriveState,
     Goal,
@@ -95,7 +95,7 @@ def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20
     up.listen()
     up.identify()
     up.unpower()
-    up.glance()
+    up.poll_frames()
     up.pre_operational()
     check_taken(session.config, {node.name: up.configure(node)}, speed=FASTEST, commands=False)
     sdo = up.sdo(node)
@@ -104,15 +104,15 @@ def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20
     before = up.preload(node)
     _choose(sdo, node, method)
     master = _Master(session, up, node)
-    session.leads(master)
-    up.glance()
+    session.register(master)
+    up.poll_frames()
     with master:
         master.start()
         master.enter_homing()
         master.enable()
         master.command(START_HOMING)
         master.await_end(timeout)
-    up.lookout.rest()
+    up.detector.disarm()
     sdo.put(0x6060, 0, I8, Mode.CYCLIC_SYNCHRONOUS_POSITION)
     after = up.position(node)
     _check_shown(up, node)
@@ -182,7 +182,7 @@ def _choose(sdo: SdoPort, node: NodeConfig, method: int) -> None:
 
 
 @final
-class _Master(Lead):
+class _Master(DriveLeader):
     """Leads one drive by SDO, with a heartbeat in every wait."""
 
     def __init__(self, session: Session, up: BringUp, node: NodeConfig) -> None:

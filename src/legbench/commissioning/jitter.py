@@ -80,7 +80,7 @@ def measure(
         session.link(SafetyLimits(), stiffness, read_only=True) as link,
     ):
         if log is not None:
-            link.tell(log)
+            link.show_frames_to(log)
         began_ns = link.start().time_ns
         if link.listening:
             raise DriveError(

@@ -15,7 +15,7 @@ from legbench.drives.setup.config import NodeConfig
 
 
 @final
-class Watched:
+class MonitoredNode:
     """Latest state of one drive, from its frames."""
 
     def __init__(self, node: NodeConfig) -> None:
@@ -24,7 +24,7 @@ class Watched:
         self.emergency = ""
         self.frames = 0
 
-    def hear(self, message: can.Message) -> None:
+    def take(self, message: can.Message) -> None:
         """Take a frame from any sender."""
         cob_id, data = message.arbitration_id, bytes(message.data)
         if cob_id in self.axis.tpdo_ids:
@@ -58,7 +58,7 @@ def monitor(session: Session, *, seconds: float, every: float) -> Iterator[tuple
     Raises:
         BusError: the bus does not work.
     """
-    watched = [Watched(node) for node in session.config.nodes]
+    watched = [MonitoredNode(node) for node in session.config.nodes]
     port, timebase = session.port(), session.timebase
     began_ns = timebase.now_ns()
     end_ns = began_ns + round(1e9 * seconds)
@@ -67,7 +67,7 @@ def monitor(session: Session, *, seconds: float, every: float) -> Iterator[tuple
         due_ns = min(due_ns + round(1e9 * every), end_ns)
         while (message := port.receive(due_ns)) is not None:
             for one in watched:
-                one.hear(message)
+                one.take(message)
             if timebase.now_ns() >= due_ns:
                 break
         lines = [one.line() for one in watched]

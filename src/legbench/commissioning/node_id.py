@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from legbench.commissioning.scan import PROBE_MS, Found, scan
+from legbench.commissioning.scan import PROBE_MS, ScannedNode, scan
 from legbench.drives.errors import DriveError, NoAnswerError, SdoAbortError
 from legbench.drives.master.identification import read_identity
 from legbench.drives.master.lss_port import LssPort
@@ -54,12 +54,12 @@ def set_node_id(session: Session, node_id: int) -> NodeIdChange:
     up = session.bring_up()
     up.listen()
     found = list(scan(session))
-    heard = up.lookout.beats - {node.node_id for node in found}
+    heard = up.detector.heard_nodes - {node.node_id for node in found}
     _refuse_many(found, heard)
     lss = LssPort(session.port())
     try:
         address, before = _select(session, lss, found)
-        up.glance()
+        up.poll_frames()
         lss.configure(node_id)
         stored = lss.store()
     finally:
@@ -87,7 +87,7 @@ def set_node_id(session: Session, node_id: int) -> NodeIdChange:
     )
 
 
-def _refuse_many(found: list[Found], heard: set[int]) -> None:
+def _refuse_many(found: list[ScannedNode], heard: set[int]) -> None:
     """Refuse a bus on which anything but one drive is alive; raises DriveError."""
     ids = sorted({node.node_id for node in found} | heard)
     twice = [node.node_id for node in found if node.answers > 1]
@@ -103,7 +103,9 @@ def _refuse_many(found: list[Found], heard: set[int]) -> None:
         )
 
 
-def _select(session: Session, lss: LssPort, found: list[Found]) -> tuple[LssAddress, int | None]:
+def _select(
+    session: Session, lss: LssPort, found: list[ScannedNode]
+) -> tuple[LssAddress, int | None]:
     """Bring the one drive into configuration; returns its address and its node id, if any."""
     if not found:
         address = lss.find_unconfigured()

@@ -58,7 +58,7 @@ def reset(session: Session, nodes: Sequence[NodeConfig]) -> list[FaultReset]:
     up.listen()
     up.identify()
     up.unpower()
-    up.glance()
+    up.poll_frames()
     return [_reset(session, up, node) for node in nodes]
 
 

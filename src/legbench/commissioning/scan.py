@@ -18,7 +18,7 @@ PROBE_MS = 15
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Found:
+class ScannedNode:
     """Node that was found on the bus."""
 
     node_id: int
@@ -35,7 +35,7 @@ class Found:
     """Comparison with the bus file, in words."""
 
 
-def scan(session: Session, last: int = LAST_NODE) -> Iterator[Found]:
+def scan(session: Session, last: int = LAST_NODE) -> Iterator[ScannedNode]:
     """Ask every node id up to `last` for its identity; nothing is written.
 
     Raises:
@@ -54,7 +54,7 @@ def scan(session: Session, last: int = LAST_NODE) -> Iterator[Found]:
             sdo = SdoPort(port, node_id, timeout_ms=config.sdo_timeout_ms)
             there = read_identity(sdo)
             answers = count_answers(port, node_id, 0x1018, 4)
-            yield Found(
+            yield ScannedNode(
                 node_id=node_id,
                 device_type=device,
                 vendor=there.vendor,

@@ -65,7 +65,7 @@ def store(
     up.identify()
     refuse_powered(up, session.config.nodes)
     if part in COMMUNICATION:
-        failed = park(session.port(), session.config, up.lookout.hear)
+        failed = park(session.port(), session.config, up.detector.check_frame)
         if failed:
             raise DriveError(f"{failed[0]}; nothing has been stored")
     done: list[Stored] = []
@@ -92,8 +92,8 @@ def _store(session: Session, up: BringUp, node: NodeConfig, part: int, timeout: 
         node.node_id,
         timeout_ms=round(1e3 * timeout),
         retries=1,
-        on_other=up.lookout.hear,
-        before_write=up.glance,
+        on_other=up.detector.check_frame,
+        before_write=up.poll_frames,
     )
     try:
         patient.put(STORE, part, U32, SAVE_SIGNATURE)

@@ -63,7 +63,7 @@ class Guard:
         self._links.start()
         self.shortfall.restart()
 
-    def forget_wish(self) -> None:
+    def restart_from_applied(self) -> None:
         """Measure the next step of the command from what was applied last."""
         self._wish = None
 

@@ -14,7 +14,7 @@ from legbench.analytic import equations
 from legbench.analytic.compiled import varied_integrator
 from legbench.analytic.course import TIME_LIMIT
 from legbench.analytic.equations import Pair
-from legbench.analytic.places import DAMPING, MOTOR, PUSHES, SMOOTH
+from legbench.analytic.parameters import DAMPING, MOTOR, PUSHES, SMOOTH
 from legbench.errors import ConfigError
 from legbench.modes.scene import Scene
 from legbench.signals import Floats

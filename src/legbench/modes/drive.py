@@ -25,7 +25,7 @@ class AbstractDrive(ABC):
     probe: Pair
     """Factors p1, p2 of the probe `p1 q1 + p2 q2` that the law watches [-]."""
     alarm: float
-    """Time at which `ring` is to be called [s]."""
+    """Time at which `on_alarm` is to be called [s]."""
 
     @abstractmethod
     def restart(self) -> None:
@@ -33,14 +33,14 @@ class AbstractDrive(ABC):
 
     @abstractmethod
     def levels(self) -> Levels:
-        """Probe values at which `happen` is to be called."""
+        """Probe values at which `on_event` is to be called."""
 
     @abstractmethod
-    def happen(self, what: Watched, value: float, time: float) -> None:
+    def on_event(self, what: Watched, value: float, time: float) -> None:
         """Handle an event of the probe."""
 
     @abstractmethod
-    def ring(self, value: float, time: float) -> None:
+    def on_alarm(self, value: float, time: float) -> None:
         """Handle the alarm."""
 
     @property
@@ -71,10 +71,10 @@ class Passive(AbstractDrive):
         """No levels, as there is nothing to watch."""
         return SILENT
 
-    def happen(self, what: Watched, value: float, time: float) -> None:
+    def on_event(self, what: Watched, value: float, time: float) -> None:
         """Do nothing, as no event is watched."""
 
-    def ring(self, value: float, time: float) -> None:
+    def on_alarm(self, value: float, time: float) -> None:
         """Do nothing, as no alarm is set."""
 
 
@@ -133,7 +133,7 @@ class JumpLaw(AbstractDrive):
             case _:
                 return SILENT
 
-    def happen(self, what: Watched, value: float, time: float) -> None:
+    def on_event(self, what: Watched, value: float, time: float) -> None:
         """Advance the phase after an event of the probe."""
         self._levels = None
         match (self.phase, what):
@@ -154,7 +154,7 @@ class JumpLaw(AbstractDrive):
             case _:
                 pass
 
-    def ring(self, value: float, time: float) -> None:
+    def on_alarm(self, value: float, time: float) -> None:
         """Advance the phase after the alarm: the release is over, or a load has lasted."""
         self._levels = None
         if self._loaded:

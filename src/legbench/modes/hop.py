@@ -148,9 +148,9 @@ def hop(leg: TaylorLeg, drive: AbstractDrive, start: Apex) -> Hop:
                 course.switch()
                 liftoff = course.time
             elif what is None:
-                drive.ring(_probe(drive, course.q), course.time)
+                drive.on_alarm(_probe(drive, course.q), course.time)
             else:
-                drive.happen(what, _probe(drive, course.q), course.time)
+                drive.on_event(what, _probe(drive, course.q), course.time)
     except PlantFault:
         ending = Ending.FAULT
     return Hop(

@@ -13,7 +13,7 @@ from typing import final
 
 import numpy as np
 
-from legbench.analytic.places import DAMPING, MOTOR
+from legbench.analytic.parameters import DAMPING, MOTOR
 from legbench.modes.brake import beyond_limits
 from legbench.modes.carry import Carrier
 from legbench.modes.continuation import Solution, correct

@@ -128,7 +128,7 @@ class CanPlant(AbstractPlant):
         self.landing = landing = land(
             self._lead,
             motor_pos.tolist(),
-            self.link.forget_wish(),
+            self.link.restart_from_applied(),
             speed=self._speed or self._session.config.start_speed,
             period=self.period,
             interrupted=interrupted,

@@ -66,7 +66,7 @@ def open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
     config, limits = _checked(choice, leg)
     session = open_session(config, choice, leg, leads=not choice.read_only)
     try:
-        granted = session.be_punctual()
+        granted = session.request_realtime()
         link = session.link(limits, leg.design.stiffness, read_only=choice.read_only)
         link.open()
     except BaseException:

@@ -129,7 +129,7 @@ class EmulatedDrive:
             order = decode_nmt(data)
             if order is not None and order[1] in (0, self.node_id):
                 self._obey(order[0])
-        elif self._heartbeats.hear(cob_id - HEARTBEAT_BASE, data, now_ns):
+        elif self._heartbeats.take(cob_id - HEARTBEAT_BASE, data, now_ns):
             self._connection.over(HEARTBEAT_LOST, now_ns)
         self._connection.forward(self._now_ns)
 
@@ -188,7 +188,7 @@ class EmulatedDrive:
         self.axis.fault(code)
         self._connection.forward(self._now_ns)
 
-    def untrip(self, code: int) -> None:
+    def clear_trip(self, code: int) -> None:
         """Remove the cause of an error; a fault reset is possible again."""
         self.axis.alarms.release(code)
 

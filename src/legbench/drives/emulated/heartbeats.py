@@ -25,7 +25,7 @@ class HeartbeatConsumer:
         for node_id, timeout_ns in self._consumed():
             self._watches.setdefault(node_id, HeartbeatWatch(timeout_ns, now_ns))
 
-    def hear(self, node_id: int, data: bytes, now_ns: int) -> bool:
+    def take(self, node_id: int, data: bytes, now_ns: int) -> bool:
         """Take a heartbeat; returns whether it is one of a node that is to be watched."""
         if decode_heartbeat(data) is None:
             return False

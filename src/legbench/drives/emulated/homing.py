@@ -83,7 +83,7 @@ class Homing:
             self._moves.pop(0)
             self._index = None
         if not self._moves:
-            motion.call_it(motion.sign * self._values[0x607C, 0])
+            motion.set_position(motion.sign * self._values[0x607C, 0])
             self.state, self.done = HomingState.ATTAINED, True
             return
         move = self._moves[0]

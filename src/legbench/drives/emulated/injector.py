@@ -12,7 +12,7 @@ from legbench.drives.emulated.faults import (
     NodeFault,
     NodeFaultKind,
 )
-from legbench.drives.emulated.sensors import Ailment
+from legbench.drives.emulated.sensors import SensorFault
 from legbench.drives.protocol.frame import Frame
 
 _TRIPS = {
@@ -20,12 +20,12 @@ _TRIPS = {
     NodeFaultKind.OVER_TEMPERATURE: OVER_TEMPERATURE,
 }
 _ENCODERS = {
-    NodeFaultKind.MOTOR_FROZEN: ("motor", Ailment.FROZEN),
-    NodeFaultKind.MOTOR_STEP: ("motor", Ailment.STEP),
-    NodeFaultKind.MOTOR_DRIFT: ("motor", Ailment.DRIFT),
-    NodeFaultKind.LINK_FROZEN: ("link", Ailment.FROZEN),
-    NodeFaultKind.LINK_STEP: ("link", Ailment.STEP),
-    NodeFaultKind.LINK_DRIFT: ("link", Ailment.DRIFT),
+    NodeFaultKind.MOTOR_FROZEN: ("motor", SensorFault.FROZEN),
+    NodeFaultKind.MOTOR_STEP: ("motor", SensorFault.STEP),
+    NodeFaultKind.MOTOR_DRIFT: ("motor", SensorFault.DRIFT),
+    NodeFaultKind.LINK_FROZEN: ("link", SensorFault.FROZEN),
+    NodeFaultKind.LINK_STEP: ("link", SensorFault.STEP),
+    NodeFaultKind.LINK_DRIFT: ("link", SensorFault.DRIFT),
 }
 Fate = tuple[tuple[int, Frame], ...]
 """Delay [ns] and content of each copy of a frame that arrives."""
@@ -142,7 +142,7 @@ class Injector:
             if begins:
                 drive.trip(code, now_ns)
             else:
-                drive.untrip(code)
+                drive.clear_trip(code)
         elif fault.kind is NodeFaultKind.HEARTBEAT_LOSS:
             drive.mute_heartbeat(begins)
         elif fault.kind is NodeFaultKind.RESET and begins:

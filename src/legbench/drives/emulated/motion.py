@@ -171,7 +171,7 @@ class Motion:
         self._late_ms += step_ns / 1e6
         return self._late_ms > self._values[0x6066, 0]
 
-    def call_it(self, counts: int) -> None:
+    def set_position(self, counts: int) -> None:
         """Set the present position to `counts`, as homing does."""
         shift = counts - self.actual
         low, high = self._hard

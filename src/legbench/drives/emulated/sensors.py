@@ -8,7 +8,7 @@ from legbench.drives.setup.config import NodeConfig
 SECOND_NS = 1_000_000_000
 
 
-class Ailment(Enum):
+class SensorFault(Enum):
     """Kinds of fault that an encoder may have."""
 
     FROZEN = "frozen"
@@ -30,19 +30,19 @@ class Encoder:
     def __init__(self, counts_per_rad: float) -> None:
         """Make an encoder without a fault."""
         self._counts_per_rad = counts_per_rad
-        self._ailment: Ailment | None = None
+        self._ailment: SensorFault | None = None
         self._size = self._offset = self._noise = 0.0
         self._shown = 0
 
-    def fail(self, ailment: Ailment | None, size: float = 0.0) -> None:
+    def fail(self, ailment: SensorFault | None, size: float = 0.0) -> None:
         """Fail from now on, by an angle [rad] or a speed [rad/s]; None heals."""
         self._ailment, self._size, self._offset = ailment, size, 0.0
 
     def tick(self, step_ns: int) -> None:
         """Advance the time of the fault [ns]."""
-        if self._ailment is Ailment.DRIFT:
+        if self._ailment is SensorFault.DRIFT:
             self._offset += self._size * step_ns / SECOND_NS
-        elif self._ailment is Ailment.STEP:
+        elif self._ailment is SensorFault.STEP:
             self._offset = self._size
 
     def disturb(self, error: float) -> None:
@@ -51,7 +51,7 @@ class Encoder:
 
     def show(self, counts: int) -> int:
         """Return the reading for a true position [counts]."""
-        if self._ailment is not Ailment.FROZEN:
+        if self._ailment is not SensorFault.FROZEN:
             self._shown = counts + round((self._offset + self._noise) * self._counts_per_rad)
         return self._shown
 

@@ -9,7 +9,7 @@ import can
 from legbench.drives.errors import BusError, DriveError, SdoAbortError
 from legbench.drives.master.first_contact import first_contact
 from legbench.drives.master.identification import identify, read_identity
-from legbench.drives.master.lookout import Lookout
+from legbench.drives.master.master_detector import MasterDetector
 from legbench.drives.master.parking import is_parked
 from legbench.drives.master.port import Port
 from legbench.drives.master.sdo_port import SdoPort
@@ -42,7 +42,7 @@ class BringUp:
 
     def __init__(self, port: Port, bus: BusConfig, on_other: Callable[[can.Message], None]) -> None:
         self._port, self._bus, self._on_other = port, bus, on_other
-        self.lookout = Lookout(port, bus)
+        self.detector = MasterDetector(port, bus)
         self._sdo = {
             node.node_id: SdoPort(
                 port,
@@ -50,7 +50,7 @@ class BringUp:
                 timeout_ms=bus.sdo_timeout_ms,
                 retries=bus.sdo_retries,
                 on_other=self._hear,
-                before_write=self.glance,
+                before_write=self.poll_frames,
             )
             for node in bus.nodes
         }
@@ -58,7 +58,7 @@ class BringUp:
     def listen(self) -> None:
         """Listen before anything but questions is sent, then ask the drives whom they watch.
 
-        From here until `lookout.rest` another master ends the bring-up with the next frame that is
+        Until `detector.disarm` another master ends the bring-up with the next frame that is
         heard of it, before the next object is written.
 
         Raises:
@@ -66,21 +66,21 @@ class BringUp:
             BusError: the bus has failed, or nobody can be talked to.
         """
         with self.contact():
-            self.lookout.listen()
-            if not self.lookout.beats:
+            self.detector.listen()
+            if not self.detector.heard_nodes:
                 return
             for node in self._bus.nodes:
                 if node.heartbeat_consumer:
-                    self.lookout.watched(node, self.sdo(node).find_int(0x1016, 1, U32) or 0)
+                    self.detector.check_consumer(node, self.sdo(node).find_int(0x1016, 1, U32) or 0)
 
-    def glance(self) -> None:
+    def poll_frames(self) -> None:
         """Hear what has come by now; raises PlantFault if another master has spoken."""
-        for message in self.lookout.glance():
+        for message in self.detector.poll_frames():
             self._on_other(message)
 
     def _hear(self, message: can.Message) -> None:
         self._on_other(message)
-        self.lookout.hear(message)
+        self.detector.check_frame(message)
 
     def sdo(self, node: NodeConfig) -> SdoPort:
         """Access to the objects of a node."""

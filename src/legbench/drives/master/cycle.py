@@ -223,9 +223,9 @@ class Cycle:
             return
         base = cob_id - node_id
         if base == HEARTBEAT_BASE:
-            watch.hear_heartbeat(bytes(message.data), self._port.timebase.now_ns())
+            watch.take_heartbeat(bytes(message.data), self._port.timebase.now_ns())
         elif base == EMCY_BASE:
-            watch.hear_emergency(bytes(message.data))
+            watch.take_emergency(bytes(message.data))
         elif base == SDO_REPLY_BASE:
             for poll in self._polls[node_id]:
                 poll.feed(bytes(message.data))

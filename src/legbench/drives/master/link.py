@@ -19,15 +19,15 @@ import can
 
 from legbench.drives.errors import DriveError
 from legbench.drives.master.enabling import enable
-from legbench.drives.master.ending import Ending, StopOnError
 from legbench.drives.master.limited_motion import LimitedMotion, guard_of
+from legbench.drives.master.link_end import LinkEnd, StopOnError
+from legbench.drives.master.link_opening import LinkOpening
 from legbench.drives.master.link_parts import LinkParts
 from legbench.drives.master.link_state import LinkState
 from legbench.drives.master.move import missed, move
-from legbench.drives.master.opening import Opening
 from legbench.drives.master.port import Listener, Port
 from legbench.drives.master.sample import Sample
-from legbench.drives.master.stop_report import Lead, StopReport
+from legbench.drives.master.stop_report import DriveLeader, StopReport
 from legbench.drives.master.ticks import Ticks
 from legbench.drives.setup.bus_numbers import check_start_speed
 from legbench.drives.setup.config import BusConfig
@@ -41,7 +41,7 @@ from legbench.limits.shortfall import Shortfall
 
 
 @final
-class Link(Lead):
+class Link(DriveLeader):
     """Cyclic link of one master to its drives over a bus.
 
     Attributes:
@@ -88,7 +88,7 @@ class Link(Lead):
         self._parts, self._config, self._status = parts, config, parts.status
         self.cycle, self.bring_up = parts.cycle, parts.bring_up
         self._supervisor, self._start_up = parts.supervisor, parts.start_up
-        self._opening, self._ending = Opening(parts), Ending(parts)
+        self._opening, self._ending = LinkOpening(parts), LinkEnd(parts)
         self._stop_on_error = StopOnError(self._ending)
         self._ticks = Ticks(parts)
         self._guard = guard_of(config, parts.limits)
@@ -150,12 +150,12 @@ class Link(Lead):
 
     # --- begin and end -----------------------------------------------------------------------
 
-    def tell(self, listener: Listener) -> None:
+    def show_frames_to(self, listener: Listener) -> None:
         """Show every frame to a listener from now on, or from when the drives are configured."""
         self._opening.show_frames_to(listener)
 
     def open(self) -> None:
-        """Take the channel, check and configure the drives; raises as `Opening.run`."""
+        """Take the channel, check and configure the drives; raises as `LinkOpening.run`."""
         self._opening.run()
 
     def start(self, *, clear_faults: bool = False) -> Sample:
@@ -175,7 +175,7 @@ class Link(Lead):
             )
         parts, ticks = self._parts, self._ticks
         if not parts.read_only and self.cycle.led_by_another():
-            self._supervisor.alone()  # A master that has come since `open` keeps the drives.
+            self._supervisor.check_no_other_master()  # It came after `open`, and keeps the drives.
         self._status.state = LinkState.CYCLIC
         with self._stop_on_error:
             self._start_up.settle(ticks.settling)
@@ -254,9 +254,9 @@ class Link(Lead):
             self._supervisor.sent(complete=self.cycle.send(words))
         return applied
 
-    def forget_wish(self) -> tuple[float, ...]:
+    def restart_from_applied(self) -> tuple[float, ...]:
         """Measure the next step of the command from what was applied last; returns that [rad]."""
-        self._guard.forget_wish()
+        self._guard.restart_from_applied()
         return self._guard.applied
 
     def move_to(self, motor_pos: Sequence[float], speed: float | None = None) -> Sample:

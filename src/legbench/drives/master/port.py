@@ -77,7 +77,7 @@ class Port:
             raise BusError(f"{self.bus.channel_info}: cannot send: {error}; {HINT}") from error
         if self.listener is not None:
             message.timestamp = 1e-9 * self.timebase.now_ns()
-            self._tell(message)
+            self._show_to_listener(message)
 
     def send_frame(self, frame: Frame) -> None:
         """Send a frame of the codec; raises BusError."""
@@ -113,7 +113,7 @@ class Port:
             raise BusError(f"{self.bus.channel_info}: cannot receive: {error}; {HINT}") from error
         if message is not None and self.listener is not None:
             message.timestamp = self._came_at(message.timestamp)
-            self._tell(message)
+            self._show_to_listener(message)
         return message
 
     def _for_us(self, message: can.Message) -> bool:
@@ -134,7 +134,7 @@ class Port:
         age = time.time() - stamp
         return now - age if 0.0 <= age < OLDEST_S else now
 
-    def _tell(self, message: can.Message) -> None:
+    def _show_to_listener(self, message: can.Message) -> None:
         """Show a frame to the listener; one that fails is not called again, and ends nothing."""
         listener = self.listener
         if listener is None:

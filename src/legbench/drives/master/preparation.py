@@ -34,7 +34,7 @@ def prepare_to_move(
     bring_up.identify()
     check_homed(bring_up, config.nodes)
     bring_up.unpower()
-    bring_up.glance()
+    bring_up.poll_frames()
     bring_up.pre_operational()
     outcomes = {node.name: bring_up.configure(node) for node in config.nodes}
     check_taken(config, outcomes, speed=speed)

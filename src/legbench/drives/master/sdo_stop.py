@@ -70,7 +70,7 @@ class SdoStop:
         began_ns = now_ns()
         left, shown = list(self._nodes), dict.fromkeys(self._nodes, -1)
         cut_off: tuple[NodeConfig, ...] = ()
-        self._tell(left, Controlword.QUICK_STOP)
+        self._write_controlword(left, Controlword.QUICK_STOP)
         for _ in range(LAST_NS // self._rest_ns):
             self._try(self._rest)
             for node in left:
@@ -80,11 +80,11 @@ class SdoStop:
             if not left or elapsed_ns > LAST_NS or self._refused >= FAILED_LOOKS:
                 break
             if elapsed_ns < RAMP_NS:
-                self._tell(left, Controlword.QUICK_STOP)
+                self._write_controlword(left, Controlword.QUICK_STOP)
                 continue
             cut_off = cut_off or tuple(left)
-            self._tell(left, Controlword.DISABLE_VOLTAGE)
-        self._tell(self._nodes, Controlword.DISABLE_VOLTAGE)
+            self._write_controlword(left, Controlword.DISABLE_VOLTAGE)
+        self._write_controlword(self._nodes, Controlword.DISABLE_VOLTAGE)
         powered = [node for node in left if shown[node] >= 0]
         return StopReport(
             powered=tuple(node.name for node in powered),
@@ -94,16 +94,16 @@ class SdoStop:
             errors=tuple(self._errors),
         )
 
-    def _tell(self, nodes: Sequence[NodeConfig], controlword: int) -> None:
+    def _write_controlword(self, nodes: Sequence[NodeConfig], controlword: int) -> None:
         """Write 6040h in all drives, back to back; twice where something was raised."""
-        told = False
+        written = False
         for node in nodes:
             request = Download(CONTROLWORD, 0, pack(DataType.UNSIGNED16, controlword)).request
             for _ in range(2):
                 if self._try(partial(self._port.send, SDO_REQUEST_BASE + node.node_id, request)):
-                    told = True
+                    written = True
                     break
-        self._refused = 0 if told else self._refused + 1
+        self._refused = 0 if written else self._refused + 1
 
     def _look(self, node: NodeConfig) -> int:
         """Read the statusword of a drive; -1 if it does not answer."""

@@ -11,7 +11,7 @@ from legbench.drives.master.bring_up import BringUp
 from legbench.drives.master.bus_log import BusLog
 from legbench.drives.master.link import Link
 from legbench.drives.master.port import Port
-from legbench.drives.master.stop_report import Lead, StopReport, add_trouble
+from legbench.drives.master.stop_report import DriveLeader, StopReport, add_trouble
 from legbench.drives.setup.config import BusConfig
 from legbench.drives.transport.lock import ChannelLock
 from legbench.drives.transport.open_bus import timebase_of
@@ -53,7 +53,7 @@ class Session(Closing):
         self.timebase = timebase or timebase_of(bus)
         self.log: BusLog | None = None
         self._links: list[Link] = []
-        self._leads: list[Lead] = []
+        self._leaders: list[DriveLeader] = []
         self._lock = lock or self._lock_of_bus()
         self._closed = False
 
@@ -67,7 +67,7 @@ class Session(Closing):
         """Name of the bus in logs."""
         return str(getattr(self.bus, "channel", "can"))
 
-    def be_punctual(self, cpu: int | None = None) -> Granted | None:
+    def request_realtime(self, cpu: int | None = None) -> Granted | None:
         """Ask the system for real-time scheduling; returns none in virtual time.
 
         Links that are made afterwards spend the last part of every wait awake, if it was granted.
@@ -86,7 +86,7 @@ class Session(Closing):
         """
         self.log = BusLog(log, self.channel)
         for link in self._links:
-            link.tell(self.log)
+            link.show_frames_to(self.log)
 
     def _lock_of_bus(self) -> ChannelLock:
         """Lock of the bus's channel; a private one for an emulated bus of this process."""
@@ -120,19 +120,19 @@ class Session(Closing):
             lock=self._lock,
         )
         if self.log is not None:
-            link.tell(self.log)
+            link.show_frames_to(self.log)
         self._links.append(link)
-        self.leads(link)
+        self.register(link)
         return link
 
-    def leads(self, lead: Lead) -> None:
+    def register(self, leader: DriveLeader) -> None:
         """Register whoever leads drives, to be closed before the bus is shut down."""
-        self._leads.append(lead)
+        self._leaders.append(leader)
 
     @property
     def stopped(self) -> tuple[StopReport, ...]:
         """Reports of the stops of those who have led drives with this session."""
-        return tuple(lead.stopped for lead in self._leads if lead.stopped is not None)
+        return tuple(leader.stopped for leader in self._leaders if leader.stopped is not None)
 
     def close(self) -> None:
         """Stop all drives, shut the bus down, close the log; may be called twice, raises no error.
@@ -151,9 +151,9 @@ class Session(Closing):
     def _let_go(self) -> None:
         """Stop all drives, shut the bus down, release the channel."""
         with shielded() as shield:
-            for lead in self._leads:
+            for leader in self._leaders:
                 try:
-                    lead.close()
+                    leader.close()
                 except BaseException as error:  # The others have to be stopped, too.
                     shield.hold(error)
             self._closed = True

@@ -22,7 +22,7 @@ FAILED_CYCLES = 3
 
 
 @final
-class StopLadder:
+class StopSequence:
     """Stop of all drives of a cycle; raises nothing.
 
     Whatever a step raises, a KeyboardInterrupt out of a driver included, the next step is taken.

@@ -53,7 +53,7 @@ class StopReport:
         )
 
 
-class Lead(ABC):
+class DriveLeader(ABC):
     """Interface of everything that gives drives power, and takes it away when its `with` ends."""
 
     @property

@@ -32,7 +32,7 @@ class Supervisor:
     def bus(self, tick: Tick) -> None:
         """Check that the controller is on the bus and the grid is kept; raises PlantFault."""
         if self._cycle.stranger is not None:
-            self.alone()
+            self.check_no_other_master()
         missed = tick.skipped - tick.silent
         self._overruns = self._overruns + missed if missed else 0
         if self._cycle.bus_off:
@@ -46,7 +46,7 @@ class Supervisor:
                 f"is {self._limits.overrun_cycles}; free the processor",
             )
 
-    def alone(self) -> None:
+    def check_no_other_master(self) -> None:
         """Check that no other master leads these drives; raises PlantFault."""
         stranger = self._cycle.stranger
         if stranger is not None:

@@ -24,7 +24,7 @@ class Ticks:
     def settling(self) -> Tick:
         """Wait for the next tick; raises PlantFault if another master leads the drives."""
         tick = self._next()
-        self._supervisor.alone()
+        self._supervisor.check_no_other_master()
         return tick
 
     def watched(self) -> Tick:

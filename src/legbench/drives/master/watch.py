@@ -45,7 +45,7 @@ class NodeWatch:
         self.lost_total = self.bad_total = 0
         self.state = None
 
-    def hear_heartbeat(self, data: bytes, now_ns: int) -> None:
+    def take_heartbeat(self, data: bytes, now_ns: int) -> None:
         """Take a heartbeat or boot-up message."""
         state = decode_heartbeat(data)
         if state is None:
@@ -55,7 +55,7 @@ class NodeWatch:
         if state is NmtState.BOOT_UP:
             self._rebooted = True
 
-    def hear_emergency(self, data: bytes) -> None:
+    def take_emergency(self, data: bytes) -> None:
         """Take an emergency message."""
         emergency = decode_emcy(self._node.node_id, data)
         if emergency is None:

@@ -139,8 +139,8 @@ HOLD = {
     _S.FAULT: Controlword.DISABLE_VOLTAGE,
 }
 """Controlword that keeps a drive in its state, by state."""
-_LADDER = (_S.SWITCH_ON_DISABLED, _S.READY_TO_SWITCH_ON, _S.SWITCHED_ON, _S.OPERATION_ENABLED)
-_RUNG = {
+_ENABLING = (_S.SWITCH_ON_DISABLED, _S.READY_TO_SWITCH_ON, _S.SWITCHED_ON, _S.OPERATION_ENABLED)
+_PLACE_OF_GOAL = {
     Goal.DISABLED: 0,
     Goal.READY: 1,
     Goal.SWITCHED_ON: 2,
@@ -174,10 +174,10 @@ def next_controlword(state: DriveState, goal: Goal) -> tuple[Controlword, Way]:
         if goal is Goal.DISABLED:
             return Controlword.DISABLE_VOLTAGE, Way.MOVING
         return hold, Way.REFUSED
-    rung, wanted = _LADDER.index(state), _RUNG[goal]
-    if rung == wanted:
+    place, wanted = _ENABLING.index(state), _PLACE_OF_GOAL[goal]
+    if place == wanted:
         return hold, Way.REACHED
-    return HOLD[_LADDER[rung + 1 if rung < wanted else wanted]], Way.MOVING
+    return HOLD[_ENABLING[place + 1 if place < wanted else wanted]], Way.MOVING
 
 
 _BLIND = {

@@ -1,4 +1,4 @@
-"""The stop ladder word by word and cycle by cycle, with two drives that show what a test says."""
+"""The stop sequence word by word and cycle by cycle, with two drives that show what a test says."""
 
 import itertools
 from collections.abc import Callable, Sequence
@@ -8,7 +8,7 @@ import pytest
 from drives_rig import node
 
 from legbench.drives.master.axis_link import AxisLink
-from legbench.drives.master.stop import StopLadder
+from legbench.drives.master.stop import StopSequence
 from legbench.drives.master.stop_report import StopReport
 from legbench.drives.protocol.cia402 import Goal
 
@@ -57,8 +57,8 @@ class ScriptedCycle:
     def stop(self) -> tuple[StopReport, list[str]]:
         """Stop, and what was held on the way."""
         held: list[str] = []
-        ladder = StopLadder(cast(Any, self), lambda error: held.append(type(error).__name__))
-        return ladder.run(), held
+        sequence = StopSequence(cast(Any, self), lambda error: held.append(type(error).__name__))
+        return sequence.run(), held
 
     def told(self, place: int) -> list[tuple[int, int]]:
         """Controlwords of a drive and for how many cycles each stood."""

@@ -20,17 +20,17 @@ from legbench.errors import PlantFault
 
 
 @final
-class Lookout:
+class MasterDetector:
     """Detector of any other master that leads the drives of a bus file or accesses their objects.
 
     A master of a leg is heard by its SYNC, its commands (RPDOs), its orders (NMT), its questions
     (SDO and LSS requests) and its heartbeat. A node that the bus file does not name may be
-    anything, such as a sensor: its heartbeat is a master's if a drive watches for it (1016h), see
-    `watched`.
+    anything, such as a sensor: it is a master if a drive watches for it (1016h), see
+    `check_consumer`.
 
     Attributes:
         stranger: identifier of the first frame that only a master sends, and another one did.
-        beats: nodes besides the drives whose heartbeat has been heard.
+        heard_nodes: nodes besides the drives whose heartbeat has been heard.
     """
 
     def __init__(self, port: Port, config: BusConfig) -> None:
@@ -49,7 +49,7 @@ class Lookout:
         self._nodes = {node.node_id for node in config.nodes}
         self._armed = True
         self.stranger: int | None = None
-        self.beats: set[int] = set()
+        self.heard_nodes: set[int] = set()
 
     def listen(self) -> None:
         """Listen for `open_bus.LISTEN_NS`, or not at all on a bus without other participants.
@@ -63,42 +63,42 @@ class Lookout:
         while port.timebase.now_ns() < until_ns:
             message = port.receive(until_ns)
             if message is not None:
-                self.hear(message)
+                self.check_frame(message)
 
-    def glance(self) -> Iterator[can.Message]:
+    def poll_frames(self) -> Iterator[can.Message]:
         """Take all frames that have come by now, without waiting; raises as `listen`.
 
         Frames that come faster than they are read are taken for a period of the bus at most.
         """
         until_ns = self._port.timebase.now_ns() + self._config.period_ns
         while (message := self._port.take()) is not None:
-            self.hear(message)
+            self.check_frame(message)
             yield message
             if self._port.timebase.now_ns() > until_ns:
                 return
 
-    def hear(self, message: can.Message) -> None:
+    def check_frame(self, message: can.Message) -> None:
         """Judge a received frame; raises PlantFault, and names it, if only a master sends it."""
         cob_id = message.arbitration_id
         if message.is_error_frame or not self._port.foreign(message):
             return
         if HEARTBEAT_BASE < cob_id <= HEARTBEAT_BASE + LAST_NODE:
-            self.beats |= {cob_id - HEARTBEAT_BASE} - self._nodes
+            self.heard_nodes |= {cob_id - HEARTBEAT_BASE} - self._nodes
         if cob_id in self._names:
             self._found(cob_id, self._names[cob_id])
 
-    def watched(self, node: NodeConfig, consumer: int) -> None:
+    def check_consumer(self, node: NodeConfig, consumer: int) -> None:
         """Compare whom a drive watches (a word of 1016h) with whom this bus has been heard from.
 
         Raises:
             PlantFault: the drive watches for a node that lives: that one is its master.
         """
         master = consumer >> 16 & LAST_NODE
-        if consumer & 0xFFFF and master in self.beats:
+        if consumer & 0xFFFF and master in self.heard_nodes:
             what = f"the heartbeat that '{node.name}' watches for"
             self._found(HEARTBEAT_BASE + master, what)
 
-    def rest(self) -> None:
+    def disarm(self) -> None:
         """Stop raising, as these drives are led from here and a stop must get out."""
         self._armed = False
 

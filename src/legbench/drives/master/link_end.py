@@ -7,13 +7,13 @@ from legbench.drives.master.link_parts import LinkParts
 from legbench.drives.master.link_state import LinkState
 from legbench.drives.master.parking import park
 from legbench.drives.master.sdo_stop import leave_operational
-from legbench.drives.master.stop import StopLadder
+from legbench.drives.master.stop import StopSequence
 from legbench.errors import PlantFault
 from legbench.interrupts import Shield, shielded
 
 
 @final
-class Ending:
+class LinkEnd:
     """End of a link, however it comes about; nothing of it raises an error of its own."""
 
     def __init__(self, parts: LinkParts) -> None:
@@ -37,7 +37,7 @@ class Ending:
             if parts.read_only or (not status.leads and self._led_by_another(shield)):
                 status.state = LinkState.STOPPED
             else:
-                status.note(StopLadder(parts.cycle, shield.hold, parts.config.cycles_in).run())
+                status.note(StopSequence(parts.cycle, shield.hold, parts.config.cycles_in).run())
 
     def close(self) -> None:
         """Stop, park the drives, release the channel, as `Link.close` describes it."""
@@ -89,7 +89,7 @@ class StopOnError:
 
     __slots__ = ("_ending",)
 
-    def __init__(self, ending: Ending) -> None:
+    def __init__(self, ending: LinkEnd) -> None:
         """Prepare to stop by this end of a link."""
         self._ending = ending
 

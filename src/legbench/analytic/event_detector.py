@@ -18,7 +18,7 @@ from legbench.analytic.equations import (
     sweep_rate,
 )
 from legbench.analytic.model import LegModel
-from legbench.analytic.places import Event, Kind, Watched
+from legbench.analytic.parameters import Event, Kind, Watched
 from legbench.analytic.state import Regime
 from legbench.analytic.watch import NUDGE, OFF, Watch
 from legbench.design.statics import GRAVITY
@@ -61,7 +61,7 @@ SILENT = Levels()
 
 
 @final
-class Lookout:
+class EventDetector:
     """The events that one course watches.
 
     Attributes:
@@ -87,7 +87,7 @@ class Lookout:
         course, self._watch = self._course, watch
         watch.restore()
         watch.lay_bounds(FELL, FELL_BACK, -self.lean, self.lean, NEVER)
-        course.bumpers.lay(watch)
+        course.stop_switches.lay(watch)
         self.lay(self.levels)
 
     def lay(self, levels: Levels) -> None:
@@ -112,8 +112,8 @@ class Lookout:
         due = self._near()
         if self.levels.turns:
             self._guard_turn()
-        if course.bumpers.touched:
-            course.bumpers.guard(
+        if course.stop_switches.touched:
+            course.stop_switches.guard(
                 watch, course.terms, course.plain_motor, course.plain_q, course.plain_v
             )
         if self._free:
@@ -196,7 +196,7 @@ class Lookout:
         course, plain = self._course, self._plain
         q, v = course.plain_q, course.plain_v
         torque = plain.torque(course.plain_motor, q, v)
-        a = course.bumpers.released(plain.falling, torque, q, v)
+        a = course.stop_switches.released(plain.falling, torque, q, v)
         return free_foot_acceleration(plain.ops, plain.floating, q, v, a)[1] / GRAVITY
 
     def _accelerations(self) -> Pair:
@@ -204,8 +204,8 @@ class Lookout:
         course, plain = self._course, self._plain
         q, v = course.plain_q, course.plain_v
         torque = plain.torque(course.plain_motor, q, v)
-        if course.bumpers.touched:
-            return course.bumpers.turns(plain.ops, course.terms, torque, q, v)[1]
+        if course.stop_switches.touched:
+            return course.stop_switches.turns(plain.ops, course.terms, torque, q, v)[1]
         return pair_acceleration(plain.ops, course.terms, q, v, torque)
 
     def _guard_turn(self) -> None:

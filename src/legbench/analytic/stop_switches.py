@@ -11,7 +11,7 @@ from typing import final
 
 from legbench.analytic.equations import SCALAR, Ops, Pair, Term, pair_acceleration, pair_share
 from legbench.analytic.model import LegModel
-from legbench.analytic.places import FREE_PUSHES, PUSHES, Event
+from legbench.analytic.parameters import FREE_PUSHES, PUSHES, Event
 from legbench.analytic.stops import TIME_CONSTANT, Stop
 from legbench.analytic.terms import PairTerms
 from legbench.analytic.watch import OFF, Watch
@@ -23,7 +23,7 @@ FIRST = int(Event.KNEE_LOW)
 
 
 @final
-class Bumpers:
+class StopSwitches:
     """State of the joint stops of one leg, at the lower and upper ends of knee and hip.
 
     A leg without stops is never touched.

@@ -20,7 +20,7 @@ LISTEN_NS = 100_000_000
 
 
 @final
-class Opening:
+class LinkOpening:
     """Opening of a link: its work before process data begins and before anything moves."""
 
     def __init__(self, parts: LinkParts) -> None:
@@ -89,7 +89,7 @@ class Opening:
         listening = parts.cycle.hears_sync(port.timebase.now_ns() + LISTEN_NS)
         parts.status.listening = parts.start_up.listening = listening
         if listening:
-            parts.bring_up.lookout.rest()
+            parts.bring_up.detector.disarm()
         else:
             parts.channel.take()
             parts.bring_up.listen()
@@ -99,5 +99,5 @@ class Opening:
         if listening:
             return
         refuse_led(parts.bring_up, parts.cycle, parts.config)
-        parts.supervisor.alone()
+        parts.supervisor.check_no_other_master()
         port.may_send = may_pace(parts.config.master_id)
