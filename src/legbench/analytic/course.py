@@ -24,12 +24,7 @@ from legbench.analytic.compiled import (
 )
 from legbench.analytic.contact import MIN_PHASE
 from legbench.analytic.dual import DUAL, floats, without_gradients
-from legbench.analytic.equations import (
-    Pair,
-    sweep,
-    sweep_rate,
-    touchdown_rates,
-)
+from legbench.analytic.equations import Pair, sweep, sweep_rate, touchdown_rates
 from legbench.analytic.event_detector import (
     CONTACT,
     KINDS,
