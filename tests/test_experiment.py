@@ -89,7 +89,7 @@ def test_the_manifest_tells_what_ran(tmp_path: Path, prototype: LegDesign) -> No
     assert tables["conventions"] == {
         "modal": "orthonormal",
         "setpoint": "link",
-        "rating_reference": "motor",
+        "rating_reference": "setup",
     }
     assert {"plant", "setup", "linkage", "ground", "numerics", "seed"} <= tables.keys()
 
