@@ -65,10 +65,10 @@ class Imperfections:
             for number in _numbers(value):
                 if not math.isfinite(number):
                     raise ConfigError(f"{entry.name} is {value}; it must be finite")
-        for name, least in _LEAST.items():
+        for name, (least, unit) in _LEAST.items():
             value = getattr(self, name)
             if value is not None and min(_numbers(value)) < least:
-                raise ConfigError(f"{name} is {value}; it must be {least:g} or more")
+                raise ConfigError(f"{name} is {value}{unit}; it must be {least:g} or more")
         for name in ("stiffness_error", "trunk_mass_error", "mass_error", "inertia_error"):
             value = getattr(self, name)
             if value is not None and min(_numbers(value)) <= -1.0:
@@ -144,15 +144,15 @@ _BUILT: Final = (
     "inertia_error",
 )
 _LEAST: Final = {
-    "damping_error": -1.0,
-    "coulomb_friction": 0.0,
-    "backlash": 0.0,
-    "guide_damping": 0.0,
-    "link_noise": 0.0,
-    "motor_noise": 0.0,
-    "motor_delay_cycles": 0,
+    "damping_error": (-1.0, ""),
+    "coulomb_friction": (0.0, " N m"),
+    "backlash": (0.0, " rad"),
+    "guide_damping": (0.0, " N s/m"),
+    "link_noise": (0.0, " rad"),
+    "motor_noise": (0.0, " rad"),
+    "motor_delay_cycles": (0, " cycles"),
 }
-"""Smallest value of each option that has one."""
+"""Smallest value of each option that has one, and how its unit is written."""
 
 
 def _numbers(value: object) -> list[float]:

@@ -307,7 +307,7 @@ def test_an_imperfection_that_is_none_is_wrong_usage(
 ) -> None:
     done = called(capfd, "run", str(file), "--out", str(tmp_path), "--backlash", "-1", "0")
     assert (done.status, done.out) == (2, "")
-    assert done.err == "legbench: backlash is (-1.0, 0.0); it must be 0 or more\n"
+    assert done.err == "legbench: backlash is (-1.0, 0.0) rad; it must be 0 or more\n"
     done = called(capfd, "run", str(file), "--out", str(tmp_path), "--set", "imperfections.zero=1")
     assert done.status == 1
     assert "imperfections.zero: unknown key; did you mean 'link_zero'? known are" in done.err

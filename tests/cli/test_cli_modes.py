@@ -86,6 +86,17 @@ def test_a_leg_that_is_not_quite_matched_is_told_what_its_free_hops_need(
     assert all(abs(point["motor_z1"]) > 1e-3 for point in points)
 
 
+def test_a_hop_that_is_not_stable_has_no_basin_and_the_status_says_so(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """The optimal leg's own hop turns into one of twice the period."""
+    optimal = PROTOTYPE.with_name("optimal.toml")
+    assert main(["hop", str(optimal), "--basin", "3", "--out", str(tmp_path)]) == 1
+    assert "no basin: the periodic hop is not stable" in capfd.readouterr().err
+    assert (tmp_path / "hop.json").exists()
+    assert not (tmp_path / "basin.jsonl").exists()
+
+
 @pytest.mark.skipif(os.name == "nt", reason="signals of a terminal")
 def test_a_map_that_is_interrupted_ends_and_keeps_its_rows(tmp_path: Path) -> None:
     rows = tmp_path / "basin.jsonl"

@@ -326,7 +326,7 @@ def test_a_jump_needs_no_guide() -> None:
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"backlash": (-0.1, 0.0)}, r"backlash is \(-0.1, 0.0\); it must be 0 or more"),
+        ({"backlash": (-0.1, 0.0)}, r"backlash is \(-0.1, 0.0\) rad; it must be 0 or more"),
         ({"mass_error": (0.0, -1.0, 0.0)}, "more than -1 leaves something of it"),
         ({"link_zero": (float("nan"), 0.0)}, "it must be finite"),
         ({"motor_slew_rate": (0.0, 1.0)}, "rad/s; it must be positive"),

@@ -105,7 +105,8 @@ def main(arguments: list[str]) -> int:
         print("\n".join(lines))
     if flags.out is not None:
         _save(flags.out, content)
-    return 0
+    # Who asks for a map and gets none is told so by the status, too.
+    return int(flags.basin > 0 and "basin" not in content)
 
 
 def _check(flags: HopArguments) -> None:
@@ -176,7 +177,8 @@ def _driven(flags: HopArguments, design: LegDesign) -> tuple[dict[str, Any], lis
     if flags.basin and not chosen.stable:
         note(
             f"no basin: the periodic hop is not stable, its largest multiplier is "
-            f"{abs(chosen.multipliers[0]):.4g}; no start stays there"
+            f"{abs(chosen.multipliers[0]):.4g}; no start stays there; --family finds settings at "
+            "which it is"
         )
     elif flags.basin and flags.out is not None:
         share = _share(_basin(flags, design, chosen, flags.out))

@@ -9,7 +9,7 @@ from typing import final
 
 from legbench.drives.errors import DriveError, SdoAbortError
 from legbench.drives.master.bring_up import BringUp
-from legbench.drives.master.preparation import is_homed
+from legbench.drives.master.preparation import is_homed, take_power
 from legbench.drives.master.sdo_port import SdoPort
 from legbench.drives.master.sdo_stop import SdoStop, leave_operational
 from legbench.drives.master.session import Session
@@ -92,10 +92,7 @@ def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20
     check_master_watch(session.config, speed=FASTEST, commands=False)
     session.hold()
     up = session.bring_up()
-    up.listen()
-    up.identify()
-    up.unpower()
-    up.poll_frames()
+    take_power(up)
     up.pre_operational()
     check_taken(session.config, {node.name: up.configure(node)}, speed=FASTEST, commands=False)
     sdo = up.sdo(node)

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from legbench.drives.master.bring_up import BringUp
+from legbench.drives.master.preparation import take_power
 from legbench.drives.master.session import Session
 from legbench.drives.protocol.cia402 import (
     Controlword,
@@ -55,10 +56,7 @@ def reset(session: Session, nodes: Sequence[NodeConfig]) -> list[FaultReset]:
     """
     session.hold()
     up = session.bring_up()
-    up.listen()
-    up.identify()
-    up.unpower()
-    up.poll_frames()
+    take_power(up)
     return [_reset(session, up, node) for node in nodes]
 
 

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from legbench.modes.continuation import AGAIN, LOST, MANY, Solution, Stride, trace
+from legbench.modes.continuation import LOST, MANY, Solution
 from legbench.modes.family import Family, Passing
 from legbench.modes.monodromy import energy_slope
-from legbench.modes.periodic import CLOSED, PeriodicOrbit, Shooting
+from legbench.modes.periodic import PeriodicOrbit, Shooting, orbits_along
 from legbench.signals import Floats
 
 ASIDE = (0.02, 0.04, 0.01, 0.08)
@@ -95,28 +95,10 @@ def _followed(
     side: int,
     most: int,
 ) -> Branch:
-    orbits = [shooting.orbit(first.unknown)]
-    halted = ""
-
-    def visit(found: Solution) -> str | None:
-        nonlocal halted
-        orbit = shooting.orbit(found.unknown)
-        if orbit.outside:
-            halted = f"{orbit.outside} beyond {orbits[-1].energy:.4g} J"
-            return AGAIN
-        orbits.append(orbit)
-        shooting.refer(orbit.start)
-        return None
-
-    begin = Solution(
-        unknown=first.unknown,
-        slope=first.slope,
-        tangent=first.tangent if first.tangent @ along > 0.0 else -first.tangent,
-    )
-    ended = trace(shooting.equations, begin, Stride(first=0.03, most=most), CLOSED, visit)
+    orbits, ended = orbits_along(shooting, first.towards(along), most)
     return Branch(
         passing=passing,
         side=side,
         orbits=tuple(orbits),
-        ended={AGAIN: halted, LOST: "no orbit continues it", MANY: f"{most} orbits"}[ended],
+        ended={LOST: "no orbit continues it", MANY: f"{most} orbits"}.get(ended, ended),
     )

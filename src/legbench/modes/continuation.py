@@ -6,7 +6,7 @@ unknown can be the parameter.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -31,6 +31,10 @@ class Solution:
     """Derivative of the equations there (n, n + 1)."""
     tangent: Floats
     """Unit vector along the curve (n + 1,)."""
+
+    def towards(self, along: Floats) -> "Solution":
+        """The same point with its tangent on the side of `along` (n + 1,)."""
+        return replace(self, tangent=tangent_of(self.slope, along))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,15 +84,22 @@ def tangent_of(slope: Floats, along: Floats) -> Floats:
     return tangent if tangent @ along >= 0.0 else -tangent
 
 
-AGAIN = "a shorter step"
-"""Answer of a visitor that refuses a solution but may accept one after a shorter step."""
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """Answer of a visitor that refuses a solution but may accept one after a shorter step."""
+
+    why: str
+    """Reason why the curve ends if no shorter step helps."""
+
+
 MANY = "as many as were asked for"
 """Reason of the end of a curve that has the largest number of solutions."""
 LOST = "no solution continues it"
 """Reason of the end of a curve beyond which Newton's method does not converge."""
-Visit = Callable[[Solution], str | None]
-"""Function that is called with every solution; it returns None to go on, `AGAIN`, or the reason why
-the curve ends with it."""
+Answer = str | Refused | None
+"""Answer to a solution: None to go on, a refusal, or the reason why the curve ends with it."""
+Visit = Callable[[Solution], Answer]
+"""Function that is called with every solution."""
 
 
 def trace(
@@ -96,16 +107,16 @@ def trace(
 ) -> str:
     """Follow a curve from its first solution on, which is not visited; return why it ended.
 
-    The reason is the visitor's, `MANY`, `LOST`, or `AGAIN` once steps are too short for another
-    solution.
+    The reason is the visitor's, also that of a refusal once steps are too short, or `MANY`, or
+    `LOST`.
     """
     last, step = first, stride.first
     for _ in range(stride.most - 1):
         found, said = _next(equations, last, step, tolerance, visit)
-        while said in (AGAIN, LOST):
+        while isinstance(said, Refused) or said == LOST:
             step *= 0.5
             if step < stride.shortest:
-                return said
+                return said.why if isinstance(said, Refused) else said
             found, said = _next(equations, last, step, tolerance, visit)
         if said is not None:
             return said
@@ -115,7 +126,7 @@ def trace(
 
 def _next(
     equations: Equations, last: Solution, step: float, tolerance: float, visit: Visit
-) -> tuple[Solution, str | None]:
+) -> tuple[Solution, Answer]:
     """Solution one step further, or the last one, and the visitor's answer to it."""
     row = last.tangent
     value = float(row @ last.unknown) + step

@@ -11,8 +11,8 @@ import numpy as np
 
 from legbench.errors import ConfigError
 from legbench.modes.carry import Carrier
-from legbench.modes.continuation import AGAIN, LOST, MANY, Solution, Stride, tangent_of, trace
-from legbench.modes.periodic import CLOSED, PeriodicOrbit, Shooting
+from legbench.modes.continuation import LOST, MANY
+from legbench.modes.periodic import PeriodicOrbit, Shooting, orbits_along
 from legbench.modes.scene import Scene
 from legbench.modes.seed import first_unknown
 from legbench.signals import Floats
@@ -58,25 +58,9 @@ def follow_damped(
             f"the {name} mode of the damped leg is not found: damping {damping} N m s/rad is too "
             "much for an oscillation, or too unequal for a mode"
         )
-    orbits = [shooting.orbit(solved.unknown)]
-    halted = ""
-
-    def visit(found: Solution) -> str | None:
-        nonlocal halted
-        orbit = shooting.orbit(found.unknown)
-        if orbit.outside:
-            halted = f"{orbit.outside} beyond {orbits[-1].energy:.4g} J"
-            return AGAIN
-        orbits.append(orbit)
-        shooting.refer(orbit.start)
-        return "the energy asked for" if orbit.energy >= energy else None
-
-    first = Solution(
-        unknown=solved.unknown, slope=solved.slope, tangent=tangent_of(solved.slope, along)
-    )
-    ended = trace(shooting.equations, first, Stride(first=0.03, most=most), CLOSED, visit)
+    orbits, ended = orbits_along(shooting, solved.towards(along), most, energy)
     lost = f"the family ends at {orbits[-1].energy:.4g} J: no orbit continues it"
-    said = {AGAIN: halted, LOST: lost, MANY: f"{most} orbits"}
+    said = {LOST: lost, MANY: f"{most} orbits"}
     return DampedFamily(
         name=name, damping=damping, orbits=tuple(orbits), ended=said.get(ended, ended)
     )

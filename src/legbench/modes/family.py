@@ -14,7 +14,16 @@ import numpy as np
 
 from legbench.errors import ConfigError
 from legbench.modes.brake import RESIDUAL, BrakeOrbit, BrakeShooting
-from legbench.modes.continuation import AGAIN, LOST, MANY, Solution, Stride, tangent_of, trace
+from legbench.modes.continuation import (
+    LOST,
+    MANY,
+    Answer,
+    Refused,
+    Solution,
+    Stride,
+    tangent_of,
+    trace,
+)
 from legbench.modes.linear import LinearMode, linear_modes
 from legbench.modes.roots import bracketed
 from legbench.modes.scene import Scene
@@ -145,14 +154,12 @@ def _grow(
 
     With an energy of zero the family is followed down to the amplitude `FIRST`.
     """
-    halted = ""
 
-    def visit(found: Solution) -> str | None:
-        nonlocal halted
+    def visit(found: Solution) -> Answer:
         orbit = shooting.orbit(found.unknown)
         if orbit.outside:
-            halted = f"{orbit.outside} beyond {max(one.energy for one in orbits):.4g} J"
-            return AGAIN
+            largest = max(one.energy for one in orbits)
+            return Refused(f"{orbit.outside} beyond {largest:.4g} J")
         if energy == 0.0:
             rest = np.asarray(shooting.scene.rest)
             if np.linalg.norm(orbit.start - rest) < FIRST:
@@ -165,8 +172,6 @@ def _grow(
     slope = shooting.equations(unknown)[1]
     first = Solution(unknown=unknown, slope=slope, tangent=tangent_of(slope, along))
     ended = trace(shooting.equations, first, stride, RESIDUAL, visit)
-    if ended == AGAIN:
-        return halted
     if ended == MANY:
         return f"{stride.most} orbits"
     if ended == LOST:

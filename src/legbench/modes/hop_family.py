@@ -12,13 +12,11 @@ from legbench.control import JumpConfig
 from legbench.design import LegDesign
 from legbench.errors import ConfigError, DesignError
 from legbench.modes.continuation import (
-    AGAIN,
     LOST,
     MANY,
     Solution,
     Stride,
     correct,
-    tangent_of,
     trace,
 )
 from legbench.modes.cycles import Cycle, described, stacked
@@ -159,14 +157,11 @@ def follow_hop(
     first = _first(equations, start, value)
     walk = _Walk(equations, first, value, to, progress)
     along = np.sign(to - value) * np.eye(len(first.unknown))[-1]
-    begin = Solution(
-        unknown=first.unknown, slope=first.slope, tangent=tangent_of(first.slope, along)
-    )
     stride = Stride(first=STEP, longest=STEP * 3.0, shortest=1e-3, most=MOST)
-    ended = trace(equations, begin, stride, CLOSED, walk.visit)
+    ended = trace(equations, first.towards(along), stride, CLOSED, walk.visit)
     if ended == MANY:
         ended = f"{MOST} hops"
-    elif ended in (LOST, AGAIN):
+    elif ended == LOST:
         ended = f"no hop continues it at {setting} = {walk.members[-1].value:.4g}"
         ended += f": {equations.why}" if equations.why else ""
     if progress is not None:

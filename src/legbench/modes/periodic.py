@@ -8,6 +8,7 @@ al. 2003). In a damped leg `-extra` is the drive, proportional to speed, that ke
 going for ever: its period and decay follow by energy (the extended periodic motion of Krack 2015).
 """
 
+import math
 from dataclasses import dataclass
 from typing import final
 
@@ -16,7 +17,7 @@ import numpy as np
 from legbench.analytic.parameters import DAMPING, MOTOR
 from legbench.modes.brake import beyond_limits
 from legbench.modes.carry import Carrier
-from legbench.modes.continuation import Solution, correct
+from legbench.modes.continuation import Answer, Refused, Solution, Stride, correct, trace
 from legbench.modes.monodromy import Monodromy, monodromy
 from legbench.signals import Floats
 
@@ -167,3 +168,27 @@ class Shooting:
             least = min(least, float(self._kinetic(state[np.newaxis])[0]))
             step *= 0.2
         return float(np.sqrt(max(least, 0.0) / largest))
+
+
+def orbits_along(
+    shooting: Shooting, first: Solution, most: int, energy: float = math.inf
+) -> tuple[list[PeriodicOrbit], str]:
+    """Follow closed orbits from a first one on; return them and why there are no more.
+
+    Args:
+        shooting: equations of the orbits; they refer to the last orbit afterwards.
+        first: where the curve begins, with its tangent ahead.
+        most: largest number of orbits, the first included.
+        energy: energy above rest with which the curve ends [J].
+    """
+    orbits = [shooting.orbit(first.unknown)]
+
+    def visit(found: Solution) -> Answer:
+        orbit = shooting.orbit(found.unknown)
+        if orbit.outside:
+            return Refused(f"{orbit.outside} beyond {orbits[-1].energy:.4g} J")
+        orbits.append(orbit)
+        shooting.refer(orbit.start)
+        return "the energy asked for" if orbit.energy >= energy else None
+
+    return orbits, trace(shooting.equations, first, Stride(first=0.03, most=most), CLOSED, visit)

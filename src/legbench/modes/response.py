@@ -15,7 +15,16 @@ from legbench.design.statics import motor_holding
 from legbench.errors import ConfigError
 from legbench.modes.brake import beyond_limits
 from legbench.modes.carry import Carrier
-from legbench.modes.continuation import AGAIN, LOST, MANY, Solution, Stride, correct, trace
+from legbench.modes.continuation import (
+    LOST,
+    MANY,
+    Answer,
+    Refused,
+    Solution,
+    Stride,
+    correct,
+    trace,
+)
 from legbench.modes.linear import RADIAL, linear_modes
 from legbench.modes.scene import SUPPORTED, Scene
 from legbench.signals import Floats
@@ -181,22 +190,20 @@ def respond(
     if solved is None:
         raise ConfigError(f"no response to motors of {dz2:g} rad is found; take a smaller dz2")
     found: list[Response] = []
-    halted = ""
 
-    def visit(one: Solution) -> str | None:
-        nonlocal halted
+    def visit(one: Solution) -> Answer:
         period = float(one.unknown[4]) * switched.unit
         half = 0.5 * period
         response = switched.response(one.unknown[:4] * switched.size, (half, half), dz2)
         if response.outside:
-            halted = f"{response.outside} at {response.freq:.4g} Hz"
-            return AGAIN
+            return Refused(f"{response.outside} at {response.freq:.4g} Hz")
         found.append(response)
         return "the slowest motors asked for" if one.unknown[4] >= 1.0 / slowest else None
 
-    if visit(solved) == AGAIN:
-        raise ConfigError(f"motors of {dz2:g} rad take the leg too far: {halted}")
+    answer = visit(solved)
+    if isinstance(answer, Refused):
+        raise ConfigError(f"motors of {dz2:g} rad take the leg too far: {answer.why}")
     ended = trace(equations, solved, Stride(first=0.01, longest=0.02, most=most), CLOSED, visit)
     lost = f"no response continues it at {found[-1].freq:.4g} Hz"
-    said = {AGAIN: halted, LOST: lost, MANY: f"{most} responses"}
+    said = {LOST: lost, MANY: f"{most} responses"}
     return ResponseCurve(dz2=dz2, responses=tuple(found), ended=said.get(ended, ended))

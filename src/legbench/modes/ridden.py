@@ -12,13 +12,13 @@ import numpy as np
 
 from legbench.errors import ConfigError
 from legbench.modes.continuation import (
-    AGAIN,
     LOST,
     MANY,
+    Answer,
+    Refused,
     Solution,
     Stride,
     correct,
-    tangent_of,
     trace,
 )
 from legbench.modes.linear import RADIAL
@@ -184,24 +184,20 @@ def ride(
     if solved is None:
         raise ConfigError(f"bang-bang with dz2 = {dz2:g} rad does not settle on a cycle")
     found: list[Response] = []
-    halted = ""
 
-    def visit(one: Solution) -> str | None:
-        nonlocal halted
+    def visit(one: Solution) -> Answer:
         cycle = law.cycle(one.unknown)
         if cycle.outside:
-            halted = f"{cycle.outside} beyond dz2 = {found[-1].dz2 if found else dz2:.4g} rad"
-            return AGAIN
+            last = found[-1].dz2 if found else dz2
+            return Refused(f"{cycle.outside} beyond dz2 = {last:.4g} rad")
         found.append(cycle)
         return "the largest dz2 asked for" if cycle.dz2 >= largest else None
 
-    if visit(solved) == AGAIN:
-        raise ConfigError(f"bang-bang with dz2 = {dz2:g} rad takes the leg too far: {halted}")
-    first = Solution(
-        unknown=solved.unknown, slope=solved.slope, tangent=tangent_of(solved.slope, row)
-    )
+    answer = visit(solved)
+    if isinstance(answer, Refused):
+        raise ConfigError(f"bang-bang with dz2 = {dz2:g} rad takes the leg too far: {answer.why}")
     stride = Stride(first=0.02, longest=0.05, most=most)
-    ended = trace(law.equations, first, stride, CLOSED, visit)
+    ended = trace(law.equations, solved.towards(row), stride, CLOSED, visit)
     lost = f"no cycle continues it at dz2 = {found[-1].dz2:.4g} rad"
-    said = {AGAIN: halted, LOST: lost, MANY: f"{most} cycles"}
+    said = {LOST: lost, MANY: f"{most} cycles"}
     return RiddenCurve(threshold=threshold, cycles=tuple(found), ended=said.get(ended, ended))

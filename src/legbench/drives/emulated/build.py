@@ -68,9 +68,7 @@ def emulate(
         ConfigError: not one behaviour a drive, or a data sheet that cannot be read.
         MissingExtraError: a drive has a data sheet, and canopen is not installed.
     """
-    chosen = [Behaviour() for _ in bus.nodes] if behaviours is None else list(behaviours)
-    if len(chosen) != len(bus.nodes):
-        raise ConfigError(f"{len(chosen)} behaviours for {len(bus.nodes)} drives")
+    chosen = _checked(bus, behaviours)
     drives = [
         EmulatedDrive(node, how, tuple(configuration(bus, node)) if configured else (), objects)
         for node, how, objects in zip(bus.nodes, chosen, _dictionaries(bus), strict=True)
@@ -84,6 +82,14 @@ def emulate(
         faults=faults,
         keep_log=keep_log,
     )
+
+
+def _checked(bus: BusConfig, behaviours: Sequence[Behaviour] | None) -> list[Behaviour]:
+    """Return one behaviour a drive, ordinary ones by default; raises ConfigError."""
+    chosen = [Behaviour() for _ in bus.nodes] if behaviours is None else list(behaviours)
+    if len(chosen) != len(bus.nodes):
+        raise ConfigError(f"{len(chosen)} behaviours for {len(bus.nodes)} drives")
+    return chosen
 
 
 def _dictionaries(bus: BusConfig) -> list[Dictionary]:
@@ -104,15 +110,26 @@ def emulate_channels(
 ) -> tuple[Network, ...]:
     """Build a network for every channel of a bus file; arguments as for `emulate`.
 
-    All drives move one body, and their networks pass time together (`LockstepChannels`). A fault
-    is injected into every channel that has its drive or its frame.
+    A bus of one channel is that of `emulate`. On several, all drives move one body, and their
+    networks pass time together (`LockstepChannels`). A fault is injected into every channel that
+    has its drive or its frame.
 
     Raises:
         ConfigError, MissingExtraError: as `emulate`.
     """
-    chosen = [Behaviour() for _ in bus.nodes] if behaviours is None else list(behaviours)
-    if len(chosen) != len(bus.nodes):
-        raise ConfigError(f"{len(chosen)} behaviours for {len(bus.nodes)} drives")
+    chosen = _checked(bus, behaviours)
+    if len(bus.channels) == 1:
+        return (
+            emulate(
+                bus,
+                chosen,
+                body=body,
+                body_period_ns=body_period_ns,
+                faults=faults,
+                keep_log=keep_log,
+                configured=configured,
+            ),
+        )
     groups = [bus.nodes_on(channel) for channel in bus.channels]
     order = [bus.nodes.index(node) for nodes in groups for node in nodes]
 

@@ -9,7 +9,7 @@ from legbench.drives.emulated.bus import IDLE_NS, LockstepBus
 from legbench.drives.emulated.network import Network
 from legbench.drives.emulated.shared_body import LockstepChannels
 from legbench.drives.setup.config import BusConfig
-from legbench.drives.transport.split_bus import Routes
+from legbench.drives.transport.split_bus import Routes, worst_state
 from legbench.drives.transport.virtual_bus import VirtualBus
 
 
@@ -47,11 +47,7 @@ class ChannelsBus(VirtualBus):
     @property
     def state(self) -> can.BusState:
         """The worst state of all channels."""
-        states = [part.state for part in self._parts]
-        for state in (can.BusState.ERROR, can.BusState.PASSIVE):
-            if state in states:
-                return state
-        return can.BusState.ACTIVE
+        return worst_state(self._parts)
 
     @state.setter
     def state(self, new_state: can.BusState) -> None:

@@ -30,11 +30,7 @@ def prepare_to_move(
             is not protected by what it took.
         PlantFault: somebody else leads the drives.
     """
-    bring_up.listen()
-    bring_up.identify()
-    check_homed(bring_up, config.nodes)
-    bring_up.unpower()
-    bring_up.poll_frames()
+    take_power(bring_up, config.nodes)
     bring_up.pre_operational()
     outcomes = {node.name: bring_up.configure(node) for node in config.nodes}
     check_taken(config, outcomes, speed=speed)
@@ -42,6 +38,25 @@ def prepare_to_move(
         bring_up.check_soft_limits(node)
         bring_up.preload(node)
     return outcomes
+
+
+def take_power(bring_up: BringUp, homed: Sequence[NodeConfig] = ()) -> None:
+    """Make sure that nobody else leads the drives and that they are the right ones; then stop them.
+
+    Args:
+        bring_up: access to the drives.
+        homed: drives that must be homed, if the bus file says how they show it.
+
+    Raises:
+        BusError: nobody can be talked to.
+        DriveError: a drive is missing, is another one, is not homed, or keeps its power.
+        PlantFault: somebody else leads the drives.
+    """
+    bring_up.listen()
+    bring_up.identify()
+    check_homed(bring_up, homed)
+    bring_up.unpower()
+    bring_up.poll_frames()
 
 
 def is_homed(bring_up: BringUp, node: NodeConfig) -> bool | None:

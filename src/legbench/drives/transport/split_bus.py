@@ -42,6 +42,15 @@ class Routes:
         return self._all
 
 
+def worst_state(parts: Sequence[can.BusABC]) -> can.BusState:
+    """The state of the worst of several interfaces."""
+    states = [part.state for part in parts]
+    for state in (can.BusState.ERROR, can.BusState.PASSIVE):
+        if state in states:
+            return state
+    return can.BusState.ACTIVE
+
+
 @final
 class SplitBus(can.BusABC):
     """Buses of several channels as one interface of python-can.
@@ -93,11 +102,7 @@ class SplitBus(can.BusABC):
     @property
     def state(self) -> can.BusState:
         """The worst state of all channels."""
-        states = [part.state for part in self.parts]
-        for state in (can.BusState.ERROR, can.BusState.PASSIVE):
-            if state in states:
-                return state
-        return can.BusState.ACTIVE
+        return worst_state(self.parts)
 
     @state.setter
     def state(self, new_state: can.BusState) -> None:

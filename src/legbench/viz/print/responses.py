@@ -101,5 +101,7 @@ def _draw_damping(axes: Axes, damped: Sequence[DampedFamily]) -> None:
         ylabel="damping ratio [%]",
         title="damped modes",
     )
-    axes.set_ylim(bottom=0.0)
+    # Room above, for a ratio that hardly changes.
+    largest = max(orbit.damping_ratio for family in damped for orbit in family.orbits)
+    axes.set_ylim(0.0, 120.0 * largest or 1.0)
     axes.legend(frameon=False)
