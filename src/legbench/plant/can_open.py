@@ -167,10 +167,11 @@ def open_session(
         bus, lock = open_channels(config.at(choice.bitrate), adapters, leads=leads)
         return Session(bus, config.at(choice.bitrate), lock=lock)
     networks = _emulated(config, choice, leg)
-    if len(networks) > 1:
+    first, *others = networks
+    if others:
         bus = ChannelsBus(networks, config, choice.bitrate)
     else:
-        bus = LockstepBus("leg", network=networks[0], bitrate=choice.bitrate)
+        bus = LockstepBus("leg", network=first, bitrate=choice.bitrate)
     return Session(bus, config.at(choice.bitrate))
 
 
