@@ -303,18 +303,18 @@ def test_a_signal_stops_all_drives_before_the_command_ends(
 ) -> None:
     made: list[Network] = []
 
-    def the_bench(config: BusConfig, _idle: object, *, configured: bool) -> tuple[Network]:
+    def the_bench(config: BusConfig, _idle: object, *, configured: bool) -> Network:
         assert not configured
         stops = (-STOP, STOP)
         behaviours = [Behaviour(start_pos=start, hard_stop=stops) for start in (0.0, 0.9 * STOP)]
         made.append(emulate(config, behaviours, keep_log=True))
-        return (made[0],)
+        return made[0]
 
     def send_signal() -> None:
         """At every frame from now on: a second one must not end the stop."""
         signal.raise_signal(SENDERS[name])
 
-    monkeypatch.setattr(can_open, "emulate_channels", the_bench)
+    monkeypatch.setattr(can_open, "emulate", the_bench)
     disturb(monkeypatch, under_way, send_signal)
     before = {number: signal.getsignal(number) for number in SENDERS.values()}
     status = main(["drives", *action, *bench(tmp_path)])

@@ -1,11 +1,12 @@
 """Opening servo drives on a CAN bus as a plant, with what a run on them logs and tells."""
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any, final
 
 from legbench.clock import AbstractClock
 from legbench.drives.emulated.behaviour import Behaviour
-from legbench.drives.emulated.build import emulate_channels, on_bench
+from legbench.drives.emulated.build import emulate, emulate_channels, on_bench
 from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.emulated.channels_bus import ChannelsBus
 from legbench.drives.emulated.network import Network
@@ -167,32 +168,46 @@ def open_session(
         bus, lock = open_channels(config.at(choice.bitrate), adapters, leads=leads)
         return Session(bus, config.at(choice.bitrate), lock=lock)
     networks = _emulated(config, choice, leg)
-    first, *others = networks
-    if others:
-        bus = ChannelsBus(networks, config, choice.bitrate)
+    if len(networks) > 1:
+        bus = ChannelsBus(tuple(networks), config, choice.bitrate)
     else:
-        bus = LockstepBus("leg", network=first, bitrate=choice.bitrate)
+        bus = LockstepBus("leg", network=networks[0], bitrate=choice.bitrate)
     return Session(bus, config.at(choice.bitrate))
 
 
-def _emulated(config: BusConfig, choice: CanChoice, leg: Leg | None) -> tuple[Network, ...]:
+def _emulated(config: BusConfig, choice: CanChoice, leg: Leg | None) -> Sequence[Network]:
     """The emulated leg; its drives run at the bitrate of the bus file, whatever is asked for.
 
     For those who only look its drives have kept their configuration: nobody may write it.
     """
+    several = len(config.channels) > 1
     if leg is None:
         starts = IDLE_POS if len(config.nodes) == len(IDLE_POS) else (0.0,) * len(config.nodes)
         idle = [on_bench(node, start) for node, start in zip(config.nodes, starts, strict=True)]
-        return emulate_channels(config, idle, configured=choice.read_only)
+        if several:
+            return emulate_channels(config, idle, configured=choice.read_only)
+        return [emulate(config, idle, configured=choice.read_only)]
     body = EmulatedLeg(leg.design, leg.options, leg.start, leg.imperfections, leg.seed)
-    return emulate_channels(
+    drives = [_behaviour(leg, body, place) for place in range(len(leg.start.motor_pos))]
+    faults, configured = choice.faults, choice.read_only
+    if several:
+        return emulate_channels(
+            config,
+            drives,
+            body=body,
+            body_period_ns=LEG_PERIOD_NS,
+            faults=faults,
+            configured=configured,
+        )
+    network = emulate(
         config,
-        [_behaviour(leg, body, place) for place in range(len(leg.start.motor_pos))],
+        drives,
         body=body,
         body_period_ns=LEG_PERIOD_NS,
-        faults=choice.faults,
-        configured=choice.read_only,
+        faults=faults,
+        configured=configured,
     )
+    return [network]
 
 
 def _behaviour(leg: Leg, body: EmulatedLeg, place: int) -> Behaviour:

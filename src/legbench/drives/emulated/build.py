@@ -110,26 +110,13 @@ def emulate_channels(
 ) -> tuple[Network, ...]:
     """Build a network for every channel of a bus file; arguments as for `emulate`.
 
-    A bus of one channel is that of `emulate`. On several, all drives move one body, and their
-    networks pass time together (`LockstepChannels`). A fault is injected into every channel that
-    has its drive or its frame.
+    All drives move one body, and their networks pass time together (`LockstepChannels`). A fault
+    is injected into every channel that has its drive or its frame.
 
     Raises:
         ConfigError, MissingExtraError: as `emulate`.
     """
     chosen = _checked(bus, behaviours)
-    if len(bus.channels) == 1:
-        return (
-            emulate(
-                bus,
-                chosen,
-                body=body,
-                body_period_ns=body_period_ns,
-                faults=faults,
-                keep_log=keep_log,
-                configured=configured,
-            ),
-        )
     groups = [bus.nodes_on(channel) for channel in bus.channels]
     order = [bus.nodes.index(node) for nodes in groups for node in nodes]
 
