@@ -104,7 +104,8 @@ def main(arguments: list[str]) -> int:
     else:
         print("\n".join(lines))
     if flags.out is not None:
-        _save(flags.out, content)
+        write_json(flags.out / "hop.json", content)
+        note(f"wrote {flags.out / 'hop.json'}")
     # Who asks for a map and gets none is told so by the status, too.
     return int(flags.basin > 0 and "basin" not in content)
 
@@ -294,8 +295,3 @@ def _basin(flags: HopArguments, design: LegDesign, cycle: Cycle, out: Path) -> I
 
 def _share(fates: Ints) -> dict[str, float]:
     return {fate.name.lower(): float(np.mean(fates == fate)) for fate in Fate if fate in fates}
-
-
-def _save(out: Path, content: dict[str, Any]) -> None:
-    write_json(out / "hop.json", content)
-    note(f"wrote {out / 'hop.json'}")

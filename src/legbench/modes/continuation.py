@@ -33,7 +33,7 @@ class Solution:
     """Unit vector along the curve (n + 1,)."""
 
     def towards(self, along: Floats) -> "Solution":
-        """The same point with its tangent on the side of `along` (n + 1,)."""
+        """This solution with its tangent on the side of `along` (n + 1,)."""
         return replace(self, tangent=tangent_of(self.slope, along))
 
 
