@@ -130,8 +130,8 @@ def _read(kind: type[Read], recording: Recording, edits: Edits) -> Read:
     for key, value in edits.items():
         if key.partition(".")[0] in names:
             tables = overlaid(tables, key, value, recording.path)
-        elif key.partition(".")[0] not in whole:
-            raise ConfigError(f"--set {key}: a recorded run has {', '.join(sorted(whole))}")
+        else:
+            raise ConfigError(f"--set {key}: this replay has {', '.join(sorted(names))}")
     for what in names & REGISTRIES.keys():
         tables = _with_own_copy(tables, recording, what)
         _check_known(tables, recording, what)
