@@ -17,7 +17,7 @@ class ReplayArguments:
     """Rate a recorded run again, from its file alone; show it, or let it happen again."""
 
     run: Annotated[Path, Positional]
-    """Run folder, which may be torn, or with --bus a log of raw frames: .log, .asc, .blf or .trc."""
+    """Run folder, which may be torn; with --bus a log of raw frames: .log, .asc, .blf or .trc."""
     against: UseAppendAction[tuple[Path, ...]] = ()
     """Another run to compare with and to draw over this one; may be repeated."""
     controller: bool = False
@@ -55,6 +55,15 @@ class ReplayArguments:
     .png, .svg or .pdf."""
     json: bool = False
     """Print one JSON object on stdout."""
+
+    def check_pictures(self) -> None:
+        """Refuse a part of a run, a speed or a loop where nothing is played; raises ConfigError."""
+        plays = self.view or self.serve or self.mujoco or self.rrd is not None
+        if not plays and self.playback != PlaybackArguments():
+            raise ConfigError(
+                "--from, --to, --speed and --loop say how a run is played; add --view, --serve, "
+                "--rrd FILE or --mujoco, or give them to `legbench render`"
+            )
 
     def check(self) -> None:
         """Refuse flags that mean nothing together; raises ConfigError."""

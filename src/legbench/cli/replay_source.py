@@ -41,6 +41,7 @@ def source_of(chosen: ReplayArguments) -> Recording:
     from legbench.replay.log_frames import is_log
 
     if not is_log(chosen.run):
+        chosen.check_pictures()
         if chosen.bus is not None:
             raise ConfigError(
                 f"--bus describes the drives of a log; {chosen.run} is no .log, .asc, .blf or .trc"
@@ -48,8 +49,8 @@ def source_of(chosen: ReplayArguments) -> Recording:
         return loaded(chosen.run)
     if chosen.bus is None:
         raise ConfigError(
-            f"{chosen.run} is a log of raw frames; add --bus FILE, such as hardware/leg.toml, to say "
-            "which drives are on that bus"
+            f"{chosen.run} is a log of raw frames; add --bus FILE, as hardware/leg.toml, which "
+            "says what drives are on that bus"
         )
     return _log(chosen, chosen.bus)
 
@@ -66,8 +67,9 @@ def _log(chosen: ReplayArguments, bus: Path) -> Recording:
         note(f"legbench: {recording.torn}; read as far as it goes")
     for line in decoded.notes:
         note(f"legbench: {line}")
+    playback = chosen.playback.playback
     # A log has no beginning of its own: what is to be looked at is also what is to be rated.
-    return cut(recording, chosen.playback.playback.rows(recording.time))
+    return cut(recording, playback.rows(recording.time)) if not playback.whole else recording
 
 
 def _leg_of(chosen: ReplayArguments) -> "tuple[LegDesign, Setup | None]":

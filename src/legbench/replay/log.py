@@ -90,13 +90,13 @@ def load_log(
 
 def _manifest(config: BusConfig, source: str, design: LegDesign, setup: Setup) -> dict[str, Any]:
     """Manifest of a log, as far as it and the bus file tell."""
-    linkage = Linkage()
+    linkage, boom = Linkage(), setup.boom_radius
     rest = PhaseInfo(code=REST, name="rest", role=Role.REST, doc="a log tells no phases")
     told = ControllerDescription(phases=(rest,), signals=signals_of(config))
     return {
         "experiment": {
             "design": design_to_mapping(design),
-            "setup": {"kind": setup.kind.value, "boom_radius": setup.boom_radius},
+            "setup": {"kind": setup.kind.value} | ({} if boom is None else {"boom_radius": boom}),
             "linkage": {"kind": linkage.kind.value, "crank_length": linkage.crank_length},
             "plant": {"kind": "can", "settings": {}},
         },

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from legbench.replay.comparison import Replayed
+from legbench.signals import SIGNALS
 from legbench.viz import style
 from legbench.viz.print._matplotlib import Axes, Figure, FigureCanvasAgg, styled
 
@@ -32,23 +33,24 @@ def replay_figure(signals: Replayed, title: str) -> Figure:
         for (left, right), (name, columns) in zip(panels.tolist(), groups.items(), strict=True):
             unit = signals.units[columns[0]]
             left.set_ylabel(f"{name} [{unit}]")
-            right.set_ylabel(f"replayed - recorded [{unit}]")
+            right.set_ylabel(f"[{unit}]")
             _draw(left, right, signals, columns)
         for panel in panels[-1]:
             panel.set_xlabel("$t$ [s]")
         panels[0, 0].set_title("recorded in colour, replayed dashed", loc="left")
-        panels[0, 1].set_title("difference", loc="left")
+        panels[0, 1].set_title("replayed minus recorded", loc="left")
         figure.suptitle(title, fontsize=10.5)
     return figure
 
 
 def _groups(signals: Replayed) -> dict[str, list[str]]:
     """Columns that are drawn by the name of their signal."""
+    known = {column: signal.name for signal in SIGNALS for column in signal.columns}
     groups: dict[str, list[str]] = {}
     for column in signals.recorded:
-        name, _, component = column.rpartition("_")
-        known = name and len(component) == 1
-        groups.setdefault(name if known else column, []).append(column)
+        own, _, component = column.rpartition("_")
+        name = known.get(column, own if len(component) == 1 and own else column)
+        groups.setdefault(name, []).append(column)
     return {name: columns for name, columns in groups.items() if name not in LEFT_OUT}
 
 
