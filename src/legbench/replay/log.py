@@ -68,17 +68,17 @@ def load_log(
     channels = channels_of(head, config, source)
     clocks = {message.channel for message in head if message.arbitration_id == SYNC_ID}
     # Several channels have a SYNC each, at the same time: one of them counts the cycles.
-    leading = min(channels & clocks, key=str, default=None)
+    leading = min(clocks & (channels or clocks), key=str, default=None)
     nodes, mappings = NodesSeen(config), MappingsSeen(config)
     run = MemoryRun(_manifest(config, source, design, setup or Setup()), name=path.stem)
     rows = RowMaker(config, design.stiffness, run)
     for message in messages:
-        if message.channel not in channels:
+        if channels is not None and message.channel not in channels:
             continue
         cob_id = message.arbitration_id
         nodes.take(cob_id)
         mappings.take(cob_id, bytes(message.data))
-        if cob_id != SYNC_ID or leading is None or message.channel == leading:
+        if cob_id != SYNC_ID or leading in (None, message.channel):
             rows.take(message)
     rows.finish()
     unseen = mappings.check(config, source)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Final, final
 
 import can
+from can.io.blf import BLFParseError
 
 from legbench.errors import RecordingError
 from legbench.writing import reason
@@ -15,6 +16,8 @@ from legbench.writing import reason
 SUFFIXES: Final = (".log", ".asc", ".blf", ".trc", ".csv")
 """Formats by the suffix of a file: candump's, Vector's text and binary, PEAK's, python-can's table;
 each may be packed, as `.log.gz`."""
+BLF_HEAD: Final = 144
+"""Length of the header of a .blf [bytes]."""
 HEAD: Final = 20_000
 """Number of frames by which the channel of a log is chosen: some seconds of a busy bus."""
 UNREADABLE: Final = (
@@ -27,6 +30,7 @@ UNREADABLE: Final = (
     struct.error,
     zlib.error,
     can.CanError,
+    BLFParseError,
     NotImplementedError,  # a part of a format that python-can does not read
     AssertionError,  # python-can's own check of a header
 )
@@ -68,6 +72,7 @@ class LogFrames:
                 f"{path} is no log of a bus by its name; known are {', '.join(SUFFIXES)}"
             )
         try:
+            _check_head(path)
             self._reader = can.LogReader(path)
         except UNREADABLE as error:
             raise RecordingError(f"{path} cannot be read as a log: {_told(error)}") from error
@@ -99,6 +104,20 @@ class LogFrames:
         if self._read == 0:
             raise RecordingError(f"{self._path} cannot be read as a log: {why}")
         self.tear = f"{self._path.name} cannot be read after {self._read} frames: {why}"
+
+
+def _check_head(path: Path) -> None:
+    """Refuse what does not begin as a .blf does; python-can would leave such a file open.
+
+    Raises:
+        ValueError: it does not.
+        OSError: it cannot be read.
+    """
+    if path.suffix.lower() == ".blf":
+        with path.open("rb") as file:
+            head = file.read(BLF_HEAD)
+        if len(head) < BLF_HEAD or not head.startswith(b"LOGG"):
+            raise ValueError("it does not begin with LOGG and a header")
 
 
 def with_head(frames: LogFrames) -> tuple[list[can.Message], Iterator[can.Message]]:

@@ -26,8 +26,10 @@ BASES: Final = frozenset(
 """Identifiers of the predefined connection set without the node."""
 
 
-def channels_of(head: Iterable[can.Message], config: BusConfig, source: str) -> frozenset[Channel]:
-    """Channels of a log on which the drives of a bus file talk.
+def channels_of(
+    head: Iterable[can.Message], config: BusConfig, source: str
+) -> frozenset[Channel] | None:
+    """Channels of a log on which the drives of a bus file talk; none if they are silent so far.
 
     Args:
         head: first frames of the log.
@@ -41,7 +43,7 @@ def channels_of(head: Iterable[can.Message], config: BusConfig, source: str) -> 
     talking = {message.channel for message in head if message.arbitration_id in answers}
     named = talking & {channel for channel in config.channels if channel is not None}
     if named or len(talking) < 2:
-        return frozenset(named or talking)
+        return frozenset(named or talking) or None
     told = ", ".join(sorted(map(str, talking)))
     raise ConfigError(
         f"the log has the drives' answers on channels {told}; {source} names "

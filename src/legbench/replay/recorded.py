@@ -11,6 +11,7 @@ from legbench.design import LegDesign
 from legbench.design.setup import Setup
 from legbench.errors import ConfigError
 from legbench.experiment.data import LARGEST_SEED, Conventions
+from legbench.experiment.format_1 import upgraded
 from legbench.experiment.overrides import overlaid
 from legbench.experiment.reading import REGISTRY, placed
 from legbench.experiment.tables import read_tables
@@ -126,6 +127,8 @@ def _read(kind: type[Read], recording: Recording, edits: Edits) -> Read:
     """Read those tables of a run's experiment that a class has fields for."""
     names = {entry.name for entry in fields(kind)}
     whole = dict(recording.description.experiment)
+    if recording.manifest.get("format") == 1:
+        whole = _said(upgraded(whole))
     tables = {name: whole[name] for name in names if name in whole}
     for key, value in edits.items():
         if key.partition(".")[0] in names:
@@ -135,9 +138,16 @@ def _read(kind: type[Read], recording: Recording, edits: Edits) -> Read:
     for what in names & REGISTRIES.keys():
         tables = _with_own_copy(tables, recording, what)
         _check_known(tables, recording, what)
-    if recording.manifest.get("format") == 1:
-        tables["format"] = 1
     return read_tables(kind, tables, recording.path, json=True)
+
+
+def _said(tables: Mapping[str, Any]) -> dict[str, Any]:
+    """Tables without what format 1 wrote as null, meaning that it is not there."""
+    return {
+        key: _said(value) if isinstance(value, Mapping) else value
+        for key, value in tables.items()
+        if value is not None
+    }
 
 
 def _with_own_copy(tables: dict[str, Any], recording: Recording, what: str) -> dict[str, Any]:
