@@ -16,7 +16,7 @@ from legbench.recording.reader import Recording
 from legbench.viz.facts import facts_of
 from legbench.viz.film.render import render
 from legbench.viz.live.blueprint import blueprint
-from legbench.viz.live.mujoco_viewer import FPS, Pace, play_run
+from legbench.viz.live.mujoco_viewer import FPS, FrameClock, play_run
 from legbench.viz.live.rrd import write_rrd
 from legbench.viz.playback import WHOLE, Playback, cut
 from legbench.viz.pose import Puppet
@@ -114,8 +114,8 @@ class FakeWindow:
 
 def played(run: Recording, playback: Playback, frames: int) -> FakeWindow:
     window = FakeWindow(frames)
-    pace = Pace(now=lambda: window.time, sleep=window.sleep)
-    play_run(run, playback, window=window.opened, pace=pace)
+    clock = FrameClock(now=lambda: window.time, sleep=window.sleep)
+    play_run(run, playback, window=window.opened, clock=clock)
     return window
 
 

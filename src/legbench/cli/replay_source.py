@@ -38,7 +38,7 @@ def source_of(chosen: ReplayArguments) -> Recording:
         RecordingError: it is not there, or damaged.
         ConfigError: a log without --bus, a run with it, or a log of other drives.
     """
-    from legbench.replay.log_frames import is_log
+    from legbench.replay.log_names import is_log
 
     if not is_log(chosen.run):
         chosen.check_pictures()

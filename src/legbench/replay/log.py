@@ -51,7 +51,7 @@ def load_log(
     known of phases, so that the run acts from where its command first moves.
 
     Args:
-        path: a log in one of the formats of `log_frames`, possibly torn.
+        path: a log in one of the formats of `log_names`, possibly torn.
         config: drives on the bus, two of them.
         source: name of their bus file, for messages.
         design: leg on the drives, whose stiffness makes torques of angles.

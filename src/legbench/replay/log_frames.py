@@ -11,11 +11,9 @@ import can
 from can.io.blf import BLFParseError
 
 from legbench.errors import RecordingError
+from legbench.replay.log_names import SUFFIXES, is_log
 from legbench.writing import reason
 
-SUFFIXES: Final = (".log", ".asc", ".blf", ".trc", ".csv")
-"""Formats by the suffix of a file: candump's, Vector's text and binary, PEAK's, python-can's table;
-each may be packed, as `.log.gz`."""
 BLF_HEAD: Final = 144
 """Length of the header of a .blf [bytes]."""
 HEAD: Final = 20_000
@@ -35,12 +33,6 @@ UNREADABLE: Final = (
     AssertionError,  # python-can's own check of a header
 )
 """Exceptions with which python-can meets what is not of its format; it has none of its own."""
-
-
-def is_log(path: Path) -> bool:
-    """Whether the name of a file is that of a log of raw frames."""
-    name = path.with_suffix("") if path.suffix.lower() == ".gz" else path
-    return path.is_file() and name.suffix.lower() in SUFFIXES
 
 
 @final

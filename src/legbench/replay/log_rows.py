@@ -94,6 +94,8 @@ class RowMaker:
         self._sync_us: int | None = None
         """Time of the present SYNC since the first row; none before the first SYNC."""
         self._last_us = 0
+        self._heard = -math.inf
+        """Time of the last SYNC, as the log has it [s]."""
         self._applied = [math.nan, math.nan]
         self._torque = any(node.torque_object is not None for node in config.nodes)
 
@@ -120,6 +122,9 @@ class RowMaker:
             self._row()
 
     def _sync(self, timestamp: float) -> None:
+        since, self._heard = timestamp - self._heard, timestamp
+        if 0.0 <= since < 0.5 * self._config.period:
+            return  # Each channel of a bus has its own SYNC, and some logs have each frame twice.
         if self._sync_us is not None:
             self._row()
         origin = timestamp if self._began is None else self._began

@@ -45,7 +45,9 @@ LONGEST_REST: Final = 2.0
 """Longest time for which a leg that was on drives stands before its first row [s]: it is put to
 rest by its equations, from which bars and encoders keep it some counts away, and swings out."""
 MOVING: Final = 0.1
-"""Link speed in the first row above which a run begins in motion [rad/s]; plants begin at rest."""
+"""Link speed above which a run begins in motion [rad/s]; plants begin at rest."""
+FIRST_ROWS: Final = 20
+"""Rows over which that speed is averaged: noise of an encoder moves no leg."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -114,7 +116,7 @@ def _notes(recording: Recording, moved: Moved) -> Iterator[str]:
             f"drives 1 and 2 did not answer in {unanswered[0]} and {unanswered[1]} rows, which are "
             "left out"
         )
-    speed = float(np.max(np.abs(recording["joint_vel"][0])))
+    speed = float(np.max(np.abs(recording["joint_vel"][:FIRST_ROWS].mean(axis=0))))
     if speed > MOVING:
         yield (
             f"the run begins in motion, at {speed:.3g} rad/s; a plant begins at rest (at most "
@@ -137,6 +139,9 @@ def _opened(leg: RecordedLeg, source: Source, moved: Moved) -> OpenPlant:
         imperfections = imperfections.beyond_motors
     elif on_drives:
         servo = replace(servo, delay_cycles=servo.delay_cycles + 1)
+    if on_drives:
+        # Its noise began before the first row: noise of one's own would only be added to it.
+        imperfections = replace(imperfections, link_noise=None)
     rest = (
         leg.targets.link_at_rest(motor_pos)
         if imperfections.perfect

@@ -40,7 +40,7 @@ Open = Callable[[mujoco.MjModel, mujoco.MjData], AbstractContextManager[Window]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Pace:
+class FrameClock:
     """Time by which frames are shown."""
 
     now: Callable[[], float] = time.perf_counter
@@ -72,7 +72,7 @@ def play_run(
     playback: Playback = WHOLE,
     *,
     window: Open = mujoco.viewer.launch_passive,
-    pace: Pace | None = None,
+    clock: FrameClock | None = None,
 ) -> None:
     """Show a run in a window until it is closed; at its end the last posture stays.
 
@@ -80,7 +80,7 @@ def play_run(
         recording: the run.
         playback: part of it, speed, and whether it begins again.
         window: what opens the window.
-        pace: time of the frames, by default the machine's.
+        clock: time of the frames, by default the machine's.
 
     Raises:
         MissingExtraError: there is no display.
@@ -94,27 +94,27 @@ def play_run(
             "has one"
         )
     require_rows(recording)
-    puppet, pace = Puppet(model_of(recording.description)), pace or Pace()
+    puppet, clock = Puppet(model_of(recording.description)), clock or FrameClock()
     rows = playback.frames(recording.time, FPS)
     hip = puppet.hip(hip_of(recording, facts_of(recording.description)))[rows]
     postures = puppet.positions(hip, recording["joint_pos"][rows])
     with window(puppet.model, puppet.data) as shown:
-        for qpos in _paced(postures, playback.loop, shown, pace):
+        for qpos in _paced(postures, playback.loop, shown, clock):
             puppet.data.qpos[:] = qpos
             mujoco.mj_forward(puppet.model, puppet.data)
             shown.sync()
         while shown.is_running():
-            pace.sleep(1.0 / FPS)
+            clock.sleep(1.0 / FPS)
 
 
-def _paced(postures: Floats, loop: bool, window: Window, pace: Pace) -> Iterator[Floats]:
+def _paced(postures: Floats, loop: bool, window: Window, clock: FrameClock) -> Iterator[Floats]:
     """Yield postures (n, nq) in step with the time while the window is open, once or in a loop."""
-    began, shown = pace.now(), 0
+    began, shown = clock.now(), 0
     while True:
         for qpos in postures:
             if not window.is_running():
                 return
-            pace.sleep(max(0.0, began + shown / FPS - pace.now()))
+            clock.sleep(max(0.0, began + shown / FPS - clock.now()))
             yield qpos
             shown += 1
         if not loop:
