@@ -90,7 +90,7 @@ def cases() -> Iterator[Case]:
                 )
     design = load_design(ROOT / "models" / "prototype.toml")
     for words, servo, imperfections, exact in (
-        ("slow servo", SLOW, Imperfections(), both),
+        ("slow servo", SLOW, Imperfections(), (Source.COMMANDS,)),
         ("imperfect", ServoConfig(), IMPERFECT, (Source.COMMANDS,)),
     ):
         chosen = Experiment(

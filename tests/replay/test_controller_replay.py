@@ -7,12 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from replay_runs import run_of
 
-from legbench.design import LegDesign
 from legbench.errors import ConfigError, FormatError, PlantFault, RecordingError
-from legbench.guests import module_of_file
-from legbench.plants import SimChoice
 from legbench.recording.layout import ARCHIVE, RUN, STREAM
 from legbench.recording.reader import Recording, load
 from legbench.recording.stream import encode_schema, schema_for
@@ -20,19 +16,7 @@ from legbench.replay.controller import replay_controller
 from legbench.replay.observations import exact_times, observations
 from legbench.replay.recorded import recorded_controller
 
-GUEST = Path(__file__).parent / "guests" / "counting.py"
 FORMAT_1 = Path(__file__).parents[1] / "recording" / "format_1"
-
-
-@pytest.fixture(scope="session")
-def guest_run(tmp_path_factory: pytest.TempPathFactory, prototype: LegDesign) -> Recording:
-    """A run of a law from a file that is not there any more."""
-    folder = tmp_path_factory.mktemp("guest")
-    mine = folder / "mine.py"
-    shutil.copy(GUEST, mine)
-    run = run_of(folder, prototype, module_of_file(mine).Counting(), SimChoice(), 0.12)
-    mine.unlink()
-    return run
 
 
 def edited_manifest(run: Recording, folder: Path, **controller: object) -> Recording:

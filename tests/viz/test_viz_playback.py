@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import imageio.v3 as iio
 import mujoco
@@ -13,6 +14,7 @@ from viz_runs import part
 
 from legbench.errors import ConfigError, MissingExtraError
 from legbench.recording.reader import Recording
+from legbench.signals import Floats
 from legbench.viz.facts import facts_of
 from legbench.viz.film.render import render
 from legbench.viz.live.blueprint import blueprint
@@ -22,7 +24,7 @@ from legbench.viz.playback import WHOLE, Playback, cut
 from legbench.viz.pose import Puppet
 from legbench.viz.run_model import model_of
 
-TIME = np.arange(1000) * 1e-3
+TIME: Floats = np.arange(1000, dtype=np.float64) * 1e-3
 
 
 def test_a_part_has_the_rows_at_its_times() -> None:
@@ -50,7 +52,7 @@ def test_frames_come_in_step_with_the_speed() -> None:
         ({"begin": float("inf")}, "from is inf s"),
     ],
 )
-def test_a_playback_that_makes_no_sense_is_refused(given: dict[str, float], message: str) -> None:
+def test_a_playback_that_makes_no_sense_is_refused(given: dict[str, Any], message: str) -> None:
     with pytest.raises(ConfigError, match=message):
         Playback(**given)
 

@@ -13,13 +13,14 @@ from legbench.design.toml import design_to_mapping
 from legbench.drives.protocol.frame import SYNC_ID
 from legbench.drives.setup.config import BusConfig
 from legbench.errors import ConfigError, RecordingError
+from legbench.loop import Progress
 from legbench.mjcf.options import Linkage
 from legbench.phases import ControllerDescription, PhaseInfo, Role
 from legbench.recording.controller_table import controller_table
 from legbench.recording.layout import TIME
 from legbench.recording.memory import MemoryRun
 from legbench.recording.reader import Recording, described
-from legbench.replay.log_frames import LogFrames, with_head
+from legbench.replay.log_frames import HEAD, LogFrames, with_head
 from legbench.replay.log_mapping import MappingsSeen
 from legbench.replay.log_nodes import NodesSeen, channels_of
 from legbench.replay.log_rows import RowMaker, signals_of
@@ -27,6 +28,8 @@ from legbench.signals import REST
 
 OFF_PERIOD: Final = 0.005
 """Share by which SYNC may come at another period than the bus file says [-]; crystals keep 1e-4."""
+TOLD_EVERY: Final = 20_000
+"""Number of frames between two calls of the progress function; a shorter log is read at once."""
 UNKNOWN: Final = "unknown"
 """Kind of the controller of a log, which tells commands but not who gave them."""
 
@@ -42,7 +45,12 @@ class DecodedLog:
 
 
 def load_log(
-    path: Path, config: BusConfig, source: str, design: LegDesign, setup: Setup | None = None
+    path: Path,
+    config: BusConfig,
+    source: str,
+    design: LegDesign,
+    setup: Setup | None = None,
+    progress: Progress | None = None,
 ) -> DecodedLog:
     """Read a log of raw frames as a run.
 
@@ -56,6 +64,7 @@ def load_log(
         source: name of their bus file, for messages.
         design: leg on the drives, whose stiffness makes torques of angles.
         setup: setup of the leg, by default a jump.
+        progress: told now and then how far the file has been read [bytes].
 
     Raises:
         RecordingError: the file cannot be read, or holds no SYNC.
@@ -72,7 +81,9 @@ def load_log(
     nodes, mappings = NodesSeen(config), MappingsSeen(config)
     run = MemoryRun(_manifest(config, source, design, setup or Setup()), name=path.stem)
     rows = RowMaker(config, design.stiffness, run)
-    for message in messages:
+    for number, message in enumerate(messages):
+        if progress is not None and number > HEAD and number % TOLD_EVERY == 0:
+            progress(*frames.place)
         if channels is not None and message.channel not in channels:
             continue
         cob_id = message.arbitration_id

@@ -1,11 +1,12 @@
 """Frames of a log of a bus, in any of the formats that python-can reads."""
 
+import os
 import struct
 import zlib
 from collections.abc import Iterator
 from itertools import chain, islice
 from pathlib import Path
-from typing import Final, final
+from typing import IO, Final, final
 
 import can
 from can.io.blf import BLFParseError
@@ -91,6 +92,14 @@ class LogFrames:
                 self._torn(reason(error))
         if self._read == 0:
             raise RecordingError(f"{self._path} holds no frames: is it a log of a bus?")
+
+    @property
+    def place(self) -> tuple[int, int]:
+        """How far the file has been read, and its length [bytes]."""
+        # Every reader of a file has it, but the type of all readers does not say so.
+        file: IO[str] | IO[bytes] = vars(self._reader)["file"]
+        descriptor = file.fileno()
+        return os.lseek(descriptor, 0, os.SEEK_CUR), os.fstat(descriptor).st_size
 
     def _torn(self, why: str) -> None:
         if self._read == 0:
