@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
+import can
 import numpy as np
 
 from legbench.design import LegDesign
@@ -73,30 +74,45 @@ def load_log(
     if len(config.nodes) != 2:
         raise ConfigError(f"{source}: {len(config.nodes)} nodes; a leg has 2")
     frames = LogFrames(path)
-    head, messages = with_head(frames)
-    channels = channels_of(head, config, source)
-    clocks = {message.channel for message in head if message.arbitration_id == SYNC_ID}
-    # Several channels have a SYNC each, at the same time: one of them counts the cycles.
-    leading = min(clocks & (channels or clocks), key=str, default=None)
-    nodes, mappings = NodesSeen(config), MappingsSeen(config)
     run = MemoryRun(_manifest(config, source, design, setup or Setup()), name=path.stem)
+    nodes, mappings = NodesSeen(config), MappingsSeen(config)
     rows = RowMaker(config, design.stiffness, run)
-    for number, message in enumerate(messages):
-        if progress is not None and number > HEAD and number % TOLD_EVERY == 0:
-            progress(*frames.place)
-        if channels is not None and message.channel not in channels:
-            continue
-        cob_id = message.arbitration_id
-        nodes.take(cob_id)
-        mappings.take(cob_id, bytes(message.data))
-        if cob_id != SYNC_ID or leading in (None, message.channel):
-            rows.take(message)
+    for message in _on_the_bus(frames, config, source, progress):
+        nodes.take(message.arbitration_id)
+        mappings.take(message.arbitration_id, bytes(message.data))
+        rows.take(message)
     rows.finish()
     unseen = mappings.check(config, source)
     _require_drives(path, config, source, nodes, rows)
     recording = _recording(run, path, frames.tear)
     notes = _notes(config, source, recording, unseen, nodes, rows)
     return DecodedLog(recording=recording, notes=tuple(notes))
+
+
+def _on_the_bus(
+    frames: LogFrames, config: BusConfig, source: str, progress: Progress | None
+) -> Iterator[can.Message]:
+    """Frames of the channels of a bus file, with the SYNC of one of them.
+
+    Raises:
+        ConfigError: it is not clear which channel of the log is meant.
+    """
+    head, messages = with_head(frames)
+    channels = channels_of(head, config, source)
+    clocks = {message.channel for message in head if message.arbitration_id == SYNC_ID}
+    # Several channels have a SYNC each, at the same time: one of them counts the cycles.
+    leading = min(clocks & (channels or clocks), key=str, default=None)
+    size = 0
+    for number, message in enumerate(messages):
+        if progress is not None and number > HEAD and number % TOLD_EVERY == 0:
+            place, size = frames.place
+            progress(place, size)
+        if channels is not None and message.channel not in channels:
+            continue
+        if message.arbitration_id != SYNC_ID or leading in (None, message.channel):
+            yield message
+    if progress is not None and size:
+        progress(size, size)
 
 
 def _manifest(config: BusConfig, source: str, design: LegDesign, setup: Setup) -> dict[str, Any]:
