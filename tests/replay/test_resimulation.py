@@ -40,6 +40,7 @@ def test_what_was_simulated_repeats_itself_to_the_bit(
     compared |= {"contact", "energy_kinetic"} if run.has_truth else set()
     assert compared <= found.signals.units.keys()
     again = found.recording
+    assert again.complete
     np.testing.assert_array_equal(again["command_pos"], run["command_pos"])
     np.testing.assert_array_equal(again["phase"], run["phase"])
     if run.description.jumps:
@@ -116,6 +117,7 @@ def test_a_plant_that_cannot_go_on_ends_it_there(sim_jump: Recording) -> None:
     assert "no longer on the branch" in found.fault
     assert 300 < len(found.recording.time) < len(sim_jump.time)
     assert len(found.signals.time) == len(found.recording.time)
+    assert found.recording.description.status == "fault"
 
 
 def test_what_cannot_be_resimulated_is_refused(can_swing: Recording, sim_jump: Recording) -> None:

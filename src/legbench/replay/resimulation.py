@@ -17,6 +17,7 @@ from legbench.plant.opening import Leg, OpenPlant, PlantSettings, open_plant
 from legbench.plant.start import Start
 from legbench.plants import PLANTS, SimChoice
 from legbench.recording.format_1 import upgraded
+from legbench.recording.layout import COMPLETE, FAULT
 from legbench.recording.manifest import OWN_KEYS
 from legbench.recording.memory import MemoryRun
 from legbench.recording.reader import Recording
@@ -98,12 +99,13 @@ def resimulate(
                 "virtual time, such as --plant sim"
             )
         fault = _drive(plant, moved, times, run, progress)
+    run.close(COMPLETE if fault is None else FAULT, None if fault is None else fault.cause)
     rows = run.recording()
     given = replace(rows, path=Path(f"{recording.path.name}-resimulated"))
     return Resimulation(
         recording=given,
         signals=_compared(recording, given, moved.stale),
-        fault=fault,
+        fault=None if fault is None else str(fault),
         notes=tuple(_notes(recording, moved)),
     )
 
@@ -167,7 +169,7 @@ def _without_limits(plant: PlantSettings) -> PlantSettings:
 
 def _drive(
     plant: AbstractPlant, moved: Moved, times: Floats, run: MemoryRun, progress: Progress | None
-) -> str | None:
+) -> PlantFault | None:
     """Step the plant from row to row; returns the fault that ended it early."""
     count = len(times)
     hold = Command.holding(moved.first)
@@ -187,7 +189,7 @@ def _drive(
             if progress is not None and ((row + 1) % PROGRESS_EVERY == 0 or row + 1 == count):
                 progress(row + 1, count)
     except PlantFault as fault:
-        return str(fault)
+        return fault
     return None
 
 
