@@ -19,6 +19,10 @@ LONGEST_LINE = 8192
 """Longest line of a TOML file [bytes]: the parser's time grows with the square of a dotted key."""
 DEEPEST = 32
 """Largest number of tables or lists within each other; the shipped files have 4."""
+# Without O_NONBLOCK a FIFO that nobody writes to would never be opened; each system has some.
+_FLAGS = os.O_RDONLY
+for _name in ("O_NONBLOCK", "O_NOCTTY", "O_CLOEXEC", "O_BINARY"):
+    _FLAGS |= getattr(os, _name, 0)
 _KINDS = (
     (stat.S_ISDIR, "a directory"),
     (stat.S_ISFIFO, "a FIFO"),
@@ -44,8 +48,7 @@ def read_file(path: Path, largest: int) -> bytes:
         UnreadableError: it is a directory, FIFO, socket or device, too large, or unreadable.
     """
     try:
-        # Without O_NONBLOCK a FIFO that nobody writes to would never be opened.
-        fd = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
+        fd = os.open(path, _FLAGS)
     except (FileNotFoundError, NotADirectoryError):
         raise FileNotFoundError(str(path)) from None
     except (OSError, ValueError) as error:

@@ -72,10 +72,11 @@ def _occupy_standard_streams() -> None:
 def _reader_left() -> bool:
     """Whether the reader of our output has gone; what is still to be flushed is dropped then."""
     output = sys.stdout.fileno()
-    watch = select.poll()
-    watch.register(output, 0)
-    if not any(happened & select.POLLERR for _, happened in watch.poll(0)):
-        return False
+    if "poll" in vars(select):  # elsewhere nothing but stdout is a pipe
+        watch = select.poll()
+        watch.register(output, 0)
+        if not any(happened & select.POLLERR for _, happened in watch.poll(0)):
+            return False
     os.dup2(os.open(os.devnull, os.O_WRONLY), output)
     return True
 

@@ -34,7 +34,7 @@ def period_of(experiment: Experiment) -> float:
     from legbench.plants import CanChoice
 
     plant = experiment.plant
-    return load_bus(plant.bus).period if isinstance(plant, CanChoice) else PERIOD
+    return load_bus(plant.bus_file).period if isinstance(plant, CanChoice) else PERIOD
 
 
 @dataclass(slots=True)
