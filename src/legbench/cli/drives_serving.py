@@ -87,6 +87,8 @@ class Emulate:
 
     def run(self, bench: Bench) -> int:
         """Serve until ^C or SIGTERM, printing every change of a drive's state."""
+        _check_time("seconds", self.seconds)
+        self._check_way(bench)
         from legbench.commissioning.emulate import Server, serve
         from legbench.drives.emulated.bus_server import BusServer
         from legbench.drives.emulated.network import Network
@@ -95,8 +97,6 @@ class Emulate:
         from legbench.interrupts import stop_on_interrupt
         from legbench.plant.can_open import open_session
 
-        _check_time("seconds", self.seconds)
-        self._check_way(bench)
         bench = replace(bench, bus=locate(bench.bus))
         config = _wearing(_at_bitrate(bench.config(), bench.bitrate), self.eds)
         start_pos, body = self._leg(bench)
