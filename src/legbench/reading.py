@@ -1,5 +1,6 @@
 """Files that a user hands over: read once, bounded in size and depth, whatever they are."""
 
+import codecs
 import json
 import os
 import stat
@@ -23,6 +24,15 @@ DEEPEST = 32
 _FLAGS = os.O_RDONLY
 for _name in ("O_NONBLOCK", "O_NOCTTY", "O_CLOEXEC", "O_BINARY"):
     _FLAGS |= getattr(os, _name, 0)
+_MARKS = {
+    codecs.BOM_UTF8: "UTF-8",
+    # The marks of UTF-32 begin with those of UTF-16.
+    codecs.BOM_UTF32_LE: "UTF-32",
+    codecs.BOM_UTF32_BE: "UTF-32",
+    codecs.BOM_UTF16_LE: "UTF-16",
+    codecs.BOM_UTF16_BE: "UTF-16",
+}
+"""First bytes of texts in other encodings than plain UTF-8."""
 _KINDS = (
     (stat.S_ISDIR, "a directory"),
     (stat.S_ISFIFO, "a FIFO"),
@@ -91,6 +101,11 @@ def parse_toml(content: bytes) -> dict[str, Any]:
     Raises:
         UnreadableError: it is no UTF-8 or no TOML, too wide or too deep.
     """
+    for mark, encoding in _MARKS.items():
+        if content.startswith(mark):
+            raise UnreadableError(
+                f"begins with the byte order mark of {encoding}; save it as UTF-8 without one"
+            )
     longest = max(map(len, content.split(b"\n")))
     if longest > LONGEST_LINE:
         raise UnreadableError(
