@@ -66,8 +66,8 @@ def start_live(
     Args:
         run_folder: folder of the run; its manifest is there.
         serve: show it in a browser on this machine rather than in a window.
-        port: port of the viewer; a window that already listens there is used, a page is served at
-            other ports where these are taken.
+        port: port of the window; one that already listens there is used. A page is served at ports
+            that nobody has.
         save: write an `.rrd` file instead of opening a viewer.
 
     Raises:
@@ -79,7 +79,7 @@ def start_live(
         viewer.require_viewer(serve=serve, way_out=way_out)
     web_port = viewer.WEB_PORT
     if serve:
-        port, web_port = viewer.free_port(port), viewer.free_port(web_port)
+        port, web_port = viewer.free_port(), viewer.free_port()
     command = [
         sys.executable,
         "-m",

@@ -43,13 +43,14 @@ def listening(port: int) -> bool:
         return probe.connect_ex((LOOPBACK, port)) == 0
 
 
-def free_port(wanted: int) -> int:
-    """Port `wanted` of this machine, or any other one where somebody has it already."""
-    for number in (wanted, 0):
-        with socket.socket() as probe, suppress(OSError):
-            probe.bind((LOOPBACK, number))
-            return int(probe.getsockname()[1])
-    raise MissingExtraError("this machine has no free port; end programs that serve something")
+def free_port() -> int:
+    """Port of this machine that nobody has; the system gives two programs two different ones.
+
+    The usual ports would be taken by the second of two runs that look at the same moment.
+    """
+    with socket.socket() as probe:
+        probe.bind((LOOPBACK, 0))
+        return int(probe.getsockname()[1])
 
 
 def wait_until_served(
@@ -144,9 +145,7 @@ class Viewer:
         forget(self._process)
 
 
-def open_viewer(
-    rrd: Path, *, serve: bool = False, port: int = PORT, web_port: int = WEB_PORT
-) -> Viewer:
+def open_viewer(rrd: Path, *, serve: bool = False) -> Viewer:
     """Show an `.rrd` file in a window, or serve it to a browser on this machine.
 
     The page is there when this returns, at ports that nobody else had.
@@ -157,8 +156,7 @@ def open_viewer(
     """
     way_out = f"open {rrd} with `rerun {rrd}` on a machine that has one, or show it with --serve"
     require_viewer(serve=serve, way_out=way_out)
-    if serve:
-        port, web_port = free_port(port), free_port(web_port)
+    port, web_port = (free_port(), free_port()) if serve else (PORT, WEB_PORT)
     command = viewer_command([rrd], port=port, serve=serve, web_port=web_port)
     process = spawn(command)
     if serve:
