@@ -1,13 +1,20 @@
 """Flags made from dataclasses, one way for every command."""
 
+import io
 import os
-from typing import TypeVar
+from contextlib import redirect_stderr
+from typing import Final, TypeVar
 
 import tyro
 
+from legbench.cli.output import report_error
 from legbench.errors import ConfigError
 
 Arguments = TypeVar("Arguments")
+WRONG_USAGE: Final = 2
+"""Exit status of a command line that means nothing."""
+FRAME, RULE = " \u2502\u256d\u256e\u2570\u256f|+", "\u2500-"
+"""Characters of the boxes in which tyro puts its errors, and of the rules within them."""
 STYLE = (
     tyro.conf.OmitArgPrefixes,
     tyro.conf.OmitSubcommandPrefixes,
@@ -35,6 +42,33 @@ def parse(
                 f"{os.fsencode(word)!r} is no UTF-8 text; rename the file or folder, since run "
                 "folders and their descriptions are in UTF-8"
             )
-    return tyro.cli(
-        kind, prog=f"legbench {command}", description=description, args=arguments, config=STYLE
-    )
+    told = io.StringIO()
+    try:
+        with redirect_stderr(told):
+            return tyro.cli(
+                kind,
+                prog=f"legbench {command}",
+                description=description,
+                args=arguments,
+                config=STYLE,
+            )
+    except SystemExit as end:
+        if end.code == WRONG_USAGE:
+            report_error(f"{_in_a_line(told.getvalue())}; see legbench {command} --help")
+        raise
+
+
+def _in_a_line(box: str) -> str:
+    """What a box of words says before its first rule, in one line.
+
+    The box is drawn by lines, by plain ASCII, or by rules alone.
+    """
+    said: list[str] = []
+    for framed in box.splitlines()[1:]:  # the first line is the title
+        line = framed.strip(FRAME)
+        if not line.strip(RULE) or line.startswith("Got errors"):
+            if said:
+                break
+            continue
+        said.append(line)
+    return " ".join(" ".join(said).split()).rstrip(".:")

@@ -134,7 +134,8 @@ def _report(finished: "Finished", *, as_json: bool) -> int:
     if summary.limited_cycles:
         note(
             f"legbench: the limits changed the command in {limited(summary)}: the leg ran "
-            "something else than it was asked to; the event 'limited' in events.jsonl says more"
+            "something else than it was asked to, by command_speed or motor_range of the limits; "
+            "the event 'limited' in events.jsonl tells which"
         )
     if summary.numerics == Soundness.UNSOUND:
         note(
