@@ -289,8 +289,7 @@ def test_emulated_motors_are_slow_and_late_each_for_itself() -> None:
     motors = Imperfections(motor_slew_rate=(20.0, 9.0), motor_delay_cycles=(3, 0))
     step = PositionJumpConfig(z2=0.9, dz2=0.05, delay=0.05)
     shown = [
-        ran(each, EMULATED, controller=step, duration=0.2)
-        for each in (Imperfections(), motors)
+        ran(each, EMULATED, controller=step, duration=0.2) for each in (Imperfections(), motors)
     ]
     ideal, slow = (run["motor_pos"] for run in shown)
     first = [
