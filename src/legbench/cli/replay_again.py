@@ -50,10 +50,11 @@ def replayed(recording: Recording, chosen: ReplayArguments) -> Again | None:
     """
     from legbench.experiment.overrides import parse_setting
     from legbench.replay.recorded import paths_from_here
+    from legbench.shipped import locate
 
     pairs = [parse_setting(text) for text in chosen.settings]
     if chosen.design is not None and chosen.bus is None:
-        pairs.append(("design", str(chosen.design)))
+        pairs.append(("design", str(locate(chosen.design).absolute())))
     edits = paths_from_here(pairs)
     if chosen.controller:
         return _controller(recording, chosen, edits)

@@ -22,6 +22,7 @@ from legbench.plant.opening import PlantSettings
 from legbench.plants import PLANTS, SimChoice
 from legbench.recording.reader import Recording
 from legbench.servo import PERFECT, ServoConfig
+from legbench.shipped import locate
 
 Edits = Mapping[str, Any]
 """Dotted key of an entry of the experiment -> its new value, as `--set` has them."""
@@ -203,4 +204,4 @@ def _absolute(value: Any) -> Any:
     place, colon, name = value.rpartition(":")
     if colon and place.endswith(".py"):
         return f"{Path(place).absolute()}:{name}"
-    return str(Path(value).absolute()) if value.endswith((".toml", ".py")) else value
+    return str(locate(Path(value)).absolute()) if value.endswith((".toml", ".py")) else value

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Final, Protocol
 
 import mujoco
-import mujoco.viewer
 
 from legbench.errors import ConfigError, MissingExtraError
 from legbench.recording.reader import Recording
@@ -19,6 +18,13 @@ from legbench.viz.hip import hip_of
 from legbench.viz.playback import WHOLE, Playback
 from legbench.viz.pose import Puppet
 from legbench.viz.run_model import model_of
+
+try:
+    import mujoco.viewer
+except ImportError as error:
+    raise MissingExtraError(
+        "glfw is not installed; MuJoCo's viewer needs it: pip install 'legbench[render]'"
+    ) from error
 
 FPS: Final = 60.0
 """Frames that are shown of a run [1/s]."""
