@@ -1,5 +1,6 @@
 """A log of raw frames tells what the master of the bus has recorded."""
 
+import struct
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -9,11 +10,13 @@ import numpy as np
 import pytest
 from replay_runs import BUS
 
-from legbench.drives.protocol.datatypes import size_of
+from legbench.drives.protocol.datatypes import DataType, size_of
+from legbench.drives.protocol.pdo import Mapped
 from legbench.drives.protocol.sdo import MUX
 from legbench.drives.setup.bus_file import load_bus
 from legbench.drives.setup.config import BusConfig
 from legbench.drives.setup.configuration import configuration
+from legbench.drives.setup.pdos import POSITION_ACTUAL, STATUSWORD, PdoConfig
 from legbench.errors import ConfigError, RecordingError
 from legbench.metrics import summarise
 from legbench.recording.reader import Recording
@@ -269,6 +272,48 @@ def test_two_channels_need_a_bus_file_that_names_one(
     elsewhere = replace(CONFIG, channel="can3")
     with pytest.raises(ConfigError, match=r"answers on channels can0, can7; leg\.toml names can3"):
         decoded(can_swing, path, elsewhere)
+
+
+def test_frames_that_a_log_has_twice_make_one_row(
+    can_swing: Recording, short: list[can.Message], whole: DecodedLog, tmp_path: Path
+) -> None:
+    """As where two channels were logged under one name, or a sender's echo."""
+    doubled = [each for each in short for _ in range(2)]
+    found = decoded(can_swing, written(tmp_path / "twice.log", doubled)).recording
+    rows = len(found.time)
+    np.testing.assert_array_equal(found["joint_pos"], whole.recording["joint_pos"][:rows])
+    np.testing.assert_allclose(found.time, whole.recording.time[:rows])
+
+
+def test_drives_with_one_encoder_tell_the_other_side_by_their_torque(
+    can_swing: Recording, tmp_path: Path
+) -> None:
+    """Against angles and torques worked out by hand: 65536 x 6 counts a turn, motor 2 mirrored."""
+    torque = Mapped(0x6077, 0, DataType.INTEGER16)
+    answer = PdoConfig(number=1, objects=(STATUSWORD, POSITION_ACTUAL, torque))
+    nodes = tuple(
+        replace(node, link=None, torque_object=torque, torque_scale=1e-3, tpdos=(answer,))
+        for node in CONFIG.nodes
+    )
+    config = replace(CONFIG, nodes=nodes)
+    frames = []
+    for cycle in range(5):
+        at = 7.0 + 1e-3 * cycle
+        frames.append(frame(0x080, b"", at))
+        for cob_id, counts, told in ((0x181, -40_000 + cycle, 500), (0x182, -40_000, 500)):
+            frames.append(frame(cob_id, struct.pack("<Hih", 0x1237, counts, told), at + 3e-4))
+    seen = decoded(can_swing, written(tmp_path / "one.log", frames), config).recording
+    counts_per_rad = 65536 * 6 / (2 * np.pi)
+    motor = np.stack([(-40_000 + np.arange(5)) / counts_per_rad, np.full(5, 40_000)], axis=-1)
+    motor[:, 1] /= counts_per_rad
+    stiffness = can_swing.description.design.stiffness
+    np.testing.assert_allclose(seen["motor_pos"], motor, rtol=1e-12)
+    np.testing.assert_allclose(seen["spring_torque"], [[0.5, -0.5]] * 5)
+    np.testing.assert_array_equal(seen["drive_torque"], seen["spring_torque"])
+    np.testing.assert_allclose(seen["joint_pos"], motor - np.array([0.5, -0.5]) / stiffness)
+    # Nothing was commanded: the command is where the motors are.
+    np.testing.assert_array_equal(seen["command_pos"], seen["motor_pos"])
+    assert np.isnan(seen["controlword"]).all()
 
 
 def test_a_torn_log_is_read_as_far_as_it_goes(
