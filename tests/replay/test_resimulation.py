@@ -1,16 +1,18 @@
 """Recorded commands and motors move the leg as it moved, to the bit or to the encoders' counts."""
 
 import math
+import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from replay_runs import BUS
 
 from legbench.drives.setup.bus_file import load_bus
-from legbench.errors import ConfigError, RecordingError
+from legbench.errors import ConfigError, PlantFault, RecordingError
 from legbench.metrics import summarise
-from legbench.recording.reader import Recording
+from legbench.recording.reader import Recording, load
 from legbench.replay.comparison import Replayed, same_bits
 from legbench.replay.moved import Moved, Source
 from legbench.replay.recorded import recorded_leg
@@ -104,6 +106,7 @@ def test_another_plant_and_another_setting_move_otherwise(sim_jump: Recording) -
     leg = recorded_leg(sim_jump, {"imperfections.stiffness_error": [0.01, 0.0]}, plant="analytic")
     found = resimulate(sim_jump, leg, Source.COMMANDS)
     assert found.recording.description.plant == "analytic"
+    assert found.recording.description.imperfections.stiffness_error == (0.01, 0.0)
     assert 1e-4 < worst(found.signals, "joint_pos") < 1.0
 
 
@@ -161,3 +164,17 @@ def test_the_error_of_a_signal_is_that_of_its_definition() -> None:
     # What only one of both knows is beyond any bound.
     (large,) = both.deviations(0.7)
     assert (large.rows, large.first_cycle) == (2, 2)
+
+
+def test_a_plant_that_fails_before_its_first_row_says_why(
+    guest_plant: Recording, tmp_path: Path
+) -> None:
+    shutil.copytree(guest_plant.path, tmp_path / "run")
+    copy = tmp_path / "run" / "plant_still.py"
+    copy.write_text(
+        copy.read_text().replace("self.cycle, self", "self.cycle = 1 / 0\n        self.cycle, self")
+    )
+    run = load(tmp_path / "run")
+    with pytest.raises(PlantFault, match="the plant failed in a resimulation after t = 0") as told:
+        resimulate(run, recorded_leg(run), Source.COMMANDS)
+    assert "1 / 0" in str(told.value)

@@ -7,8 +7,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from legbench.design.toml import design_to_mapping
 from legbench.errors import ConfigError, LegbenchError, PlantFault
+from legbench.experiment.tables import write_tables
 from legbench.failures import failed, own_lines
 from legbench.loop import PROGRESS_EVERY, Progress
 from legbench.plant.abstract import AbstractPlant
@@ -86,7 +86,7 @@ def resimulate(
         RecordingError: a run that has no rows, lacks some, or does not know its motors.
         ConfigError: commands that were never sent, a leg that cannot stand so, or a plant that
             runs in the machine's time.
-        PlantFault: a plant of one's own failed.
+        PlantFault: the plant cannot even stand as the run began.
     """
     times = exact_times(recording, require_every_row(recording))
     moved = Moved(recording, source)
@@ -99,6 +99,8 @@ def resimulate(
                 "virtual time, such as --plant sim"
             )
         fault = _drive(plant, moved, times, run, progress)
+    if fault is not None and run.rows == 0:
+        raise fault
     run.close(COMPLETE if fault is None else FAULT, None if fault is None else fault.cause)
     rows = run.recording()
     given = replace(rows, path=Path(f"{recording.path.name}-resimulated"))
@@ -218,16 +220,20 @@ def _guarded(act: Callable[[], Any], time: float) -> Any:
 
 
 def _manifest(recording: Recording, leg: RecordedLeg) -> Mapping[str, Any]:
-    """Manifest of the run that comes out: that of the run, on this leg and plant."""
+    """Manifest of the run that comes out: that of the run, on this leg and plant.
+
+    Where the run came from, and what it began in, is not this one's.
+    """
     manifest = recording.manifest
     whole = upgraded(manifest) if manifest.get("format") == 1 else manifest
     plant = SimChoice.kind if leg.plant.kind == DRIVES else leg.plant.kind
     experiment = {
         **whole.get("experiment", {}),
-        "design": design_to_mapping(leg.design),
+        **write_tables(replace(leg, plant=SimChoice()), where=False),
         "plant": {"kind": plant, "settings": {}},
     }
-    kept = {key: value for key, value in whole.items() if key not in OWN_KEYS}
+    own = (*OWN_KEYS, "provenance", "initial_state")
+    kept = {key: value for key, value in whole.items() if key not in own}
     return kept | {"experiment": experiment, "plant": {"kind": plant}}
 
 
