@@ -93,11 +93,7 @@ def resimulate(
     opened = _opened(leg, source, moved)
     run = MemoryRun(_manifest(recording, leg), name=f"resimulated-{recording.path.name}")
     with opened.plant as plant:
-        if opened.realtime:
-            raise ConfigError(
-                f"plant '{leg.plant.kind}' runs in the machine's time; a resimulation needs one in "
-                "virtual time, such as --plant sim"
-            )
+        _require_virtual(opened, leg)
         fault = _drive(plant, moved, times, run, progress)
     if fault is not None and run.rows == 0:
         raise fault
@@ -110,6 +106,15 @@ def resimulate(
         fault=None if fault is None else str(fault),
         notes=tuple(_notes(recording, moved)),
     )
+
+
+def _require_virtual(opened: OpenPlant, leg: RecordedLeg) -> None:
+    """Refuse a plant that the machine's clock paces; raises ConfigError."""
+    if opened.realtime:
+        raise ConfigError(
+            f"plant '{leg.plant.kind}' runs in the machine's time; a resimulation needs one in "
+            "virtual time, such as --plant sim"
+        )
 
 
 def _notes(recording: Recording, moved: Moved) -> Iterator[str]:
