@@ -1,0 +1,152 @@
+"""Numbers of a campaign's table that stand beside numbers of the paper."""
+
+import math
+from collections import defaultdict
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import pyarrow as pa
+
+from legbench.campaign.curves import CONTROLLER, DZ2, SETUP, Z2, rows_of, sound_runs
+from legbench.metrics.jump import LAST
+from legbench.metrics.source import Reference
+from legbench.paper import Comparison, Published
+
+RATING_WITHIN: Final = 0.02
+"""Distance within which a rating agrees with the paper's [-]: two units of its last digit."""
+SHARE_WITHIN: Final = 0.1
+"""Distance within which any other number agrees, as a share of the paper's [-], which gives
+lengths in two digits."""
+SAME: Final = 1e-9
+"""Largest distance between set points that are the same [rad]."""
+TRANSIENT: Final = 3
+"""Periods of bang-bang before those that the paper averages [-]: its index is P>3."""
+
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measured:
+    """Number measured in a campaign, over the runs that show it."""
+
+    value: float
+    """Mean over the runs."""
+    spread: float
+    """Standard deviation over the runs; zero for one."""
+    runs: int
+    """Number of runs."""
+
+    def words(self, unit: str) -> str:
+        """The number, with its spread if there are several runs."""
+        text = measured_text(self.value, unit)
+        if self.runs == 1:
+            return text
+        return f"{text} ± {measured_text(self.spread, unit)} over {self.runs} runs"
+
+
+def measure(
+    number: Published,
+    table: pa.Table,
+    reference: Reference,
+    at: tuple[float, float] | None = None,
+) -> Measured | None:
+    """Measure the counterpart of a number of the paper; none where no run shows it.
+
+    Args:
+        number: number of the paper.
+        table: the table of a campaign; runs in it that are not sound do not count.
+        reference: what ratings are about.
+        at: set point and deflection of the runs to take [rad]; those of the number by default. A
+            jump is measured whatever its set point, as the paper's can be read in several ways.
+    """
+    found = MEASURES.get(number.key)
+    if found is None:
+        return None
+    kind, of_run = found
+    z2, dz2 = (number.z2, number.dz2) if at is None else at
+    runs: dict[str, list[Row]] = defaultdict(list)
+    for row in rows_of(sound_runs(table), kind):
+        here = row[SETUP] == number.setup and row[CONTROLLER] == number.controller
+        if here and (kind != "period" or (_same(row[Z2], z2) and _same(row[DZ2], dz2))):
+            runs[row["experiment"]].append(row)
+    values = [of_run(rows, f"rating_{reference.value}") for rows in runs.values()]
+    values = [value for value in values if math.isfinite(value)]
+    if not values:
+        return None
+    return Measured(value=float(np.mean(values)), spread=float(np.std(values)), runs=len(values))
+
+
+def agrees(number: Published, value: float) -> bool:
+    """Whether a measured value agrees with what the paper prints."""
+    if number.comparison is Comparison.MORE:
+        return value > number.value
+    if number.comparison is Comparison.LESS:
+        return value < number.value
+    rating = number.key in MEASURES and number.unit == "1"
+    within = RATING_WITHIN if rating else SHARE_WITHIN * abs(number.value)
+    return abs(value - number.value) <= within
+
+
+def published_text(number: Published) -> str:
+    """A number of the paper as it prints it, in millimetres if it is a length."""
+    sign = "" if number.comparison is Comparison.EQUAL else f"{number.comparison.value} "
+    if number.unit == "m":
+        return f"{sign}{1e3 * number.value:g} mm"
+    return f"{sign}{number.value:g}" + ("" if number.unit == "1" else f" {number.unit}")
+
+
+def measured_text(value: float, unit: str) -> str:
+    """A measured number, a rating to three decimals, a length to a tenth of a millimetre."""
+    if unit == "m":
+        return f"{1e3 * value:.1f} mm"
+    return f"{value:.3f}" if unit == "1" else f"{value:.4g} {unit}"
+
+
+def _same(one: float | None, two: float | None) -> bool:
+    return one is not None and two is not None and abs(one - two) <= SAME
+
+
+def _at_index(index: int) -> Callable[[list[Row], str], float]:
+    def of_run(rows: list[Row], rated: str) -> float:
+        return next((row[rated] for row in rows if row["index"] == index), math.nan)
+
+    return of_run
+
+
+def _sustained(rows: list[Row], rated: str) -> float:
+    ratings = [row[rated] for row in rows if row["index"] > TRANSIENT]
+    return float(np.mean(ratings)) if ratings else math.nan
+
+
+def _worst_of_last(rows: list[Row], rated: str) -> float:
+    """Lowest rating of the last three phases, as many as the paper shows."""
+    return min(row[rated] for row in rows[-LAST:])
+
+
+def _largest_of_last(name: str) -> Callable[[list[Row], str], float]:
+    def of_run(rows: list[Row], rated: str) -> float:
+        return max(row[name] for row in rows[-LAST:])
+
+    return of_run
+
+
+def _drift(rows: list[Row], rated: str) -> float:
+    return rows[0]["drift"]
+
+
+MEASURES: Final[dict[str, tuple[str, Callable[[list[Row], str], float]]]] = {
+    "step_rating_1": ("period", _at_index(1)),
+    "step_rating_6": ("period", _at_index(6)),
+    "bang_bang_rating": ("period", _sustained),
+    "jump_rating_stance": ("stance", _worst_of_last),
+    "jump_rating_flight": ("flight", _worst_of_last),
+    "foot_clearance": ("jump", _largest_of_last("foot_clearance")),
+    "trunk_excursion": ("jump", _largest_of_last("trunk_excursion")),
+    "drift": ("run", _drift),
+    "foot_travel": ("jump", _largest_of_last("foot_travel")),
+}
+"""Key of the paper's number -> kind of the table's rows that show it, and its value for a run."""
+JUMP_MEASURES: Final = tuple(key for key, (kind, _) in MEASURES.items() if kind != "period")
+"""Keys of the numbers that are about the jump."""
