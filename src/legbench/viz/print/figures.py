@@ -7,7 +7,7 @@ from legbench.metrics.source import Recorded
 from legbench.viz import style
 from legbench.viz.colouring import colouring_of
 from legbench.viz.drafts import require_rows
-from legbench.viz.facts import Facts, facts_of
+from legbench.viz.facts import facts_of
 from legbench.viz.names import names_of
 from legbench.viz.print._matplotlib import Figure, FigureCanvasAgg, styled
 from legbench.viz.print.legend import explain
