@@ -2,13 +2,13 @@
 
 import time
 from collections.abc import Hashable, Sequence
-from dataclasses import replace
 from typing import final
 
 import numpy as np
 
 from legbench.control import AbstractController, LegTargets, make_controllers
 from legbench.errors import ConfigError
+from legbench.experiment.alike import alike, runs_in_batch
 from legbench.experiment.data import Experiment
 from legbench.experiment.manifest import manifest_of
 from legbench.experiment.start import targets_of
@@ -45,7 +45,7 @@ def run_batch(
         ConfigError: another plant, limits, or settings that a leg refuses.
     """
     for place, each in enumerate(experiments):
-        if not isinstance(each.plant, SimChoice) or each.plant.limits is not None:
+        if not runs_in_batch(each):
             raise ConfigError(
                 f"experiment {place} of the batch is on plant '{each.plant.kind}'"
                 f"{' under limits' if isinstance(each.plant, SimChoice) else ''}; a batch runs on "
@@ -53,7 +53,7 @@ def run_batch(
             )
     groups: dict[Hashable, list[int]] = {}
     for place, each in enumerate(experiments):
-        groups.setdefault(_alike(each), []).append(place)
+        groups.setdefault(alike(each), []).append(place)
     made = [LegGroup([experiments[place] for place in group]) for group in groups.values()]
     total, done = sum(group.cycles for group in made), 0
     found: dict[int, Recording] = {}
@@ -62,17 +62,6 @@ def run_batch(
         done += group.cycles
         found |= zip(places, group.recordings(), strict=True)
     return [found[place] for place in range(len(experiments))]
-
-
-def _alike(experiment: Experiment) -> Hashable:
-    """What legs that are stepped together have in common: parts of the model, readings, columns."""
-    conventions = experiment.conventions
-    signals = experiment.controller.describe().signals
-    options, built = experiment.options, experiment.imperfections.leg_of(experiment.design)
-    # Alone each leg has the step that suits it, so that only legs of one step are company.
-    fitted = options.numerics.fitted([built], options.linkage)
-    alike = replace(options, numerics=fitted)
-    return alike, conventions.modal, conventions.setpoint, signals
 
 
 def start_together(experiments: Sequence[Experiment]) -> tuple[AbstractController, Start]:
