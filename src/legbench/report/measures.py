@@ -58,19 +58,23 @@ def measure(
         number: number of the paper.
         table: the table of a campaign; runs in it that are not sound do not count.
         reference: what ratings are about.
-        at: set point and deflection of the runs to take [rad]; those of the number by default. A
-            jump is measured whatever its set point, as the paper's can be read in several ways.
+        at: set point and deflection of the runs to take [rad]; those of the number by default. Of
+            jumps, whose set point can be read in several ways, any are taken if there are none.
     """
     found = MEASURES.get(number.key)
     if found is None:
         return None
     kind, of_run = found
     z2, dz2 = (number.z2, number.dz2) if at is None else at
+    rows = [
+        row
+        for row in rows_of(sound_runs(table), kind)
+        if row[SETUP] == number.setup and row[CONTROLLER] == number.controller
+    ]
+    there = [row for row in rows if _same(row[Z2], z2) and _same(row[DZ2], dz2)]
     runs: dict[str, list[Row]] = defaultdict(list)
-    for row in rows_of(sound_runs(table), kind):
-        here = row[SETUP] == number.setup and row[CONTROLLER] == number.controller
-        if here and (kind != "period" or (_same(row[Z2], z2) and _same(row[DZ2], dz2))):
-            runs[row["experiment"]].append(row)
+    for row in there or (rows if number.key in JUMP_MEASURES else ()):
+        runs[row["experiment"]].append(row)
     values = [of_run(rows, f"rating_{reference.value}") for rows in runs.values()]
     values = [value for value in values if math.isfinite(value)]
     if not values:

@@ -56,6 +56,15 @@ def _inlined(text: str, description: str) -> str:
     svg = re.sub(r' (width|height)="[0-9.]+pt"', "", svg, count=2)
     used = set(re.findall(r"#([\w-]+)", svg))
     svg = re.sub(r' id="([\w-]+)"', lambda each: each[0] if each[1] in used else "", svg)
+    svg = re.sub(r' d="([^"]*)"', _rounded, svg, flags=re.DOTALL)
     svg = svg.replace(INK, "currentColor")
     label = f'<svg role="img" aria-label="{escape(description, quote=True)}"'
     return svg.replace("<svg", label, 1).strip()
+
+
+def _rounded(path: re.Match[str]) -> str:
+    """Path with coordinates to a hundredth of a point, which no screen can tell apart."""
+    text = re.sub(
+        r"-?\d+\.\d+", lambda each: f"{float(each[0]):.2f}".rstrip("0").rstrip("."), path[1]
+    )
+    return f' d="{" ".join(text.split())}"'

@@ -24,7 +24,13 @@ ON_BOTH: Final = (0.22, 0.88)
 
 
 def draw_plane(
-    panel: Axes, points: Floats, colouring: Colouring, width: float, *, rasterized: bool = True
+    panel: Axes,
+    points: Floats,
+    colouring: Colouring,
+    width: float,
+    *,
+    faint: tuple[float, ...] | tuple[str, float] = FAINT,
+    step: int | None = None,
 ) -> None:
     """Draw the whole run faintly, the highlighted stretches over it.
 
@@ -33,11 +39,14 @@ def draw_plane(
         points: coordinates of every row (n, 2).
         colouring: which rows have which colour.
         width: width of the coloured lines [pt].
-        rasterized: whether lines are pixels in vector files, which else weigh megabytes.
+        faint: colour of the whole run.
+        step: number of rows from one point of a line to the next; none: every row, as pixels in
+            vector files, which else weigh megabytes.
     """
-    panel.plot(*points.T, color=FAINT, linewidth=0.5, zorder=1, rasterized=rasterized)
+    rasterized, every = step is None, step or 1
+    panel.plot(*points[::every].T, color=faint, linewidth=0.5, zorder=1, rasterized=rasterized)
     lines = LineCollection(
-        [points[stretch.first : stretch.stop + 1] for stretch in colouring.stretches],
+        [_thinned(points[each.first : each.stop + 1], every) for each in colouring.stretches],
         colors=[stretch.colour for stretch in colouring.stretches],
         linewidths=width,
         capstyle="round",
@@ -46,6 +55,11 @@ def draw_plane(
     )
     panel.add_collection(lines)
     panel.margins(0.06)
+
+
+def _thinned(points: Floats, every: int) -> Floats:
+    """Every so-manieth of some points, and the last one, so that lines meet."""
+    return points if every == 1 else np.concatenate([points[:-1:every], points[-1:]])
 
 
 def widen(panel: Axes, span: float) -> None:
