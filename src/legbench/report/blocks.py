@@ -123,9 +123,11 @@ def ratings_block(
     name: str, title: str, caption: str, curves: Sequence[RatingCurve], marks: Sequence[Mark]
 ) -> Block:
     """Six panels of Fig. 5, with the ratings that the paper prints."""
-    looks, lowest = looks_of(curves), lowest_of(curves, marks)
+    looks = looks_of(curves)
 
-    def draw(shown: Sequence[RatingCurve], printed: Sequence[Mark], panel: Axes) -> None:
+    def draw(
+        lowest: float, shown: Sequence[RatingCurve], printed: Sequence[Mark], panel: Axes
+    ) -> None:
         draw_ratings(panel, shown, looks, printed, INK)
         panel.set_ylim(lowest, 1.004)
         panel.set_xlabel("oscillation period")
@@ -135,8 +137,9 @@ def ratings_block(
     for place, (controller, kind) in enumerate(PANELS):
         words = f"{TITLES[kind]}, {WORDS[controller]}"
         shown = in_panel(curves, controller, kind), marks_in(marks, controller, kind)
+        lowest = lowest_of(curves, marks, controller)
         heard = f"{title}: rating of each oscillation period, {words}, {len(shown[0])} cells"
-        svg = panel_svg(f"{name}-{place}", heard, RATING_INCH, partial(draw, *shown))
+        svg = panel_svg(f"{name}-{place}", heard, RATING_INCH, partial(draw, lowest, *shown))
         panels.append(Panel(title=f"({'abcdef'[place]}) {words}", svg=svg))
     return Block(
         name=name, title=title, caption=caption, panels=tuple(panels), legend=_legend(looks, marks)

@@ -70,14 +70,14 @@ def blocks_of(
     jump = by_name["jump"]
     yield _planes(jump)
     title = "Fig. 7: one jump, from lower apex to lower apex"
-    stills = None
+    stills, why = None, jump.origin
     if jump.recording is not None:
         caption = (
-            f"{jump.settings}. Drawn from the recorded angles and the hip's path; dotted: lowest "
+            f"{jump.settings}. Drawn from the recorded angles and the path of the hip; dotted are "
+            "its lowest and highest place."
         )
-        caption += "and highest hip. Bars are drawn in their place, their length is not to scale."
         stills = stills_block("fig7", title, caption, jump.recording)
-    why = jump.origin if jump.recording is None else "no complete jump, or the hip is not known"
+        why = "no jump lies complete within the run, or the hip's height is not known"
     yield stills if stills is not None else without_panels("fig7", title, why)
 
 

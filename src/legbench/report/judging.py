@@ -67,10 +67,8 @@ def better_at(
     if not pairs:
         return None, f"no cell of both {names[0]} and {names[1]} has {period} rated periods"
     means = np.mean(pairs, axis=0)
-    cells = f"{len(pairs)} cell{'' if len(pairs) == 1 else 's'}"
-    return bool(means[0] - means[1] > VISIBLE), (
-        f"period {period}, {cells}: {names[0]} {means[0]:.3f}, {names[1]} {means[1]:.3f}"
-    )
+    words = f"{names[0]} {means[0]:.3f}, {names[1]} {means[1]:.3f}"
+    return bool(means[0] - means[1] > VISIBLE), f"period {period}, {_cells(len(pairs))}: {words}"
 
 
 def below(curves: Sequence[RatingCurve], lower: SetupKind, others: Sequence[SetupKind]) -> Judged:
@@ -88,7 +86,7 @@ def below(curves: Sequence[RatingCurve], lower: SetupKind, others: Sequence[Setu
         verdicts.append(theirs - ours > VISIBLE)
         words.append(
             f"{SETUP_NAMES[lower]} {ours:.3f}, {SETUP_NAMES[other]} {theirs:.3f} "
-            f"({len(shared)} cells)"
+            f"({_cells(len(shared))})"
         )
     return all(verdicts), "; ".join(words)
 
@@ -150,6 +148,10 @@ def _pairs(
         and _same(one.cell.z2, two.cell.z2)
         and _same(one.cell.dz2, two.cell.dz2)
     ]
+
+
+def _cells(count: int) -> str:
+    return f"{count} cell" if count == 1 else f"{count} cells"
 
 
 def _same(one: float, two: float) -> bool:

@@ -39,11 +39,12 @@ class Measured:
     """Number of runs."""
 
     def words(self, unit: str) -> str:
-        """The number, with its spread if there are several runs."""
-        text = measured_text(self.value, unit)
+        """The number, with its spread where the digits show one."""
+        text, spread = measured_text(self.value, unit), measured_text(self.spread, unit)
         if self.runs == 1:
             return text
-        return f"{text} ± {measured_text(self.spread, unit)} over {self.runs} runs"
+        shown = f" ± {spread}" if spread != measured_text(0.0, unit) else ""
+        return f"{text}{shown} over {self.runs} runs"
 
 
 def measure(

@@ -40,7 +40,7 @@ class Named:
     """Hash of the experiment; none: the campaign has no such run that is sound."""
     recording: Recording | None
     origin: str
-    """Where the recording comes from, or why there is none, in words."""
+    """Origin of the recording, or the reason why there is none, in words."""
 
 
 def named_experiments(

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from typing import Any, Final
 
@@ -12,7 +13,9 @@ from legbench.campaign.again import CAMPAIGN
 from legbench.campaign.curves import Cell, cell_of, rows_of, sound_runs, varying_axes
 from legbench.campaign.folder import SOURCE
 from legbench.campaign.table import PROVENANCE_KEY, read_table
+from legbench.metrics.soundness import Soundness
 from legbench.reading import LARGEST_JSON, UnreadableError, parse_json, read_file
+from legbench.recording.layout import COMPLETE
 
 IDEAL: Final = "ideal"
 EXPLAINED: Final = "explained"
@@ -88,14 +91,16 @@ def invalid_runs(table: pa.Table) -> tuple[InvalidRun, ...]:
 
 def _reason(row: Mapping[str, Any]) -> str:
     reasons = []
-    if row["status"] != "complete":
+    if row["status"] != COMPLETE:
         cause = f" ({row['cause']})" if row["cause"] else ""
         reasons.append(f"{row['status']}{cause} after {row['length']:.3g} s")
-    if row["numerics"] == "unsound":
-        reasons.append(
-            f"numerics unsound: energy residual {row['energy_residual']:.2g}, loop gap "
-            f"{1e6 * row['loop_gap_max']:.2g} um"
+    if row["numerics"] == Soundness.UNSOUND:
+        values = (
+            ("energy residual", row["energy_residual"], ""),
+            ("loop gap", 1e6 * row["loop_gap_max"], " um"),
         )
+        known = [f"{name} {value:.2g}{unit}" for name, value, unit in values if isfinite(value)]
+        reasons.append(f"numerics unsound: {', '.join(known)}")
     return "; ".join(reasons)
 
 

@@ -102,10 +102,12 @@ def draw_ratings(
     panel.locator_params(axis="y", nbins=6)
 
 
-def lowest_of(curves: Sequence[RatingCurve], marks: Sequence[Mark]) -> float:
-    """Lower end of an axis that shows these curves and marks [-]."""
-    lows = [float((curve.mean - curve.spread).min()) for curve in curves]
-    lowest = min([*lows, *(mark.rating for mark in marks), 0.95])
+def lowest_of(curves: Sequence[RatingCurve], marks: Sequence[Mark], controller: str) -> float:
+    """Lower end of an axis that shows all curves and marks of a controller [-]."""
+    shown = [curve for curve in curves if curve.cell.controller == controller]
+    lows = [float((curve.mean - curve.spread).min()) for curve in shown if len(curve.mean)]
+    printed = [mark.rating for mark in marks if mark.controller == controller]
+    lowest = min([*lows, *printed, 0.95])
     return max(0.0, GRAIN * np.floor(lowest / GRAIN - 0.5))
 
 
@@ -131,13 +133,12 @@ def ratings_figure(curves: Sequence[RatingCurve], marks: Sequence[Mark], title: 
     with styled():
         figure = Figure(figsize=SIZE_INCH, layout="constrained")
         FigureCanvasAgg(figure)
-        lowest = lowest_of(curves, marks)
         for place, (controller, kind) in enumerate(PANELS):
             panel = figure.add_subplot(2, 3, place + 1)
             panel.set_title(f"({'abcdef'[place]}) {TITLES[kind]}, {WORDS[controller]}", loc="left")
             shown = in_panel(curves, controller, kind), marks_in(marks, controller, kind)
             draw_ratings(panel, shown[0], looks, shown[1], "black")
-            panel.set_ylim(lowest, 1.004)
+            panel.set_ylim(lowest_of(curves, marks, controller), 1.004)
             panel.set_xlabel("oscillation period")
             panel.set_ylabel("$P^r$")
         figure.legend(handles=_handles(looks), loc="outside lower center", ncols=5, frameon=False)
