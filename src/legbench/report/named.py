@@ -13,6 +13,7 @@ from legbench.campaign.curves import CONTROLLER, DZ2, SETUP, Z2, rows_of, sound_
 from legbench.campaign.records import RECORDS
 from legbench.errors import CampaignError, RecordingError
 from legbench.experiment.run import run
+from legbench.experiment.writing import flat
 from legbench.loop import Progress
 from legbench.paper import Published
 from legbench.recording.reader import Recording, load
@@ -41,6 +42,12 @@ class Named:
     recording: Recording | None
     origin: str
     """Origin of the recording, or the reason why there is none, in words."""
+
+    @property
+    def entries(self) -> tuple[str, ...]:
+        """Every setting of the experiment as `dotted.key = value`, from its recording."""
+        told = {} if self.recording is None else self.recording.manifest.get("experiment", {})
+        return tuple(f"{key} = {value}" for key, value in sorted(flat(told).items()))
 
 
 def named_experiments(

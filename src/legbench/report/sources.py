@@ -59,14 +59,19 @@ class InvalidRun:
     reason: str
 
 
-def read_source(name: str, folder: Path) -> Source:
+def read_source(name: str, folder: Path | str) -> Source:
     """Read the campaign in a folder.
+
+    Args:
+        name: name of its column, `ideal`, `explained` or `bench`.
+        folder: the folder, with at least the table.
 
     Raises:
         ConfigError: it has no table, or has not come to its end.
         FormatError: another version wrote the table.
         RecordingError: the table is damaged.
     """
+    folder = Path(folder)
     told = _json(folder / CAMPAIGN)
     return Source(
         name=name, folder=folder, table=read_table(folder), told=told, source=_text(folder / SOURCE)

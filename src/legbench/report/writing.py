@@ -31,7 +31,7 @@ class Written:
 
 def write_report(
     sources: Sequence[Source],
-    out: Path,
+    out: Path | str,
     *,
     suffixes: Sequence[str] = (),
     progress: Progress | None = None,
@@ -52,7 +52,7 @@ def write_report(
     """
     if not sources:
         raise ConfigError("a report needs a campaign")
-    numbers = published()
+    out, numbers = Path(out), published()
     named = named_experiments(sources[0], numbers, progress)
     judged = judge(sources, numbers)
     html = page_html(sources, judged, tuple(blocks_of(sources, named, numbers)), named)

@@ -91,9 +91,8 @@ def draw_ratings(
             low, high = curve.mean - curve.spread, np.minimum(curve.mean + curve.spread, 1.0)
             panel.fill_between(periods, low, high, color=ink, alpha=0.16, linewidth=0, zorder=1)
     for mark in marks:
-        last = mark.first if mark.last is None and mark.first == longest else mark.last
-        ends = [mark.first, longest if last is None else last]
-        look = "x" if ends[0] == ends[1] else "-"
+        ends = [mark.first, max(longest, mark.first) if mark.last is None else mark.last]
+        look = "x" if mark.first == mark.last else "-"
         panel.plot(
             ends, [mark.rating] * 2, look, color=colour, markersize=6, linewidth=1.4, zorder=4
         )
