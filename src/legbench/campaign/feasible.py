@@ -1,6 +1,5 @@
 """Cells that a leg cannot do, found before anything runs, each with the nearest it could."""
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -112,9 +111,10 @@ def _border(
         else:
             near = middle
     exact = value + sense * far
-    step = 10.0**-DIGITS
-    rounded = round((math.floor if sense < 0.0 else math.ceil)(exact / step) * step, DIGITS)
-    return rounded if feasible(rounded) else exact
+    for digits in (round(exact, DIGITS), round(exact + sense * 10.0**-DIGITS, DIGITS)):
+        if feasible(digits):
+            return digits
+    return exact
 
 
 def _field(experiment: Experiment, key: str) -> object:

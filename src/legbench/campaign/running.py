@@ -97,7 +97,7 @@ def run_campaign(
         missing = [shard for shard in mine if not _kept(folder, shard, kept)]
         failures = _run(missing, mine, folder, executor, kept, stop or StopFlag(), progress, note)
         there = [shard for shard in shards if is_done(folder, shard)]
-        table = _assembled(plan, folder, shards) if len(there) == len(shards) else None
+        table = assembled(plan, folder, shards) if len(there) == len(shards) else None
     found = {shard.name for shard in there}
     done = sum(len(shard.planned) for shard in mine if shard.name in found)
     wanted = sum(len(shard.planned) for shard in mine)
@@ -194,7 +194,7 @@ class _Clock:
             self._progress(self._done, self._total, left)
 
 
-def _assembled(plan: Plan, folder: Path, shards: Sequence[Shard]) -> Path:
+def assembled(plan: Plan, folder: Path, shards: Sequence[Shard]) -> Path:
     """Write the table of all shards and return its path."""
     with assembling(folder):
         made: set[bytes] = set()

@@ -120,7 +120,9 @@ def _changes(flags: CampaignArguments) -> dict[str, Any]:
     changes = dict(parse_setting(text) for text in flags.set)
     if flags.plant is not None:
         if flags.shard is not None or flags.executor != "local":
-            raise ConfigError("a bench runs one experiment after another: leave --shard and")
+            raise ConfigError(
+                "a bench runs one experiment after another: leave --shard and --executor out"
+            )
         changes |= {"plant.kind": flags.plant, "plant.settings.bus": str(flags.bus.resolve())}
         for name in ("interface", "channel"):
             if getattr(flags, name) is not None:
@@ -161,7 +163,7 @@ def _on_bench(plan: "Plan", out: Path, flags: CampaignArguments) -> int:
     from legbench.campaign.bench import run_on_bench
     from legbench.interrupts import stop_on_interrupt
 
-    with stop_on_interrupt(raises=True) as stop:
+    with stop_on_interrupt() as stop:
         finished = run_on_bench(
             plan, out, pause=flags.pause, stop=stop, progress=progress, note=report_error
         )
