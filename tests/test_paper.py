@@ -4,7 +4,7 @@ import pytest
 
 from legbench.design import load_design
 from legbench.errors import ConfigError
-from legbench.paper import COLUMNS, PAPER, Comparison, published
+from legbench.paper import COLUMNS, PAPER, Relation, published
 
 MODELS = Path(__file__).parents[1] / "models"
 ROW = "rating,0.9,1,>,ffs,bang-bang,1.0,0.1,a rating,VI,Fig. 5,more than 0.9"
@@ -42,7 +42,7 @@ def test_every_number_says_where_it_stands() -> None:
     assert {number.section for number in numbers.values()} == {"V", "VI-B", "VI-C"}
     assert numbers["step_rating_6"].place == "section VI-B, Fig. 4"
     assert numbers["control_rate"].place == "section V"
-    assert numbers["jump_rating_flight"].comparison is Comparison.MORE
+    assert numbers["jump_rating_flight"].comparison is Relation.MORE
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,7 @@ LARGEST: Final = 1_000_000
 """Largest file of published numbers that is read [bytes]; the paper's has a hundredth of it."""
 
 
-class Comparison(StrEnum):
+class Relation(StrEnum):
     """Relation of what was measured to the number that the paper prints."""
 
     EQUAL = "="
@@ -45,7 +45,7 @@ class Published:
     value: float
     unit: str
     """SI unit; `1` for a ratio or a count."""
-    comparison: Comparison
+    comparison: Relation
     setup: SetupKind | None
     """Setup that it is about; none: every setup, or the leg itself."""
     controller: str | None
@@ -107,7 +107,7 @@ def _parse(row: list[str]) -> Published:
     if len(row) != len(COLUMNS):
         raise ValueError(f"{len(row)} cells; there are {len(COLUMNS)} columns")
     cells = dict(zip(COLUMNS, row, strict=True))
-    for key, known in (("comparison", Comparison), ("setup", ("", *SetupKind))):
+    for key, known in (("comparison", Relation), ("setup", ("", *SetupKind))):
         if cells[key] not in tuple(known):
             raise ValueError(
                 f"{key} is {cells[key]!r}; choose from {', '.join(filter(None, known))}"
@@ -116,7 +116,7 @@ def _parse(row: list[str]) -> Published:
         key=cells["key"],
         value=float(cells["value"]),
         unit=cells["unit"],
-        comparison=Comparison(cells["comparison"]),
+        comparison=Relation(cells["comparison"]),
         setup=SetupKind(cells["setup"]) if cells["setup"] else None,
         controller=cells["controller"] or None,
         z2=float(cells["z2"]) if cells["z2"] else None,

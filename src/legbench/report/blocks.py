@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final
 
-from legbench.campaign.curves import RatingCurve
 from legbench.metrics.analysis import Analysis, analysed
 from legbench.metrics.source import Recorded
 from legbench.viz import style
@@ -15,19 +14,7 @@ from legbench.viz.print._matplotlib import Axes
 from legbench.viz.print.inline import INK, panel_svg
 from legbench.viz.print.overlay import planes_of
 from legbench.viz.print.planes import PLANES, draw_modes, draw_plane, on_both_grounds, widen
-from legbench.viz.print.ratings import (
-    PANELS,
-    TITLES,
-    WORDS,
-    Dashes,
-    Looks,
-    Mark,
-    draw_ratings,
-    in_panel,
-    looks_of,
-    lowest_of,
-    marks_in,
-)
+from legbench.viz.print.ratings import Dashes, Looks, RatingPanel, draw_ratings, looks_of
 from legbench.viz.print.stills import Still, draw_still, stills_of
 
 PLANE_INCH: Final = (3.5, 3.0)
@@ -55,7 +42,7 @@ class Swatch:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Panel:
+class BlockPanel:
     """Panel of a figure."""
 
     title: str
@@ -69,7 +56,7 @@ class Block:
     name: str
     title: str
     caption: str
-    panels: tuple[Panel, ...] = ()
+    panels: tuple[BlockPanel, ...] = ()
     legend: tuple[Swatch, ...] = ()
     scale: tuple[str, ...] = ()
     """Colours of the oscillation periods, first to last."""
@@ -99,7 +86,7 @@ def planes_block(name: str, title: str, caption: str, recording: Recorded) -> Bl
     for place, (title_of_plane, _, _) in enumerate(PLANES):
         heard = f"{title}: {title_of_plane}, {AXES[place][1]} over {AXES[place][0]}"
         svg = panel_svg(f"{name}-{place}", heard, PLANE_INCH, partial(draw, place))
-        panels.append(Panel(title=f"({'abc'[place]}) {title_of_plane}", svg=svg))
+        panels.append(BlockPanel(title=f"({'abc'[place]}) {title_of_plane}", svg=svg))
     modes = (
         Swatch(label="w₁, polar mode", colour=_css(style.unit(style.MODE_1)), dashes="5 2"),
         Swatch(label="w₂, radial mode", colour=_css(style.unit(style.MODE_2)), dashes="5 2"),
@@ -119,31 +106,24 @@ def planes_block(name: str, title: str, caption: str, recording: Recorded) -> Bl
     )
 
 
-def ratings_block(
-    name: str, title: str, caption: str, curves: Sequence[RatingCurve], marks: Sequence[Mark]
-) -> Block:
-    """Six panels of Fig. 5, with the ratings that the paper prints."""
-    looks = looks_of(curves)
+def ratings_block(name: str, title: str, caption: str, contents: Sequence[RatingPanel]) -> Block:
+    """Panels of Fig. 5, with the ratings that the paper prints."""
+    looks = looks_of(contents)
 
-    def draw(
-        lowest: float, shown: Sequence[RatingCurve], printed: Sequence[Mark], panel: Axes
-    ) -> None:
-        draw_ratings(panel, shown, looks, printed, INK)
-        panel.set_ylim(lowest, 1.004)
+    def draw(content: RatingPanel, panel: Axes) -> None:
+        draw_ratings(panel, content, looks, INK)
         panel.set_xlabel("oscillation period")
         panel.set_ylabel("Pʳ")
 
     panels = []
-    for place, (controller, kind) in enumerate(PANELS):
-        words = f"{TITLES[kind]}, {WORDS[controller]}"
-        shown = in_panel(curves, controller, kind), marks_in(marks, controller, kind)
-        lowest = lowest_of(curves, marks, controller)
-        heard = f"{title}: rating of each oscillation period, {words}, {len(shown[0])} cells"
-        svg = panel_svg(f"{name}-{place}", heard, RATING_INCH, partial(draw, lowest, *shown))
-        panels.append(Panel(title=f"({'abcdef'[place]}) {words}", svg=svg))
-    return Block(
-        name=name, title=title, caption=caption, panels=tuple(panels), legend=_legend(looks, marks)
-    )
+    for place, content in enumerate(contents):
+        heard = f"{title}: rating of each oscillation period, {content.title}, "
+        heard += f"{len(content.curves)} cells"
+        svg = panel_svg(f"{name}-{place}", heard, RATING_INCH, partial(draw, content))
+        panels.append(BlockPanel(title=content.title, svg=svg))
+    printed = any(content.printed for content in contents)
+    legend = _legend(looks, printed)
+    return Block(name=name, title=title, caption=caption, panels=tuple(panels), legend=legend)
 
 
 def stills_block(name: str, title: str, caption: str, recording: Recorded) -> Block | None:
@@ -160,7 +140,7 @@ def stills_block(name: str, title: str, caption: str, recording: Recorded) -> Bl
         state = "stance" if still.stance else "flight"
         heard = f"the leg {1e3 * still.time:.0f} ms after the lower apex, in {state}"
         svg = panel_svg(f"{name}-{place}", heard, STILL_INCH, partial(draw, still))
-        panels.append(Panel(title=f"{1e3 * still.time:.0f} ms", svg=svg))
+        panels.append(BlockPanel(title=f"{1e3 * still.time:.0f} ms", svg=svg))
     return Block(
         name=name,
         title=title,
@@ -197,21 +177,16 @@ def _step(run: Analysis) -> int:
     return max(1, round(1.0 / (LINE_RATE * period)))
 
 
-def _legend(looks: Looks, marks: Sequence[Mark]) -> tuple[Swatch, ...]:
+def _legend(looks: Looks, printed: bool) -> tuple[Swatch, ...]:
     found = [
         Swatch(label=f"z₂ = {z2:g} rad", colour=_css(colour))
         for z2, colour in looks.colours.items()
     ]
-    for controller, dashes in looks.dashes.items():
-        found += [
-            Swatch(
-                label=f"{WORDS[controller]}, |Δz₂| = {size:g} rad",
-                colour="currentColor",
-                dashes=_svg_dashes(look),
-            )
-            for size, look in dashes.items()
-        ]
-    if marks:
+    for group, dashes in looks.dashes.items():
+        for size, look in dashes.items():
+            label = f"{group}, |Δz₂| = {size:g} rad"
+            found.append(Swatch(label=label, colour="currentColor", dashes=_svg_dashes(look)))
+    if printed:
         found.append(Swatch(label="printed in the paper", colour="currentColor", point=True))
     return tuple(found)
 

@@ -15,12 +15,14 @@ from legbench.report.blocks import (
     stills_block,
     without_panels,
 )
+from legbench.report.judging import SETUP_NAMES
 from legbench.report.measures import TRANSIENT
 from legbench.report.named import Named
 from legbench.report.sources import Source
+from legbench.report.trends import BANG_BANG, STEP, THREE
 from legbench.viz.print._matplotlib import Figure
 from legbench.viz.print.figures import phase_figure
-from legbench.viz.print.ratings import Mark, ratings_figure
+from legbench.viz.print.ratings import PrintedRating, RatingPanel, ratings_figure
 from legbench.viz.print.stills import stills_figure
 
 TITLES: Final = {
@@ -29,6 +31,8 @@ TITLES: Final = {
     "jump": "Fig. 6: the last three jumps",
 }
 """Titles of the figures of named experiments."""
+GROUPS: Final = {STEP: "step", BANG_BANG: "bang-bang"}
+"""Word for each controller of Fig. 5."""
 ABOUT: Final = {
     Reference.EQUILIBRIUM: "Gravity's sag is no deflection here. It is the reference that the "
     "paper's figures can be about.",
@@ -38,23 +42,42 @@ ABOUT: Final = {
 """What each reference of the rating means, in words."""
 
 
-def marks_of(numbers: Mapping[str, Published]) -> tuple[Mark, ...]:
-    """Ratings that the paper prints for single cells of Fig. 5."""
+def rating_panels(
+    source: Source, reference: Reference, numbers: Mapping[str, Published]
+) -> tuple[RatingPanel, ...]:
+    """Panels (a) to (f) of Fig. 5; none where the campaign has no sound run with rated periods."""
+    curves = rating_curves(source.table, reference)
+    if not curves:
+        return ()
+    printed = _printed(numbers)
+    kinds = [(controller, kind) for controller in (STEP, BANG_BANG) for kind in THREE]
+    return tuple(
+        RatingPanel(
+            title=f"({letter}) {SETUP_NAMES[kind]}, {GROUPS[controller]}",
+            group=GROUPS[controller],
+            curves=tuple(
+                each
+                for each in curves
+                if each.cell.controller == controller and each.cell.setup == kind
+            ),
+            printed=printed[controller] if kind is SetupKind.FFS else (),
+        )
+        for letter, (controller, kind) in zip("abcdef", kinds, strict=True)
+    )
+
+
+def _printed(numbers: Mapping[str, Published]) -> dict[str, tuple[PrintedRating, ...]]:
+    """Ratings that the paper prints of a fixed foot, by controller."""
     first, last, level = (
-        numbers[key] for key in ("step_rating_1", "step_rating_6", "bang_bang_rating")
+        numbers[key].value for key in ("step_rating_1", "step_rating_6", "bang_bang_rating")
     )
-    step = [
-        Mark(controller="position-jump", setup=SetupKind.FFS, first=n, last=n, rating=each.value)
-        for n, each in ((1, first), (6, last))
-    ]
-    sustained = Mark(
-        controller="bang-bang",
-        setup=SetupKind.FFS,
-        first=TRANSIENT + 1,
-        last=None,
-        rating=level.value,
-    )
-    return (*step, sustained)
+    return {
+        STEP: (
+            PrintedRating(first=1, last=1, rating=first),
+            PrintedRating(first=6, last=6, rating=last),
+        ),
+        BANG_BANG: (PrintedRating(first=TRANSIENT + 1, last=None, rating=level),),
+    }
 
 
 def blocks_of(
@@ -91,16 +114,16 @@ def _planes(named: Named) -> Block:
 
 
 def _ratings(source: Source, reference: Reference, numbers: Mapping[str, Published]) -> Block:
-    curves = rating_curves(source.table, reference)
+    panels = rating_panels(source, reference, numbers)
     title = f"Fig. 5, {source.name}: P^r about the {reference.value}"
     name = f"ratings-{source.name}-{reference.value}"
-    if not curves:
+    if not panels:
         return without_panels(name, title, "no sound run has a rated period")
     caption = (
         f"P^r of each oscillation period: mean over the trials, in a band of one standard "
         f"deviation where they differ. {ABOUT[reference]}"
     )
-    return ratings_block(name, title, caption, curves, marks_of(numbers))
+    return ratings_block(name, title, caption, panels)
 
 
 def print_figures(
@@ -113,10 +136,9 @@ def print_figures(
             yield file, phase_figure(recording)
     for source in sources:
         for reference in Reference:
-            if curves := rating_curves(source.table, reference):
+            if panels := rating_panels(source, reference, numbers):
                 title = f"{source.title}: $P^r$ about the {reference.value}"
-                figure = ratings_figure(curves, marks_of(numbers), title)
-                yield f"fig5-{source.name}-{reference.value}", figure
+                yield f"fig5-{source.name}-{reference.value}", ratings_figure(panels, title)
     jump = recordings["jump"]
     if jump is not None and (figure := stills_figure(jump)) is not None:
         yield "fig7", figure

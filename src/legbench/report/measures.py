@@ -12,7 +12,7 @@ import pyarrow as pa
 from legbench.campaign.curves import CONTROLLER, DZ2, SETUP, Z2, rows_of, sound_runs
 from legbench.metrics.jump import LAST
 from legbench.metrics.source import Reference
-from legbench.paper import Comparison, Published
+from legbench.paper import Published, Relation
 
 RATING_WITHIN: Final = 0.02
 """Distance within which a rating agrees with the paper's [-]: two units of its last digit."""
@@ -85,9 +85,9 @@ def measure(
 
 def agrees(number: Published, value: float) -> bool:
     """Whether a measured value agrees with what the paper prints."""
-    if number.comparison is Comparison.MORE:
+    if number.comparison is Relation.MORE:
         return value > number.value
-    if number.comparison is Comparison.LESS:
+    if number.comparison is Relation.LESS:
         return value < number.value
     rating = number.key in MEASURES and number.unit == "1"
     within = RATING_WITHIN if rating else SHARE_WITHIN * abs(number.value)
@@ -96,7 +96,7 @@ def agrees(number: Published, value: float) -> bool:
 
 def published_text(number: Published) -> str:
     """A number of the paper as it prints it, in millimetres if it is a length."""
-    sign = "" if number.comparison is Comparison.EQUAL else f"{number.comparison.value} "
+    sign = "" if number.comparison is Relation.EQUAL else f"{number.comparison.value} "
     if number.unit == "m":
         return f"{sign}{1e3 * number.value:g} mm"
     return f"{sign}{number.value:g}" + ("" if number.unit == "1" else f" {number.unit}")

@@ -35,7 +35,7 @@ RULES: Final = (
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Verdict:
+class Judgement:
     """Verdict of one campaign on a statement, about one reference or whatever it is."""
 
     source: str
@@ -49,7 +49,7 @@ class Statement:
     """Statement of the paper with the verdicts of all campaigns; of each the headline first."""
 
     trend: Trend
-    verdicts: tuple[Verdict, ...]
+    verdicts: tuple[Judgement, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,7 +73,7 @@ class Judged:
 
 def judge(sources: Sequence[Source], numbers: Mapping[str, Published]) -> Judged:
     """Judge the paper's statements and measure its numbers in each campaign."""
-    found: dict[str, list[Verdict]] = {}
+    found: dict[str, list[Judgement]] = {}
     first: dict[str, Trend] = {}
     for source in sources:
         by = {each: judge_trends(source.table, numbers, each) for each in Reference}
@@ -89,14 +89,14 @@ def judge(sources: Sequence[Source], numbers: Mapping[str, Published]) -> Judged
     )
 
 
-def _verdicts(source: str, equilibrium: Trend, motor: Trend) -> Iterator[Verdict]:
+def _verdicts(source: str, equilibrium: Trend, motor: Trend) -> Iterator[Judgement]:
     """Verdicts about both references, that of the headline first; one where they are the same."""
     if equilibrium == motor:
-        yield Verdict(source=source, about="", trend=equilibrium)
+        yield Judgement(source=source, about="", trend=equilibrium)
         return
     both = [("equilibrium", equilibrium), ("motor", motor)]
     for about, trend in reversed(both) if equilibrium.key in JUMP_MEASURES else both:
-        yield Verdict(source=source, about=about, trend=trend)
+        yield Judgement(source=source, about=about, trend=trend)
 
 
 def headlines(judged: Judged, source: str) -> list[Trend]:

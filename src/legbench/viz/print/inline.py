@@ -3,14 +3,14 @@
 import re
 from collections.abc import Callable
 from html import escape
-from io import StringIO
-from typing import Final
+from typing import Any, Final
 
 from legbench.viz.print._matplotlib import Axes, Figure, FigureCanvasAgg, rc_context, styled
+from legbench.viz.print.save import svg_text
 
 INK: Final = "#010203"
 """Colour that stands for the page's text colour: nothing else is drawn in it."""
-PAGE_STYLE: Final = {
+PAGE_STYLE: Final[dict[Any, Any]] = {
     "text.color": INK,
     "axes.edgecolor": INK,
     "axes.labelcolor": INK,
@@ -25,7 +25,6 @@ PAGE_STYLE: Final = {
     "grid.alpha": 0.10,
     "grid.linewidth": 0.6,
 }
-NO_METADATA: Final = {"Date": None, "Creator": None, "Format": None, "Type": None}
 
 
 def panel_svg(
@@ -43,9 +42,8 @@ def panel_svg(
         figure = Figure(figsize=size, layout="constrained")
         FigureCanvasAgg(figure)
         draw(figure.add_subplot())
-        stream = StringIO()
-        figure.savefig(stream, format="svg", transparent=True, metadata=NO_METADATA)
-    return _inlined(stream.getvalue(), description)
+        text = svg_text(figure)
+    return _inlined(text, description)
 
 
 def _inlined(text: str, description: str) -> str:

@@ -2,44 +2,49 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
 from legbench.campaign.curves import RatingCurve
-from legbench.design.setup import SetupKind
 from legbench.viz import style
 from legbench.viz.print._matplotlib import Axes, Figure, FigureCanvasAgg, Line2D, styled
 
 Colour = tuple[float, float, float]
-Dashes = tuple[float, tuple[float, ...]] | str
+Dashes = tuple[float, tuple[float, ...]] | Literal["solid"]
 
-SIZE_INCH: Final = (10.0, 6.2)
-"""Width and height of the figure [inch]."""
+WIDTH_INCH, ROW_INCH, LEGEND_INCH = 10.0, 2.7, 0.8
+"""Width of the figure, heights of a row of panels and of the legend [inch]."""
+COLUMNS: Final = 3
+"""Number of panels in a row: one for each setup."""
 GRAIN: Final = 0.02
 """Grain of the lower end of the axis of ratings [-]."""
+HIGHEST: Final = 0.95
+"""Highest lower end of that axis [-]: noise of ratings near one fills no panel."""
 DASHES: Final[tuple[Dashes, ...]] = ("solid", (0.0, (5.0, 2.0)), (0.0, (1.5, 1.5)))
 """Dashes of the deflections in turn, from the smallest on."""
-PANELS: Final = tuple(
-    (controller, kind)
-    for controller in ("position-jump", "bang-bang")
-    for kind in (SetupKind.HFTS, SetupKind.VFTS, SetupKind.FFS)
-)
-"""Controller and setup of the panels (a) to (f)."""
-TITLES: Final = {SetupKind.HFTS: "hFTS", SetupKind.VFTS: "vFTS", SetupKind.FFS: "FFS"}
-WORDS: Final = {"position-jump": "step", "bang-bang": "bang-bang"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Mark:
-    """Rating that the paper prints, drawn in a panel: a point, or a level from `first` on."""
+class PrintedRating:
+    """Rating that the paper prints: of one period, or a level from one on."""
 
-    controller: str
-    setup: SetupKind
     first: int
+    """First period that it is about."""
     last: int | None
-    """Last period of a level; none: to the end of the panel."""
+    """Last period; none: the last of the panel."""
     rating: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RatingPanel:
+    """Content of one panel."""
+
+    title: str
+    group: str
+    """Word for the controller; panels of one group share dashes and the axis of ratings."""
+    curves: tuple[RatingCurve, ...]
+    printed: tuple[PrintedRating, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,114 +54,97 @@ class Looks:
     colours: dict[float, Colour]
     """Colour by set point z2 [rad]."""
     dashes: dict[str, dict[float, Dashes]]
-    """Dashes by controller, and by deflection dz2 [rad]."""
+    """Dashes by group, and by size of the deflection dz2 [rad]."""
+    lowest: dict[str, float]
+    """Lower end of the axis of ratings by group [-]."""
 
 
-def looks_of(curves: Sequence[RatingCurve]) -> Looks:
-    """Choose a colour for each set point, and dashes for each deflection of a controller."""
-    z2 = sorted({curve.cell.z2 for curve in curves})
+def looks_of(panels: Sequence[RatingPanel]) -> Looks:
+    """Choose a colour for each set point, dashes for each deflection, and axes for each group."""
+    z2 = sorted({curve.cell.z2 for panel in panels for curve in panel.curves})
     palette = style.COMPONENTS
     colours = {value: style.unit(palette[n % len(palette)]) for n, value in enumerate(z2)}
     dashes: dict[str, dict[float, Dashes]] = {}
-    for controller in WORDS:
-        sizes = sorted({abs(c.cell.dz2) for c in curves if c.cell.controller == controller})
-        dashes[controller] = {size: DASHES[n % len(DASHES)] for n, size in enumerate(sizes)}
-    return Looks(colours=colours, dashes=dashes)
+    lowest: dict[str, float] = {}
+    for group in dict.fromkeys(panel.group for panel in panels):
+        shown = [panel for panel in panels if panel.group == group]
+        sizes = sorted({abs(curve.cell.dz2) for panel in shown for curve in panel.curves})
+        dashes[group] = {size: DASHES[n % len(DASHES)] for n, size in enumerate(sizes)}
+        lowest[group] = _lowest(shown)
+    return Looks(colours=colours, dashes=dashes, lowest=lowest)
 
 
-def draw_ratings(
-    panel: Axes,
-    curves: Sequence[RatingCurve],
-    looks: Looks,
-    marks: Sequence[Mark],
-    colour: str | Colour,
-) -> None:
+def _lowest(panels: Sequence[RatingPanel]) -> float:
+    """Lower end of an axis that shows all curves and printed ratings of some panels [-]."""
+    lows = [float((c.mean - c.spread).min()) for p in panels for c in p.curves if len(c.mean)]
+    printed = [each.rating for panel in panels for each in panel.printed]
+    lowest = min([*lows, *printed, HIGHEST])
+    return max(0.0, GRAIN * float(np.floor(lowest / GRAIN - 0.5)))
+
+
+def draw_ratings(panel: Axes, content: RatingPanel, looks: Looks, colour: str) -> None:
     """Draw the curves of one panel, with bands of their spread, and what the paper prints there.
 
     Args:
         panel: where to draw.
-        curves: curves of one controller and setup.
-        looks: colours and dashes.
-        marks: ratings of the paper that belong there.
-        colour: colour of the marks.
+        content: curves and printed ratings.
+        looks: colours, dashes and axes.
+        colour: colour of the printed ratings.
     """
-    longest = max((len(curve.mean) for curve in curves), default=1)
-    for curve in curves:
+    longest = max((len(curve.mean) for curve in content.curves), default=1)
+    for curve in content.curves:
         periods = np.arange(1, len(curve.mean) + 1)
         ink = looks.colours[curve.cell.z2]
-        dashes = looks.dashes[curve.cell.controller][abs(curve.cell.dz2)]
+        dashes = looks.dashes[content.group][abs(curve.cell.dz2)]
         panel.plot(periods, curve.mean, color=ink, linestyle=dashes, linewidth=1.2, zorder=3)
         panel.plot(periods, curve.mean, ".", color=ink, markersize=3.5, zorder=3)
         if curve.spread.any():
             low, high = curve.mean - curve.spread, np.minimum(curve.mean + curve.spread, 1.0)
             panel.fill_between(periods, low, high, color=ink, alpha=0.16, linewidth=0, zorder=1)
-    for mark in marks:
-        ends = [mark.first, max(longest, mark.first) if mark.last is None else mark.last]
-        look = "x" if mark.first == mark.last else "-"
-        panel.plot(
-            ends, [mark.rating] * 2, look, color=colour, markersize=6, linewidth=1.4, zorder=4
-        )
-    panel.set_xlim(0.5, max(longest, *(mark.first for mark in marks), 6) + 0.5)
+    for each in content.printed:
+        ends = [each.first, max(longest, each.first) if each.last is None else each.last]
+        look = "x" if each.first == each.last else "-"
+        at = [each.rating] * 2
+        panel.plot(ends, at, look, color=colour, markersize=6, linewidth=1.4, zorder=4)
+    panel.set_xlim(0.5, max(longest, *(each.first for each in content.printed), 6) + 0.5)
+    panel.set_ylim(looks.lowest[content.group], 1.004)
     panel.locator_params(axis="x", nbins=8, integer=True)
     panel.locator_params(axis="y", nbins=6)
 
 
-def lowest_of(curves: Sequence[RatingCurve], marks: Sequence[Mark], controller: str) -> float:
-    """Lower end of an axis that shows all curves and marks of a controller [-]."""
-    shown = [curve for curve in curves if curve.cell.controller == controller]
-    lows = [float((curve.mean - curve.spread).min()) for curve in shown if len(curve.mean)]
-    printed = [mark.rating for mark in marks if mark.controller == controller]
-    lowest = min([*lows, *printed, 0.95])
-    return max(0.0, GRAIN * np.floor(lowest / GRAIN - 0.5))
-
-
-def in_panel(curves: Sequence[RatingCurve], controller: str, setup: SetupKind) -> list[RatingCurve]:
-    """Curves that belong to one panel."""
-    return [c for c in curves if c.cell.controller == controller and c.cell.setup == setup]
-
-
-def marks_in(marks: Sequence[Mark], controller: str, setup: SetupKind) -> list[Mark]:
-    """Marks that belong to one panel."""
-    return [each for each in marks if each.controller == controller and each.setup is setup]
-
-
-def ratings_figure(curves: Sequence[RatingCurve], marks: Sequence[Mark], title: str) -> Figure:
-    """Six panels, steps above and bang-bang below, one column for each setup.
+def ratings_figure(panels: Sequence[RatingPanel], title: str) -> Figure:
+    """All panels in rows of three, with one legend.
 
     Args:
-        curves: curves of all cells.
-        marks: ratings of the paper, drawn in black.
+        panels: panels in order; printed ratings are drawn in black.
         title: title of the figure, which says what the rating is about.
     """
-    looks = looks_of(curves)
+    looks, rows = looks_of(panels), -(-len(panels) // COLUMNS)
     with styled():
-        figure = Figure(figsize=SIZE_INCH, layout="constrained")
+        size = (WIDTH_INCH, ROW_INCH * rows + LEGEND_INCH)
+        figure = Figure(figsize=size, layout="constrained")
         FigureCanvasAgg(figure)
-        for place, (controller, kind) in enumerate(PANELS):
-            panel = figure.add_subplot(2, 3, place + 1)
-            panel.set_title(f"({'abcdef'[place]}) {TITLES[kind]}, {WORDS[controller]}", loc="left")
-            shown = in_panel(curves, controller, kind), marks_in(marks, controller, kind)
-            draw_ratings(panel, shown[0], looks, shown[1], "black")
-            panel.set_ylim(lowest_of(curves, marks, controller), 1.004)
+        for place, content in enumerate(panels):
+            panel = figure.add_subplot(rows, COLUMNS, place + 1)
+            panel.set_title(content.title, loc="left")
+            draw_ratings(panel, content, looks, "black")
             panel.set_xlabel("oscillation period")
             panel.set_ylabel("$P^r$")
-        figure.legend(handles=_handles(looks), loc="outside lower center", ncols=5, frameon=False)
+        printed = any(panel.printed for panel in panels)
+        handles = _handles(looks, printed)
+        figure.legend(handles=handles, loc="outside lower center", ncols=5, frameon=False)
         figure.suptitle(title, fontsize=10.5)
     return figure
 
 
-def _handles(looks: Looks) -> list[Line2D]:
+def _handles(looks: Looks, printed: bool) -> list[Line2D]:
     found = [
         Line2D([], [], color=colour, label=f"$z_2$ = {z2:g} rad")
         for z2, colour in looks.colours.items()
     ]
-    for controller, dashes in looks.dashes.items():
-        found += [
-            Line2D([], [], color="black", linestyle=look, label=_of_deflection(controller, size))
-            for size, look in dashes.items()
-        ]
-    return [*found, Line2D([], [], color="black", marker="x", label="paper")]
-
-
-def _of_deflection(controller: str, size: float) -> str:
-    return rf"{WORDS[controller]}, $|\Delta z_2|$ = {size:g} rad"
+    for group, dashes in looks.dashes.items():
+        for size, look in dashes.items():
+            label = rf"{group}, $|\Delta z_2|$ = {size:g} rad"
+            found.append(Line2D([], [], color="black", linestyle=look, label=label))
+    paper = Line2D([], [], color="black", marker="x", label="paper")
+    return [*found, paper] if printed else found
