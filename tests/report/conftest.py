@@ -1,3 +1,6 @@
+import json
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -5,7 +8,6 @@ import pytest
 from campaign_tables import MODELS
 
 from legbench.cli import main
-from legbench.report import read_source, write_report
 
 SMALL = f"""
 format = 1
@@ -67,7 +69,9 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def reported(small: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
-    """Page of the small campaign, and its content as JSON."""
-    page = tmp_path_factory.mktemp("report") / "report.html"
-    written = write_report([read_source("ideal", small)], page)
-    return page, written.content
+    """Page of the small campaign with its single figures, and its content as JSON."""
+    page = tmp_path_factory.mktemp("report") / "out" / "report.html"
+    with redirect_stdout(StringIO()) as printed:
+        code = main(["report", str(small), "--out", str(page), "--figures", "png", "--json"])
+    assert code == 0
+    return page, json.loads(printed.getvalue())

@@ -1,4 +1,3 @@
-import json
 import re
 from html.parser import HTMLParser
 from pathlib import Path
@@ -15,7 +14,9 @@ from legbench.campaign.curves import rows_of
 from legbench.cli import main
 from legbench.errors import ConfigError
 from legbench.experiment import experiment_hash
-from legbench.report import read_source, write_report
+from legbench.report import write_report
+from legbench.viz.print._matplotlib import Axes
+from legbench.viz.print.inline import panel_svg
 
 VOID = {"meta", "link", "img", "br"}
 LARGEST = 3_000_000
@@ -55,6 +56,7 @@ def test_the_page_is_whole_small_and_asks_for_nothing(
     assert outline.open == []
     assert len(text.encode()) < LARGEST
     assert "script" not in outline.counts
+    assert len(outline.ids) == len(set(outline.ids))
     assert outline.counts["details"] >= 5
     assert not re.search(r"(src|href|url\()\s*=?\s*[\"'(]?\s*(https?:)?//", text)
     # Panels of Figs. 4 (twice), 5 (twice), 6 and 7.
@@ -120,56 +122,55 @@ def synthetic(folder: Path) -> Path:
     return folder
 
 
-def test_a_table_alone_is_reported_and_invalid_runs_are_flagged(tmp_path: Path) -> None:
-    source = read_source("ideal", synthetic(tmp_path / "table"))
-    written = write_report([source], tmp_path / "report.html")
-    text = written.page.read_text(encoding="utf-8")
-    assert Outline(text).open == []
-    assert "2 of 16 runs did not come to their end or left the" in text
-    reasons = [run["reason"] for run in written.content["sources"]["ideal"]["invalid"]]
-    assert reasons[0] == "fault (straightened) after 2 s"
-    assert reasons[1] == "numerics unsound: energy residual 0.65"
-    for figure in ("Fig. 4, step", "Fig. 4, bang-bang", "Fig. 6", "Fig. 7"):
-        block = text[text.index(f"<h2>{figure}") :]
-        assert re.search(r"<figcaption>(.*?)</figcaption>", block, re.S)[1].startswith(
-            "Not drawn: "
-        )
-
-
 def test_a_report_is_about_something(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="a report needs a campaign"):
         write_report([], tmp_path / "report.html")
 
 
-def test_the_command_writes_the_page_and_its_figures(
-    small: Path,
-    reported: tuple[Path, dict[str, Any]],
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    page = tmp_path / "out" / "report.html"
-    arguments = ["report", str(small), "--out", str(page), "--figures", "png", "--json"]
-    with mpl.rc_context({"font.size": 20.0, "axes.facecolor": "red"}):
-        assert main(arguments) == 0
-    content = json.loads(capsys.readouterr().out)
-    assert page.read_bytes() == reported[0].read_bytes()  # whatever the user's own style is
+def test_single_figures_are_written_beside_the_page(reported: tuple[Path, dict[str, Any]]) -> None:
+    page, content = reported
     assert content["page"] == str(page)
-    names = {Path(path).name for path in content["figures"]}
     stems = ("fig4-step", "fig4-bang-bang", "fig5-ideal-equilibrium", "fig5-ideal-motor")
-    assert names == {f"{stem}.png" for stem in (*stems, "fig6", "fig7")}
+    names = {f"{stem}.png" for stem in (*stems, "fig6", "fig7")}
+    assert {path.name for path in (page.parent / "figures").iterdir()} == names
+    assert {Path(path).name for path in content["figures"]} == names
     assert all(Path(path).stat().st_size > 3000 for path in content["figures"])
 
 
-def test_the_command_tells_what_holds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_same_panel_is_the_same_text_whatever_the_style_of_the_user() -> None:
+    def draw(panel: Axes) -> None:
+        panel.plot([0.0, 1.0], [2.0, 3.0])
+        panel.set_xlabel("x")
+
+    first = panel_svg("one", 'a "line"', (2.0, 2.0), draw)
+    with mpl.rc_context({"font.size": 20.0, "axes.facecolor": "red", "svg.fonttype": "path"}):
+        assert panel_svg("one", 'a "line"', (2.0, 2.0), draw) == first
+    assert first.startswith('<svg role="img" aria-label="a &quot;line&quot;"')
+    assert "currentColor" in first
+    assert not re.search(r"<metadata|<!DOCTYPE|<\?xml| d=\"[^\"]*\.\d{3}", first)
+    ids, used = re.findall(r'id="([^"]+)"', first), re.findall(r"#([\w-]+)", first)
+    assert len(ids) == len(set(ids))
+    assert set(ids) <= set(used)
+
+
+def test_a_table_alone_is_reported_and_invalid_runs_are_flagged(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     folder = synthetic(tmp_path / "table")
     assert main(["report", str(folder), "--explained", str(folder)]) == 0
     told = capsys.readouterr()
     assert "ideal: 14 of 15 statements hold\n" in told.out
     assert "  invalid: 130000000000, fault (straightened) after 2 s\n" in told.out
+    assert "  invalid: 140000000000, numerics unsound: energy residual 0.65\n" in told.out
     assert told.err == f"wrote {folder / 'report.html'}\n"
     text = (folder / "report.html").read_text(encoding="utf-8")
+    assert Outline(text).open == []
+    assert text.count("2 of 16 runs did not come to their end or left the") == 2
     assert text.count('data-label="explained"') == 14
     assert "Fig. 5, explained" in text
+    for figure in ("Fig. 4, step", "Fig. 4, bang-bang", "Fig. 6", "Fig. 7"):
+        block = text[text.index(f"<h2>{figure}") :]
+        assert block.partition("<figcaption>")[2].startswith("Not drawn: ")
 
 
 def test_a_folder_without_a_table_is_one_line(
