@@ -53,7 +53,7 @@ def _inlined(text: str, description: str) -> str:
     # The page gives the width, the viewBox the ratio.
     svg = re.sub(r' (width|height)="[0-9.]+pt"', "", svg, count=2)
     used = set(re.findall(r"#([\w-]+)", svg))
-    svg = re.sub(r' id="([\w-]+)"', lambda each: each[0] if each[1] in used else "", svg)
+    svg = re.sub(r' id="([^"]+)"', lambda each: each[0] if each[1] in used else "", svg)
     svg = re.sub(r' d="([^"]*)"', _rounded, svg, flags=re.DOTALL)
     svg = svg.replace(INK, "currentColor")
     label = f'<svg role="img" aria-label="{escape(description, quote=True)}"'
