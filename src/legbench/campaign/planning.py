@@ -188,6 +188,7 @@ class _Planner:
         if experiment.seed + block.trials - 1 > LARGEST_SEED:
             self._refuse(f"{block.name}: seed {experiment.seed} leaves no seeds for its trials")
             return
+        told = flat(write_tables(experiment, where=False))
         for trial in range(block.trials):
             one = replace(experiment, seed=experiment.seed + trial)
             name = experiment_hash(one)
@@ -197,7 +198,7 @@ class _Planner:
             self._planned[name] = Planned(
                 experiment=one, hash=name, block=block.name, cell=self._cells, trial=trial
             )
-            self._settings[name] = flat(write_tables(one, where=False))
+            self._settings[name] = {**told, "seed": one.seed}
         self._cells += 1
 
 
