@@ -174,7 +174,7 @@ def test_a_million_cells_are_asked_back_with_size_and_time(tmp_path: Path) -> No
     text = SMALL.replace("1.0, 1.2", lines[0]).replace("0.1, 0.2", lines[1])
     with pytest.raises(
         CampaignError,
-        match=r"has 2000000 experiments, some 8\.33 h on one processor; up to 10000 .* say --large",
+        match=r"has 2000000 experiments, some 3\.33 h on one processor; up to 10000 .* say --large",
     ):
         planned(tmp_path, text)
 

@@ -78,7 +78,8 @@ def test_a_shard_whose_worker_dies_is_run_again_then_named(
     shards = shards_of(planned(tmp_path, MIXED), 4)
     once, always, calm = (work_of(shard, None) for shard in shards[:3])
     once = Work(**{name: getattr(once, name) for name in FIELDS}, records=tmp_path / "mark")
-    lost = {name: getattr(always, name) for name in FIELDS} | {"hashes": ("always-deadly",)}
+    lost: dict[str, Any] = {name: getattr(always, name) for name in FIELDS}
+    lost["hashes"] = ("always-deadly",)
     monkeypatch.setattr(pool, "_work", deadly)
     notes: list[str] = []
     works = [Work(**lost, records=None), once, calm]

@@ -102,6 +102,6 @@ def test_the_paper_can_be_run(models: Path) -> None:
             assert {z2 for z2, _ in told[kind, setup]} >= {1.0, 1.8}
     trials = [each.trial for each in plan.planned if each.block == "step, fixed trunk"]
     assert max(trials) == 9
-    beyond = replace(campaign, excluded=())
+    beyond = replace(campaign, blocks=campaign.blocks[1:2], excluded=())
     with pytest.raises(CampaignError, match=r"puts the knee at 2\.970 rad"):
         plan_campaign(beyond)

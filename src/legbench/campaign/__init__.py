@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 from legbench.lazily import lazy_names
 
 if TYPE_CHECKING:
-    from legbench.campaign.plan import Plan, plan_campaign
+    from legbench.campaign.plan import Plan
+    from legbench.campaign.planning import plan_campaign
     from legbench.campaign.reading import load_campaign
     from legbench.campaign.rows import measured_rows
     from legbench.campaign.running import run_campaign
@@ -33,7 +34,7 @@ __getattr__ = lazy_names(
         "load_campaign": "legbench.campaign.reading",
         "measured_rows": "legbench.campaign.rows",
         "measured_table": "legbench.campaign.table",
-        "plan_campaign": "legbench.campaign.plan",
+        "plan_campaign": "legbench.campaign.planning",
         "read_table": "legbench.campaign.table",
         "run_campaign": "legbench.campaign.running",
         "shards_of": "legbench.campaign.shards",

@@ -14,7 +14,7 @@ from legbench.campaign.folder import is_done, open_folder, shard_path, write_int
 from legbench.campaign.plan import Plan
 from legbench.campaign.records import RECORDS
 from legbench.campaign.rows import measured_rows
-from legbench.campaign.running import Finished, Progress, assembled
+from legbench.campaign.running import Finished, Progress, finished_of
 from legbench.campaign.shards import Shard, shard_bytes, shards_of
 from legbench.commissioning.idle import drive_troubles
 from legbench.drives.setup.bus_file import load_bus
@@ -73,32 +73,21 @@ def run_on_bench(
     asked, say = stop or StopFlag(), note if note is not None else _silent
     places = {each.hash: place for place, each in enumerate(plan.planned)}
     shards = sorted(shards_of(plan, 1), key=lambda shard: places[shard.planned[0].hash])
-    failure = None
     with open_folder(folder, plan):
         missing = [shard for shard in shards if not is_done(folder, shard)]
-        done, began = len(shards) - len(missing), time.monotonic()
+        done, failure = len(shards) - len(missing), None
+        began = time.monotonic()
         for place, shard in enumerate(missing):
             if place and not _virtual(shard):
                 wait(pause, asked)
-            if asked.is_set:
-                break
-            failure = _run_one(shard, folder, asked, say)
+            failure = None if asked.is_set else _run_one(shard, folder, asked, say)
             if failure is not None or asked.is_set:
                 break
             done += 1
             if progress is not None:
                 took = (time.monotonic() - began) / (place + 1)
                 progress(done, len(shards), took * (len(missing) - place - 1))
-        table = assembled(plan, folder, shards) if done == len(shards) else None
-    return Finished(
-        folder=folder,
-        done=done,
-        wanted=len(shards),
-        total=len(shards),
-        stopped=failure is None and done < len(shards),
-        failures=() if failure is None else (failure,),
-        table=table,
-    )
+        return finished_of(plan, folder, shards, shards, () if failure is None else (failure,))
 
 
 def _silent(_line: str) -> None:

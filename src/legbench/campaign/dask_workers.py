@@ -6,7 +6,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import ExitStack, contextmanager
 from typing import Any, final
 
-from legbench.campaign._distributed import Client, KilledWorker, LocalCluster, dask
+from legbench.campaign._distributed import Client, KilledWorker, LocalCluster, configured
 from legbench.campaign.executor import AbstractExecutor, Done, Note
 from legbench.campaign.pool import LOOK_EVERY, done_of, workers_or_processors
 from legbench.campaign.work import Work, do_work
@@ -55,8 +55,7 @@ class DaskExecutor(AbstractExecutor):
     def _client(self) -> Iterator[Any]:
         """Connect to the scheduler, which is begun and ended here where none is named."""
         with ExitStack() as stack:
-            settings = {"distributed.scheduler.allowed-failures": 1}
-            stack.enter_context(dask.config.set(settings))
+            stack.enter_context(configured({"distributed.scheduler.allowed-failures": 1}))
             if self._address is not None:
                 try:
                     yield stack.enter_context(
@@ -73,7 +72,7 @@ class DaskExecutor(AbstractExecutor):
                     n_workers=self._workers,
                     threads_per_worker=1,
                     host="127.0.0.1",
-                    dashboard_address=None,
+                    dashboard_address=None,  # pyright: ignore[reportArgumentType]
                     silence_logs=logging.CRITICAL,
                 )
             stack.enter_context(cluster)

@@ -127,8 +127,9 @@ def _field(experiment: Experiment, key: str) -> object:
 
 def _plain(value: object) -> float | None:
     """Return a number as a float; none for anything else."""
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    return float(value) if number else None
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return float(value)
+    return None
 
 
 def _refusal(experiment: Experiment) -> str | None:

@@ -53,17 +53,16 @@ def open_folder(folder: Path, plan: Plan, part: Part | None = None) -> Iterator[
             yield
             return
         number, count = part
-        with (
-            _locked(folder / f"{LOCK}-{number}-of-{count}", folder, shared=False),
-        ):
-            _begin(folder, plan)
+        with _locked(folder / f"{LOCK}-{number}-of-{count}", folder, shared=False):
+            with one_at_a_time(folder):
+                _begin(folder, plan)
             yield
 
 
 @contextmanager
-def assembling(folder: Path) -> Iterator[None]:
-    """Keep other parts from writing the table of one folder at the same time."""
-    with (folder / f"{LOCK}-table").open("ab") as file:
+def one_at_a_time(folder: Path) -> Iterator[None]:
+    """Keep callers with other parts from writing what all of them share at the same time."""
+    with (folder / f"{LOCK}-shared").open("ab") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         yield
 

@@ -2,7 +2,7 @@
 
 import json
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,8 +12,8 @@ import pyarrow as pa
 from legbench.campaign.executor import AbstractExecutor, Done, Note
 from legbench.campaign.folder import (
     Part,
-    assembling,
     is_done,
+    one_at_a_time,
     open_folder,
     shard_path,
     write_into,
@@ -95,11 +95,23 @@ def run_campaign(
     with open_folder(folder, plan, part):
         kept = folder.resolve() / RECORDS if records else None
         missing = [shard for shard in mine if not _kept(folder, shard, kept)]
-        failures = _run(missing, mine, folder, executor, kept, stop or StopFlag(), progress, note)
-        there = [shard for shard in shards if is_done(folder, shard)]
-        table = assembled(plan, folder, shards) if len(there) == len(shards) else None
-    found = {shard.name for shard in there}
-    done = sum(len(shard.planned) for shard in mine if shard.name in found)
+        clock = _Clock(mine, missing, progress)
+        works = [work_of(shard, kept) for shard in missing]
+        done = executor.run(works, stop or StopFlag(), note or _silent)
+        failures = _put_all(done, missing, folder, clock)
+        return finished_of(plan, folder, shards, mine, failures)
+
+
+def finished_of(
+    plan: Plan,
+    folder: Path,
+    shards: Sequence[Shard],
+    mine: Sequence[Shard],
+    failures: tuple[str, ...],
+) -> Finished:
+    """Look what is there, and make the table if that is all."""
+    there = {shard.name for shard in shards if is_done(folder, shard)}
+    done = sum(len(shard.planned) for shard in mine if shard.name in there)
     wanted = sum(len(shard.planned) for shard in mine)
     return Finished(
         folder=folder,
@@ -108,7 +120,7 @@ def run_campaign(
         total=len(plan.planned),
         stopped=done < wanted and not failures,
         failures=failures,
-        table=table,
+        table=_assembled(plan, folder, shards) if len(there) == len(shards) else None,
     )
 
 
@@ -119,23 +131,14 @@ def _kept(folder: Path, shard: Shard, records: Path | None) -> bool:
     return records is None or all((records / each.hash).is_dir() for each in shard.planned)
 
 
-def _run(
-    missing: Sequence[Shard],
-    mine: Sequence[Shard],
-    folder: Path,
-    executor: AbstractExecutor,
-    records: Path | None,
-    stop: StopFlag,
-    progress: Progress | None,
-    note: Note | None,
+def _put_all(
+    found: Iterator[Done], missing: Sequence[Shard], folder: Path, clock: "_Clock"
 ) -> tuple[str, ...]:
-    """Run shards and put each in its place; returns those that failed, with reasons."""
+    """Put each shard that was run in its place; returns those that failed, with reasons."""
     by_name = {shard.name: shard for shard in missing}
-    clock = _Clock(mine, missing, progress)
     failures: list[str] = []
-    works = [work_of(shard, records) for shard in missing]
     try:
-        for done in executor.run(works, stop, note or _silent):
+        for done in found:
             shard = by_name[done.work.name]
             failure = _put(done, shard, folder)
             if failure is not None:
@@ -194,9 +197,9 @@ class _Clock:
             self._progress(self._done, self._total, left)
 
 
-def assembled(plan: Plan, folder: Path, shards: Sequence[Shard]) -> Path:
+def _assembled(plan: Plan, folder: Path, shards: Sequence[Shard]) -> Path:
     """Write the table of all shards and return its path."""
-    with assembling(folder):
+    with one_at_a_time(folder):
         made: set[bytes] = set()
         parts: list[pa.Table] = []
         for shard in shards:

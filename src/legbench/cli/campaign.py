@@ -70,7 +70,7 @@ def main(arguments: list[str]) -> int:
     """
     flags = parse(CampaignArguments, "campaign", arguments)
     part = _part(flags.shard)
-    from legbench.campaign.plan import plan_campaign
+    from legbench.campaign.planning import plan_campaign
     from legbench.campaign.reading import load_campaign
     from legbench.campaign.shards import shards_of
 
@@ -172,7 +172,7 @@ def _on_bench(plan: "Plan", out: Path, flags: CampaignArguments) -> int:
 
 def _note_skipped(plan: "Plan") -> None:
     """Say which cells are left out because the leg cannot do them."""
-    from legbench.campaign.plan import TOLD
+    from legbench.campaign.planning import TOLD
 
     for each in plan.infeasible[:TOLD]:
         report_error(f"skipped: {each}")
