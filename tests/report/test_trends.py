@@ -2,7 +2,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from campaign_tables import BANG_BANG, SETUPS, STEP, Runs, as_the_paper_says, periods
+from campaign_tables import BANG_BANG, SETUPS, STEP, Runs, as_the_paper_says, jumps, periods
 
 from legbench.campaign import read_table
 from legbench.campaign.curves import rating_curves
@@ -205,3 +205,13 @@ def test_the_ideal_leg_jumps_along_its_mode_but_not_as_far_as_the_paper(
     assert found["jump_rating_stance"].held is True
     assert found["jump_rating_flight"].held is True
     assert not any(found[key].held for key in ("foot_clearance", "trunk_excursion", "foot_travel"))
+
+
+def test_a_lower_bound_is_kept_by_every_run_not_by_their_mean() -> None:
+    runs = as_the_paper_says()
+    lengths = {name: [0.04] * 3 for name in ("foot_clearance", "trunk_excursion", "foot_travel")}
+    worse = jumps([0.995] * 3, [0.98, 0.969, 0.98], lengths)
+    runs.add("jump", "jump", 0.8, 0.28, worse, trial=1)
+    trend = judged(runs, MOTOR)["jump_rating_flight"]
+    assert trend.held is False
+    assert trend.evidence == "0.969 ± 0.003 over 2 runs"

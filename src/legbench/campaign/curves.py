@@ -22,6 +22,9 @@ DZ2: Final = "controller.settings.dz2"
 _NO_AXES: Final = frozenset({*MEASURED.names, "trial", "seed", SETUP, CONTROLLER, Z2, DZ2})
 """Columns that tell no cell apart from another beyond its setup, controller and set points."""
 
+SAME: Final = 1e-9
+"""Largest distance between set points that are the same [rad]: they come from files."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cell:
@@ -55,6 +58,11 @@ class RatingCurve:
     """Standard deviation over these trials (n,) [-]; zero where there is one."""
     trials: Ints
     """Number of trials that have this period (n,)."""
+
+
+def same_set_point(one: float | None, two: float | None) -> bool:
+    """Whether two set points or deflections [rad] are one; what is not there is not the same."""
+    return one is not None and two is not None and abs(one - two) <= SAME
 
 
 def sound_runs(table: pa.Table) -> pa.Table:

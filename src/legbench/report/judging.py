@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from legbench.campaign.curves import RatingCurve
+from legbench.campaign.curves import RatingCurve, same_set_point
 from legbench.design.setup import SetupKind
 from legbench.signals import Floats
 
@@ -18,8 +18,6 @@ HIGH: Final = 0.9
 """Least rating that counts as high [-]; the paper calls 0.94 very good."""
 SETTLED: Final = 0.02
 """Largest distance of a saturated rating from its level [-]: two units of the last digit."""
-SAME: Final = 1e-9
-"""Largest distance between set points that are the same [rad]: they come from one file."""
 
 SETUP_NAMES: Final = {
     SetupKind.HFTS: "hFTS",
@@ -124,8 +122,10 @@ def lower_at(curves: Sequence[RatingCurve], z2: float, setups: Sequence[SetupKin
     """Judge whether the cells at one set point have a lower rating than the others of a setup."""
     verdicts, words = [], []
     for setup in setups:
-        here = [c.mean for c in curves if c.cell.setup == setup and _same(c.cell.z2, z2)]
-        rest = [c.mean for c in curves if c.cell.setup == setup and not _same(c.cell.z2, z2)]
+        here = [c.mean for c in curves if c.cell.setup == setup and same_set_point(c.cell.z2, z2)]
+        rest = [
+            c.mean for c in curves if c.cell.setup == setup and not same_set_point(c.cell.z2, z2)
+        ]
         if not (here and rest):
             return None, f"{SETUP_NAMES[setup]} has no cells both at z2 = {z2:g} and elsewhere"
         at, elsewhere = _mean(here), _mean(rest)
@@ -145,17 +145,13 @@ def _pairs(
         if one.cell.setup == first
         and two.cell.setup == second
         and one.cell.other == two.cell.other
-        and _same(one.cell.z2, two.cell.z2)
-        and _same(one.cell.dz2, two.cell.dz2)
+        and same_set_point(one.cell.z2, two.cell.z2)
+        and same_set_point(one.cell.dz2, two.cell.dz2)
     ]
 
 
 def _cells(count: int) -> str:
     return f"{count} cell" if count == 1 else f"{count} cells"
-
-
-def _same(one: float, two: float) -> bool:
-    return abs(one - two) <= SAME
 
 
 def _mean(ratings: Sequence[Floats]) -> float:

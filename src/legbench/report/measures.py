@@ -9,7 +9,15 @@ from typing import Any, Final
 import numpy as np
 import pyarrow as pa
 
-from legbench.campaign.curves import CONTROLLER, DZ2, SETUP, Z2, rows_of, sound_runs
+from legbench.campaign.curves import (
+    CONTROLLER,
+    DZ2,
+    SETUP,
+    Z2,
+    rows_of,
+    same_set_point,
+    sound_runs,
+)
 from legbench.metrics.jump import LAST
 from legbench.metrics.source import Reference
 from legbench.paper import Published, Relation
@@ -19,8 +27,6 @@ RATING_WITHIN: Final = 0.02
 SHARE_WITHIN: Final = 0.1
 """Distance within which any other number agrees, as a share of the paper's [-], which gives
 lengths in two digits."""
-SAME: Final = 1e-9
-"""Largest distance between set points that are the same [rad]."""
 TRANSIENT: Final = 3
 """Periods of bang-bang before those that the paper averages [-]: its index is P>3."""
 
@@ -32,7 +38,7 @@ class Measured:
     """Number measured in a campaign, over the runs that show it."""
 
     value: float
-    """Mean over the runs."""
+    """Mean over the runs; the lowest of them beside a lower bound."""
     spread: float
     """Standard deviation over the runs; zero for one."""
     runs: int
@@ -72,7 +78,7 @@ def measure(
         for row in rows_of(sound_runs(table), kind)
         if row[SETUP] == number.setup and row[CONTROLLER] == number.controller
     ]
-    there = [row for row in rows if _same(row[Z2], z2) and _same(row[DZ2], dz2)]
+    there = [row for row in rows if same_set_point(row[Z2], z2) and same_set_point(row[DZ2], dz2)]
     runs: dict[str, list[Row]] = defaultdict(list)
     for row in there or (rows if number.key in JUMP_MEASURES else ()):
         runs[row["experiment"]].append(row)
@@ -80,7 +86,9 @@ def measure(
     values = [value for value in values if math.isfinite(value)]
     if not values:
         return None
-    return Measured(value=float(np.mean(values)), spread=float(np.std(values)), runs=len(values))
+    # A lower bound is kept by every run, not by their mean.
+    value = min(values) if number.comparison is Relation.MORE else float(np.mean(values))
+    return Measured(value=value, spread=float(np.std(values)), runs=len(values))
 
 
 def agrees(number: Published, value: float) -> bool:
@@ -107,10 +115,6 @@ def measured_text(value: float, unit: str) -> str:
     if unit == "m":
         return f"{1e3 * value:.1f} mm"
     return f"{value:.3f}" if unit == "1" else f"{value:.4g} {unit}"
-
-
-def _same(one: float | None, two: float | None) -> bool:
-    return one is not None and two is not None and abs(one - two) <= SAME
 
 
 def _at_index(index: int) -> Callable[[list[Row], str], float]:

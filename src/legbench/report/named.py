@@ -9,7 +9,15 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from legbench.campaign.again import experiment_of
-from legbench.campaign.curves import CONTROLLER, DZ2, SETUP, Z2, rows_of, sound_runs
+from legbench.campaign.curves import (
+    CONTROLLER,
+    DZ2,
+    SETUP,
+    Z2,
+    rows_of,
+    same_set_point,
+    sound_runs,
+)
 from legbench.campaign.records import RECORDS
 from legbench.errors import CampaignError, RecordingError
 from legbench.experiment.run import run
@@ -25,8 +33,6 @@ READINGS: Final = {
     "jump": ("jump_middle",),
 }
 """Named experiment -> keys of the numbers that give its settings, the first choice first."""
-SAME: Final = 1e-9
-"""Largest distance between set points that are the same [rad]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,7 +77,11 @@ def _chosen(rows: Sequence[Mapping[str, Any]], readings: Sequence[Published]) ->
     """First trial with the settings of the first reading that is there; a jump, of any."""
     for number in readings:
         here = [r for r in rows if r[SETUP] == number.setup and r[CONTROLLER] == number.controller]
-        exact = [r for r in here if _same(r[Z2], number.z2) and _same(r[DZ2], number.dz2)]
+        exact = [
+            r
+            for r in here
+            if same_set_point(r[Z2], number.z2) and same_set_point(r[DZ2], number.dz2)
+        ]
         if found := exact or (here if number.setup == "jump" else []):
             return min(found, key=lambda row: row["trial"])
     return None
@@ -115,7 +125,3 @@ def _recorded(
     if experiment.plant.kind == "can":
         return None, "the bench kept no recording of it, and a report moves no drives"
     return run(experiment, progress=progress), "run afresh, as the campaign kept no recordings"
-
-
-def _same(one: float | None, two: float | None) -> bool:
-    return one is not None and two is not None and abs(one - two) <= SAME
