@@ -73,7 +73,10 @@ def _row(number: Published, cell: Published, sources: Sequence[Source]) -> Numbe
         if cell is not number:
             settings += ", as the caption has it"
     rated = number.unit == "1"
-    references = (Reference.EQUILIBRIUM, Reference.MOTOR) if rated else (Reference.MOTOR,)
+    # The reference by which a setup is judged comes first.
+    both = (Reference.EQUILIBRIUM, Reference.MOTOR)
+    references = both[::-1] if number.setup is SetupKind.JUMP else both
+    references = references if rated else references[:1]
     counterparts = {
         source.name: tuple(
             _counterpart(number, _measured(number, cell, source, each), each if rated else None)
