@@ -4,14 +4,10 @@ import pytest
 
 from legbench.design import load_design
 from legbench.errors import ConfigError
-from legbench.paper import COLUMNS, PAPER, Relation, published
+from legbench.paper import COLUMNS, Relation, published
 
 MODELS = Path(__file__).parents[1] / "models"
 ROW = "rating,0.9,1,>,ffs,bang-bang,1.0,0.1,a rating,VI,Fig. 5,more than 0.9"
-
-
-def test_the_numbers_of_the_package_are_those_of_the_sources() -> None:
-    assert PAPER.read_bytes() == (MODELS / "campaigns" / "paper.csv").read_bytes()
 
 
 def test_the_prototype_is_the_leg_of_table_3() -> None:

@@ -1,7 +1,7 @@
 """Numbers that the paper publishes of its experiments, as data to compare with.
 
-`paper.csv`, which is `models/campaigns/paper.csv` of the sources, has each of them once, with the
-sentence in which it stands. Nothing is computed from them.
+`models/campaigns/paper.csv` has each of them once, with the sentence in which it stands. Nothing is
+computed from them.
 """
 
 import csv
@@ -16,8 +16,9 @@ from typing import Final
 from legbench.design.setup import SetupKind
 from legbench.errors import ConfigError
 from legbench.reading import UnreadableError, read_file
+from legbench.shipped import shipped_root
 
-PAPER: Final = Path(__file__).with_name("paper.csv")
+PAPER: Final = shipped_root() / "models" / "campaigns" / "paper.csv"
 """File of the published numbers, which comes with the package."""
 LARGEST: Final = 1_000_000
 """Largest file of published numbers that is read [bytes]; the paper's has a hundredth of it."""
