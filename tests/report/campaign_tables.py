@@ -29,8 +29,8 @@ class Runs:
         self,
         setup: str,
         controller: str,
-        z2: float,
-        dz2: float,
+        z2: float | None,
+        dz2: float | None,
         rows: Iterable[dict[str, Any]],
         **said: Any,
     ) -> None:

@@ -1,3 +1,4 @@
+import json
 import re
 from html.parser import HTMLParser
 from pathlib import Path
@@ -12,7 +13,7 @@ from legbench.campaign import read_table
 from legbench.campaign.again import experiment_of
 from legbench.campaign.curves import rows_of
 from legbench.cli import main
-from legbench.errors import ConfigError
+from legbench.errors import CampaignError, ConfigError
 from legbench.experiment import experiment_hash
 from legbench.report import write_report
 from legbench.viz.print._matplotlib import Axes
@@ -95,6 +96,19 @@ def test_every_experiment_of_a_campaign_is_made_anew_from_its_folder(small: Path
         "ffs",
         "jump",
     }
+
+
+def test_an_experiment_that_would_be_another_is_refused(small: Path, tmp_path: Path) -> None:
+    row = next(row for row in rows_of(read_table(small), "run"))
+    told = json.loads((small / "campaign.json").read_bytes())
+    for example in told["examples"]:
+        example["design"]["springs"]["stiffness"] = [2.4, 2.3]
+    (tmp_path / "campaign.json").write_text(json.dumps(told), encoding="utf-8")
+    with pytest.raises(CampaignError, match="cannot be made anew: what the folder tells is"):
+        experiment_of(tmp_path, row)
+    (tmp_path / "campaign.json").write_text("{}", encoding="utf-8")
+    with pytest.raises(CampaignError, match="has no whole experiment with this controller"):
+        experiment_of(tmp_path, row)
 
 
 def test_numbers_stand_beside_the_paper(reported: tuple[Path, dict[str, Any]]) -> None:

@@ -215,3 +215,25 @@ def test_a_lower_bound_is_kept_by_every_run_not_by_their_mean() -> None:
     trend = judged(runs, MOTOR)["jump_rating_flight"]
     assert trend.held is False
     assert trend.evidence == "0.969 ± 0.003 over 2 runs"
+
+
+def test_runs_of_a_controller_without_set_points_are_one_cell() -> None:
+    runs = Runs()
+    for trial in (0, 1):
+        runs.add("ffs", "sine", None, None, periods([0.9, 0.8]), trial=trial)
+    (curve,) = rating_curves(runs.table(), EQUILIBRIUM)
+    assert curve.trials.tolist() == [2, 2]
+    assert curve.cell.place == ""
+
+
+def test_settings_that_vary_within_a_setup_tell_cells_apart() -> None:
+    runs = Runs()
+    for number, (name, z2) in enumerate((("optimal", 1.0), ("prototype", 1.0), ("optimal", 1.4))):
+        runs.add("ffs", STEP, z2, 0.3, periods([0.9, 0.8]))
+        runs.settings[f"{number:02d}".ljust(64, "0")]["design.name"] = name
+    places = [curve.cell.place for curve in rating_curves(runs.table(), EQUILIBRIUM)]
+    assert places == [
+        "z2 = 1, dz2 = 0.3, design.name = optimal",
+        "z2 = 1, dz2 = 0.3, design.name = prototype",
+        "z2 = 1.4, dz2 = 0.3, design.name = optimal",
+    ]

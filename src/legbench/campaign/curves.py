@@ -1,5 +1,6 @@
 """Ratings over the periods of a campaign's cells: mean and spread over trials, as in Fig. 5."""
 
+import math
 from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -41,10 +42,10 @@ class Cell:
 
     @property
     def place(self) -> str:
-        """The set points in words."""
-        return ", ".join(
-            [f"z2 = {self.z2:g}", f"dz2 = {self.dz2:g}", *(f"{k} = {v}" for k, v in self.other)]
-        )
+        """The set points and other settings in words."""
+        points = [("z2", self.z2), ("dz2", self.dz2)]
+        words = [f"{name} = {value:g}" for name, value in points if not math.isnan(value)]
+        return ", ".join([*words, *(f"{name} = {value}" for name, value in self.other)])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,7 +98,8 @@ def cell_of(row: dict[str, Any], axes: Iterable[str] = ()) -> Cell:
         row: a row of the table.
         axes: settings that tell cells apart besides setup, controller and set points.
     """
-    z2, dz2 = (float("nan") if row[key] is None else float(row[key]) for key in (Z2, DZ2))
+    # One and the same NaN, so that rows without set points still belong to one cell.
+    z2, dz2 = (math.nan if row[key] is None else float(row[key]) for key in (Z2, DZ2))
     return Cell(
         setup=row[SETUP],
         controller=row[CONTROLLER],
