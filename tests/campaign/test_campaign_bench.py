@@ -4,13 +4,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from campaigns import MODELS, planned, written
+from campaigns import MODELS, planned, ran, written
 
 from legbench.campaign import bench, load_campaign, plan_campaign, read_table
 from legbench.campaign.bench import run_on_bench
 from legbench.campaign.plan import Plan
 from legbench.drives.emulated.faults import NodeFault, NodeFaultKind
-from legbench.errors import ConfigError
+from legbench.errors import CampaignError, ConfigError
 from legbench.interrupts import StopFlag
 from legbench.plants import CanChoice
 from legbench.recording.reader import load
@@ -60,7 +60,7 @@ def test_all_cells_are_run_in_order_and_the_first_fault_ends_it(
     monkeypatch.setattr(
         bench, "drive_troubles", lambda session: looks.append(session) or good(session)
     )
-    monkeypatch.setattr(bench, "_virtual", lambda shard: False)
+    monkeypatch.setattr(bench, "moves_drives", lambda experiment: True)
     pauses: list[float] = []
     stopped = run_on_bench(
         faulty(plan, 1, IN_MID_RUN),
@@ -123,3 +123,10 @@ def test_what_is_not_on_a_bench_is_refused(tmp_path: Path) -> None:
         run_on_bench(plan, tmp_path / "out")
     with pytest.raises(ConfigError, match="pause is -1 s; it must be 0 to 3600 s"):
         run_on_bench(plan, tmp_path / "out", pause=-1.0)
+
+
+def test_no_executor_moves_drives_on_a_wire(tmp_path: Path) -> None:
+    plan = planned(tmp_path, TEXT.replace('settings.interface = "legbench"\n', ""))
+    with pytest.raises(CampaignError, match="moves drives on a wire, which no executor does"):
+        ran(plan, tmp_path / "out")
+    assert not (tmp_path / "out").exists()

@@ -9,9 +9,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
+from legbench.campaign.drives import moves_drives
 from legbench.campaign.executor import Note
 from legbench.campaign.folder import is_done, open_folder, shard_path, write_into
-from legbench.campaign.plan import Plan
+from legbench.campaign.plan import Plan, Planned
 from legbench.campaign.records import RECORDS
 from legbench.campaign.rows import measured_rows
 from legbench.campaign.running import Finished, Progress, finished_of
@@ -70,6 +71,8 @@ def run_on_bench(
     """
     if not 0.0 <= pause < 3600.0:
         raise ConfigError(f"pause is {pause:g} s; it must be 0 to 3600 s")
+    for each in plan.planned:
+        _choice(each)
     asked, say = stop or StopFlag(), note if note is not None else _silent
     places = {each.hash: place for place, each in enumerate(plan.planned)}
     shards = sorted(shards_of(plan, 1), key=lambda shard: places[shard.planned[0].hash])
@@ -78,7 +81,7 @@ def run_on_bench(
         done, failure = len(shards) - len(missing), None
         began = time.monotonic()
         for place, shard in enumerate(missing):
-            if place and not _virtual(shard):
+            if place and moves_drives(shard.planned[0].experiment):
                 wait(pause, asked)
             failure = None if asked.is_set else _run_one(shard, folder, asked, say)
             if failure is not None or asked.is_set:
@@ -94,24 +97,19 @@ def _silent(_line: str) -> None:
     """Tell nobody."""
 
 
-def _choice(shard: Shard) -> CanChoice:
+def _choice(planned: Planned) -> CanChoice:
     """Drives of an experiment; raises ConfigError for another plant."""
-    plant = shard.planned[0].experiment.plant
+    plant = planned.experiment.plant
     if not isinstance(plant, CanChoice):
-        raise ConfigError(f"a bench runs plant 'can'; block {shard.planned[0].block} is on another")
+        raise ConfigError(f"a bench runs plant 'can'; block {planned.block} is on another")
     return plant
-
-
-def _virtual(shard: Shard) -> bool:
-    choice = _choice(shard)
-    return choice.is_virtual(load_bus(choice.bus))
 
 
 def _run_one(shard: Shard, folder: Path, stop: StopFlag, note: Note) -> str | None:
     """Run one experiment and put its rows in place; returns why it could not be, or none."""
     planned = shard.planned[0]
     where = f"{planned.block}, cell {planned.cell}, trial {planned.trial}"
-    choice = _choice(shard)
+    choice = _choice(planned)
     try:
         with open_session(load_bus(choice.bus), choice, leads=False) as session:
             troubles = drive_troubles(session)

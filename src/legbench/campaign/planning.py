@@ -25,7 +25,7 @@ TOLD: Final = 4
 """Number of mistakes, or of cells that the leg cannot do, that a message tells one by one."""
 SEARCHED: Final = 40
 """Number of infeasible cells for which the nearest feasible value is looked for: each takes some
-50 ms, and nobody reads more."""
+0.1 s, and nobody reads more."""
 
 
 def plan_campaign(campaign: Campaign, *, large: bool = False) -> Plan:

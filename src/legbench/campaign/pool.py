@@ -65,7 +65,7 @@ class PoolExecutor(AbstractExecutor):
             with _pool(self._workers, stop) as pool:
                 yield from _run(pool, waiting, suspects, self._workers, stop)
             if suspects:
-                note(f"a worker died; {len(suspects)} shards that were running are run again")
+                note(f"a worker died; shards that were running and are run again: {len(suspects)}")
             for work in suspects:
                 if not stop.is_set:
                     yield from self._again(work, stop)

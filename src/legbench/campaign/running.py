@@ -9,6 +9,7 @@ from typing import Any
 
 import pyarrow as pa
 
+from legbench.campaign.drives import refuse_drives
 from legbench.campaign.executor import AbstractExecutor, Done, Note
 from legbench.campaign.folder import (
     Part,
@@ -87,9 +88,10 @@ def run_campaign(
         note: told what a person should know.
 
     Raises:
-        CampaignError: the folder holds something else or is in use, or a file cannot be written.
-        RecordingError: a recording cannot be written.
+        CampaignError: the folder holds something else or is in use, a file cannot be written, or
+            an experiment moves drives.
     """
+    refuse_drives(plan)
     number, count = part or (1, 1)
     mine = [shard for place, shard in enumerate(shards) if place % count == number - 1]
     with open_folder(folder, plan, part):

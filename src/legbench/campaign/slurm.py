@@ -58,7 +58,7 @@ class SlurmExecutor(AbstractExecutor):
             again: list[Work] = []
             yield from self._wait(running, stop, again)
             if again and not stop.is_set:
-                note(f"{len(again)} jobs died; their shards are run again")
+                note(f"jobs that died, whose shards are run again: {len(again)}")
                 dead: list[Work] = []
                 yield from self._wait(self._submit(again), stop, dead)
                 for work in dead:
