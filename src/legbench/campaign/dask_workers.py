@@ -8,7 +8,7 @@ from typing import Any, final
 
 from legbench.campaign._distributed import Client, KilledWorker, LocalCluster, configured
 from legbench.campaign.executor import AbstractExecutor, Done, Note
-from legbench.campaign.pool import LOOK_EVERY, done_of, workers_or_processors
+from legbench.campaign.pool import LOOK_EVERY, died_twice, done_of, workers_or_processors
 from legbench.campaign.work import Work, do_work
 from legbench.errors import CampaignError
 from legbench.interrupts import StopFlag, children_without_interrupts
@@ -39,23 +39,30 @@ class DaskExecutor(AbstractExecutor):
         self._workers = workers_or_processors(workers)
 
     def run(self, works: Sequence[Work], stop: StopFlag, note: Note) -> Iterator[Done]:
-        """Run shards on the workers; recordings go to a folder that they all must see."""
+        """Run shards on the workers; recordings go to a folder that they all must see.
+
+        A worker that dies takes down what it did and what waited for it: all of that is run again,
+        one shard at a time, and the one that kills its worker once more is named.
+        """
         with self._client() as client:
-            pool = client.get_executor(pure=False)
             width = AHEAD * max(1, len(client.scheduler_info()["workers"]))
-            waiting, running = list(works), dict[Future[bytes], Work]()
-            while (waiting or running) and not stop.is_set:
-                while waiting and len(running) < width:
-                    work = waiting.pop(0)
-                    running[pool.submit(do_work, work)] = work
-                for future in wait(running, LOOK_EVERY, FIRST_COMPLETED).done:
-                    yield _done(running.pop(future), future)
+            suspects: list[Work] = []
+            yield from _run(client, list(works), suspects, width, stop)
+            if suspects:
+                note(f"a worker died; shards that it had and that are run again: {len(suspects)}")
+            for work in suspects:
+                killed: list[Work] = []
+                yield from _run(client, [work], killed, 1, stop)
+                if killed:
+                    yield Done(work=work, failure=died_twice(work))
 
     @contextmanager
     def _client(self) -> Iterator[Any]:
         """Connect to the scheduler, which is begun and ended here where none is named."""
         with ExitStack() as stack:
-            stack.enter_context(configured({"distributed.scheduler.allowed-failures": 1}))
+            # Who waited for a worker that died is as suspect as what it did: neither is blamed for
+            # it, and both come back here at once.
+            stack.enter_context(configured({"distributed.scheduler.allowed-failures": 0}))
             if self._address is not None:
                 try:
                     yield stack.enter_context(
@@ -72,20 +79,25 @@ class DaskExecutor(AbstractExecutor):
                     n_workers=self._workers,
                     threads_per_worker=1,
                     host="127.0.0.1",
-                    dashboard_address=None,  # pyright: ignore[reportArgumentType]
+                    scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
                     silence_logs=logging.CRITICAL,
                 )
             stack.enter_context(cluster)
             yield stack.enter_context(Client(cluster))
 
 
-def _done(work: Work, future: Future[bytes]) -> Done:
-    error = future.exception()
-    if isinstance(error, KilledWorker):
-        first = work.hashes[0][:12]
-        return Done(
-            work=work,
-            failure=f"two workers died of it: {len(work.hashes)} experiments from {first} on; is "
-            "there memory enough for them?",
-        )
-    return done_of(work, error, future)
+def _run(
+    client: Any, waiting: list[Work], suspects: list[Work], width: int, stop: StopFlag
+) -> Iterator[Done]:
+    """Run what waits; what a worker had that died becomes suspect."""
+    pool, running = client.get_executor(pure=False), dict[Future[bytes], Work]()
+    while (waiting or running) and not stop.is_set:
+        while waiting and len(running) < width:
+            work = waiting.pop(0)
+            running[pool.submit(do_work, work)] = work
+        for future in wait(running, LOOK_EVERY, FIRST_COMPLETED).done:
+            work, error = running.pop(future), future.exception()
+            if isinstance(error, KilledWorker):
+                suspects.append(work)
+            else:
+                yield done_of(work, error, future)

@@ -76,12 +76,15 @@ class PoolExecutor(AbstractExecutor):
         with _pool(1, stop) as pool:
             yield from _run(pool, [work], killed, 1, stop)
         if killed:
-            first = work.hashes[0][:12]
-            yield Done(
-                work=work,
-                failure=f"its worker died twice, the second time alone: {len(work.hashes)} "
-                f"experiments from {first} on; is there memory enough for them?",
-            )
+            yield Done(work=work, failure=died_twice(work))
+
+
+def died_twice(work: Work) -> str:
+    """What to say of a shard that has killed its worker, and alone once more."""
+    return (
+        f"its worker died twice, the second time alone: {len(work.hashes)} experiments from "
+        f"{work.hashes[0][:12]} on; is there memory enough for them?"
+    )
 
 
 def workers_or_processors(workers: int | None) -> int:
