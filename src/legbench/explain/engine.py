@@ -1,0 +1,114 @@
+"""Rating of many imperfect legs in one fixed setup, as the analytic plant would run each.
+
+    shapes = rate_many(experiment, [Imperfections(stiffness_error=(0.0, 0.03)), ...], periods=6)
+
+Motors that stand still between two commands leave the motion to the compiled equations; what acts
+on the motors every cycle is integrated as arrays, in step with controller and servo.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from legbench.control import PositionJumpConfig
+from legbench.design.setup import SetupKind
+from legbench.errors import ConfigError
+from legbench.experiment import Experiment
+from legbench.explain.held import move_held
+from legbench.explain.rating import Shapes, rate_rows
+from legbench.explain.sampled import move_sampled
+from legbench.imperfections import Imperfections
+from legbench.plant.start import PERIOD
+from legbench.signals import Ints
+
+ROWS_TOGETHER = 400_000
+"""Number of rows of all legs that are kept at once [-]: some tens of megabytes, whatever number of
+legs is asked for."""
+
+Progress = Callable[[int], None]
+"""Function that is called with the number of legs that were rated since the last call."""
+
+
+def rate_many(
+    experiment: Experiment,
+    imperfections: Sequence[Imperfections],
+    *,
+    periods: int,
+    progress: Progress | None = None,
+) -> Shapes:
+    """Rate the leading periods of an experiment for many legs with imperfections of their own.
+
+    A guide's damping acts in `ffs` alone and is left out elsewhere, where nothing guides the trunk.
+
+    Args:
+        experiment: what is done in a fixed setup; its own imperfections and plant do not count.
+        imperfections: one for each leg, without noise.
+        periods: how many periods to rate.
+        progress: told how many legs are done.
+
+    Raises:
+        ConfigError: the leg jumps or hangs on a boom, an encoder is noisy, or a leg cannot be.
+    """
+    check(experiment, imperfections)
+    legs = [in_setup(each, experiment.setup.kind) for each in imperfections]
+    held = np.array([_held(experiment, each) for each in legs], dtype=np.bool_)
+    together = max(8, ROWS_TOGETHER // round(experiment.duration / PERIOD))
+    parts: list[Shapes] = []
+    places: list[Ints] = []
+
+    def rate(chosen: Ints, *, compiled: bool) -> None:
+        for first in range(0, len(chosen), together):
+            part = chosen[first : first + together]
+            some = [legs[place] for place in part]
+            if compiled:
+                rows, outside = move_held(experiment, some)
+                again.extend(part[outside])
+                rows, part = rows.taken(~outside), part[~outside]
+            else:
+                rows = move_sampled(experiment, some)
+            parts.append(rate_rows(rows, periods, experiment.controller.describe().counting))
+            places.append(part)
+            if progress is not None:
+                progress(len(part))
+
+    again: list[int] = []
+    # Legs without friction and guide have shorter equations.
+    extras = np.array(
+        [(each.coulomb_friction is not None, each.guide_damping is not None) for each in legs]
+    )
+    for kind in np.unique(extras[held], axis=0):
+        rate(np.flatnonzero(held & (extras == kind).all(axis=1)), compiled=True)
+    rate(np.array([*np.flatnonzero(~held), *again], dtype=np.int64), compiled=False)
+    return Shapes.joined(parts).taken(np.argsort(np.concatenate(places)))
+
+
+def check(experiment: Experiment, imperfections: Sequence[Imperfections]) -> None:
+    """Refuse what the equations of held legs do not know; raises ConfigError."""
+    if not imperfections:
+        raise ConfigError("no leg to rate; give the imperfections of one leg or more")
+    setup = experiment.setup
+    if setup.kind is SetupKind.JUMP or setup.boom_radius is not None:
+        raise ConfigError(
+            f"setup {setup.kind}{'' if setup.boom_radius is None else ' with a boom'} is not for "
+            "many legs at once; hold them in hfts, vfts or ffs, without a boom"
+        )
+    for each in imperfections:
+        if each.link_noise is not None or each.motor_noise is not None:
+            raise ConfigError("encoder noise is not rated for many legs at once; leave it out")
+
+
+def in_setup(imperfections: Imperfections, setup: SetupKind) -> Imperfections:
+    """Imperfections that act in a setup: what guides the trunk is there in `ffs` alone."""
+    return imperfections if setup is SetupKind.FFS else replace(imperfections, guide_damping=None)
+
+
+def _held(experiment: Experiment, imperfections: Imperfections) -> bool:
+    """Whether the motors stand still from the first control action on."""
+    return (
+        isinstance(experiment.controller, PositionJumpConfig)
+        and experiment.servo.ideal
+        and imperfections.backlash is None
+        and imperfections.motor_slew_rate is None
+        and not any(imperfections.motor_delay_cycles or (0,))
+    )

@@ -1,0 +1,80 @@
+"""Rows of many legs as their encoders show them."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from legbench.control import LegTargets
+from legbench.experiment import Experiment, targets_of
+from legbench.explain.rating import Rows
+from legbench.imperfections import Imperfections
+from legbench.kinematics import joint_to_modal
+from legbench.metrics.rating import link_equilibrium
+from legbench.plant.start import PERIOD
+from legbench.servo import Servo
+from legbench.signals import Floats
+
+STRAIGHT_MARGIN = 0.02
+"""Distance of a knee from 0 or pi at which it has gone through its stop, as in a run [rad]."""
+
+
+def targets_of_many(experiment: Experiment, count: int) -> LegTargets:
+    """Set points of so many legs, all of the design that the controller believes."""
+    one = targets_of(experiment)
+    return LegTargets(
+        designs=[experiment.design] * count,
+        support=one.support,
+        meaning=one.meaning,
+        convention=one.convention,
+    )
+
+
+def first_action(experiment: Experiment) -> int:
+    """Row of the first control action, which follows a time at rest."""
+    times = np.arange(round(experiment.duration / PERIOD)) * PERIOD
+    return int(np.searchsorted(times, getattr(experiment.controller, "delay", 0.0)))
+
+
+def measured(
+    experiment: Experiment,
+    imperfections: Sequence[Imperfections],
+    servo: Servo,
+    joint_pos: Floats,
+    joint_vel: Floats,
+    motor_pos: Floats,
+) -> Rows:
+    """Rows of many legs as a recording has them, and their deflections.
+
+    Args:
+        experiment: what is done.
+        imperfections: of each leg.
+        servo: drives of the legs, whose encoders count.
+        joint_pos: true link angles (n, t, 2) [rad].
+        joint_vel: their rates (n, t, 2) [rad/s].
+        motor_pos: positions that the motors' encoders show, uncounted (n, t, 2) [rad].
+    """
+    convention = experiment.conventions.modal
+    knee = joint_pos[..., 1] - joint_pos[..., 0]
+    whole = (knee > STRAIGHT_MARGIN) & (knee < np.pi - STRAIGHT_MARGIN)
+    zero = np.array([each.link_zero or (0.0, 0.0) for each in imperfections])
+    if experiment.servo.encoder_counts is None:
+        shown, motors = joint_pos + zero[:, np.newaxis], motor_pos
+    else:
+        shown = _encoded(servo, joint_pos + zero[:, np.newaxis])
+        motors = _encoded(servo, motor_pos)
+    support = experiment.setup.support
+    flat = motors.reshape(-1, 2)
+    equilibrium = link_equilibrium(experiment.design, flat, support).reshape(motors.shape)
+    broken = ~(whole & np.isfinite(joint_vel).all(axis=-1)).all(axis=1)
+    return Rows(
+        radial=joint_to_modal(shown, convention)[..., 1],
+        radial_rate=joint_to_modal(joint_vel, convention)[..., 1],
+        about_equilibrium=shown - equilibrium,
+        about_motor=shown - motors,
+        broken=broken,
+    )
+
+
+def _encoded(servo: Servo, angles: Floats) -> Floats:
+    """Angles (n, t, 2) as counts; the servo takes the legs of one instant (n, 2)."""
+    return np.stack([servo.encode(row) for row in np.moveaxis(angles, 1, 0)], axis=1)
