@@ -16,7 +16,7 @@ from legbench.design.setup import SetupKind
 from legbench.errors import ConfigError
 from legbench.experiment import Experiment
 from legbench.explain.held import move_held
-from legbench.explain.rating import Shapes, rate_rows
+from legbench.explain.rating import Rows, Shapes, rate_rows
 from legbench.explain.sampled import move_sampled
 from legbench.imperfections import Imperfections
 from legbench.plant.start import PERIOD
@@ -25,6 +25,10 @@ from legbench.signals import Ints
 ROWS_TOGETHER = 400_000
 """Number of rows of all legs that are kept at once [-]: some tens of megabytes, whatever number of
 legs is asked for."""
+
+IN_STEP = 4
+"""Number of such batches that move in step where motors move cycle by cycle [-]: the interpreter's
+time for a cycle does not grow with the legs."""
 
 Progress = Callable[[int], None]
 """Function that is called with the number of legs that were rated since the last call."""
@@ -54,33 +58,35 @@ def rate_many(
     legs = [in_setup(each, experiment.setup.kind) for each in imperfections]
     held = np.array([_held(experiment, each) for each in legs], dtype=np.bool_)
     together = max(8, ROWS_TOGETHER // round(experiment.duration / PERIOD))
+    counting = experiment.controller.describe().counting
     parts: list[Shapes] = []
     places: list[Ints] = []
 
-    def rate(chosen: Ints, *, compiled: bool) -> None:
-        for first in range(0, len(chosen), together):
-            part = chosen[first : first + together]
-            some = [legs[place] for place in part]
-            if compiled:
-                rows, outside = move_held(experiment, some)
-                again.extend(part[outside])
-                rows, part = rows.taken(~outside), part[~outside]
-            else:
-                rows = move_sampled(experiment, some)
-            parts.append(rate_rows(rows, periods, experiment.controller.describe().counting))
-            places.append(part)
-            if progress is not None:
-                progress(len(part))
+    def take(part: Ints, rows: Rows) -> None:
+        parts.append(rate_rows(rows, periods, counting))
+        places.append(part)
+        if progress is not None:
+            progress(len(part))
 
     again: list[int] = []
     # Legs without friction and guide have shorter equations.
-    extras = np.array(
-        [(each.coulomb_friction is not None, each.guide_damping is not None) for each in legs]
-    )
+    extras = np.array([(leg.coulomb_friction is None, leg.guide_damping is None) for leg in legs])
     for kind in np.unique(extras[held], axis=0):
-        rate(np.flatnonzero(held & (extras == kind).all(axis=1)), compiled=True)
-    rate(np.array([*np.flatnonzero(~held), *again], dtype=np.int64), compiled=False)
+        chosen = np.flatnonzero(held & (extras == kind).all(axis=1))
+        for part in _split(chosen, together):
+            rows, outside = move_held(experiment, [legs[place] for place in part])
+            again.extend(part[outside])
+            take(part[~outside], rows.taken(~outside))
+    rest = np.array([*np.flatnonzero(~held), *again], dtype=np.int64)
+    for batch in _split(rest, IN_STEP * together):
+        moved = move_sampled(experiment, [legs[place] for place in batch], together)
+        for part, rows in zip(_split(batch, together), moved, strict=True):
+            take(part, rows)
     return Shapes.joined(parts).taken(np.argsort(np.concatenate(places)))
+
+
+def _split(places: Ints, size: int) -> list[Ints]:
+    return [places[first : first + size] for first in range(0, len(places), size)]
 
 
 def check(experiment: Experiment, imperfections: Sequence[Imperfections]) -> None:

@@ -1,6 +1,6 @@
 """Motion of legs whose motors move cycle by cycle, as arrays: controller, servo, play and stops."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -23,8 +23,13 @@ FRICTION_PARTS = 4
 """Number of steps in a period where there is dry friction, which is then harder [-]."""
 
 
-def move_sampled(experiment: Experiment, imperfections: Sequence[Imperfections]) -> Rows:
-    """Rows of an experiment of many legs, cycle by cycle, by Runge-Kutta steps of a period or less."""
+def move_sampled(
+    experiment: Experiment, imperfections: Sequence[Imperfections], together: int
+) -> Iterator[Rows]:
+    """Rows of an experiment of many legs, `together` legs at a time in their order.
+
+    All legs move in step, by Runge-Kutta steps of a period or less.
+    """
     count, first = len(imperfections), first_action(experiment)
     targets = targets_of_many(experiment, count)
     controller = make_controllers([experiment.controller] * count, targets)
@@ -47,14 +52,16 @@ def move_sampled(experiment: Experiment, imperfections: Sequence[Imperfections])
         shaft = servo.shaft(servo.follow(controller.step(seen).motor_pos))
         for _ in range(parts):
             q, v = advance(legs, (shaft[:, 0], shaft[:, 1]), q, v, PERIOD / parts)
-    joint_pos, joint_vel, motor_pos = (np.moveaxis(each, 0, 1) for each in kept)
-    return measured(experiment, imperfections, servo, joint_pos, joint_vel, motor_pos)
+    for begin in range(0, count, together):
+        part = slice(begin, begin + together)
+        joint_pos, joint_vel, motor_pos = (np.moveaxis(each[:, part], 0, 1) for each in kept)
+        yield measured(experiment, imperfections[part], servo, joint_pos, joint_vel, motor_pos)
 
 
 def many_legs(
     experiment: Experiment, imperfections: Sequence[Imperfections], step: float
 ) -> ManyLegs:
-    """Constants of the legs as they were built, held as the setup has it, for steps of `step` [s]."""
+    """Constants of the legs as they were built and are held, for steps of `step` [s]."""
     kind = experiment.setup.kind
     gravity = 0.0 if kind is SetupKind.HFTS else GRAVITY
     models = [
