@@ -62,11 +62,16 @@ def make_folder(path: Path) -> None:
         ) from error
 
 
-def progress(done: int, total: int) -> None:
+def progress(done: int, total: int, left: float | None = None) -> None:
     """Draw a line that overwrites itself, on a terminal that takes it at once.
 
     A stalled terminal (^S, a lost connection) must not hold up who reports, and one that is gone
     is no terminal.
+
+    Args:
+        done: how much is done.
+        total: how much there is to do.
+        left: time that the rest will take, where that is known [s].
     """
     if not _draws():
         return
@@ -74,7 +79,16 @@ def progress(done: int, total: int) -> None:
     filled = width * done // max(total, 1)
     bar = "#" * filled + "-" * (width - filled)
     end = "\n" if done >= total else ""
-    _to_stderr(f"\r[{bar}] {100 * done // max(total, 1):3d} %{end}")
+    # Blanks overwrite what a longer line before has left.
+    rest = f", {duration_text(left)} left" if left is not None and done < total else ""
+    _to_stderr(f"\r[{bar}] {100 * done // max(total, 1):3d} %{rest:<18}{end}")
+
+
+def duration_text(seconds: float) -> str:
+    """Return a time in hours, minutes and seconds, as 1:02:03 or 2:03 [s]."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
 
 
 def _draws() -> bool:
