@@ -7,7 +7,7 @@ on the motors every cycle is integrated as arrays, in step with controller and s
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,8 +30,21 @@ IN_STEP = 4
 """Number of such batches that move in step where motors move cycle by cycle [-]: the interpreter's
 time for a cycle does not grow with the legs."""
 
-Progress = Callable[[int], None]
-"""Function that is called with the number of legs that were rated since the last call."""
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Watch:
+    """Ears and eyes of who waits for a long computation; by default nobody does."""
+
+    begin: Callable[[str, int], None] = lambda _stage, _legs: None
+    """Called with the name of a stage that begins and the number of legs that it rates, about."""
+    advance: Callable[[int], None] = lambda _legs: None
+    """Called with the number of legs that were rated since the last call."""
+    stopped: Callable[[], bool] = lambda: False
+    """Asked between batches whether to end with what is there."""
+
+
+NOBODY = Watch()
+"""Watch of a computation that nobody waits for."""
 
 
 def rate_many(
@@ -39,17 +52,18 @@ def rate_many(
     imperfections: Sequence[Imperfections],
     *,
     periods: int,
-    progress: Progress | None = None,
+    watch: Watch = NOBODY,
 ) -> Shapes:
     """Rate the leading periods of an experiment for many legs with imperfections of their own.
 
     A guide's damping acts in `ffs` alone and is left out elsewhere, where nothing guides the trunk.
+    Legs that were not reached before the watch stopped have no ratings (NaN).
 
     Args:
         experiment: what is done in a fixed setup; its own imperfections and plant do not count.
         imperfections: one for each leg, without noise.
         periods: how many periods to rate.
-        progress: told how many legs are done.
+        watch: told how many legs are done, and asked whether to end.
 
     Raises:
         ConfigError: the leg jumps or hangs on a boom, an encoder is noisy, or a leg cannot be.
@@ -59,30 +73,31 @@ def rate_many(
     held = np.array([_held(experiment, each) for each in legs], dtype=np.bool_)
     together = max(8, ROWS_TOGETHER // round(experiment.duration / PERIOD))
     counting = experiment.controller.describe().counting
-    parts: list[Shapes] = []
-    places: list[Ints] = []
+    found = Shapes.unknown(len(legs), periods)
 
     def take(part: Ints, rows: Rows) -> None:
-        parts.append(rate_rows(rows, periods, counting))
-        places.append(part)
-        if progress is not None:
-            progress(len(part))
+        found.put(part, rate_rows(rows, periods, counting))
+        watch.advance(len(part))
 
     again: list[int] = []
     # Legs without friction and guide have shorter equations.
     extras = np.array([(leg.coulomb_friction is None, leg.guide_damping is None) for leg in legs])
     for kind in np.unique(extras[held], axis=0):
-        chosen = np.flatnonzero(held & (extras == kind).all(axis=1))
-        for part in _split(chosen, together):
-            rows, outside = move_held(experiment, [legs[place] for place in part])
-            again.extend(part[outside])
-            take(part[~outside], rows.taken(~outside))
+        for part in _split(np.flatnonzero(held & (extras == kind).all(axis=1)), together):
+            if not watch.stopped():
+                rows, outside = move_held(experiment, [legs[place] for place in part])
+                again.extend(part[outside])
+                take(part[~outside], rows.taken(~outside))
     rest = np.array([*np.flatnonzero(~held), *again], dtype=np.int64)
-    for batch in _split(rest, IN_STEP * together):
-        moved = move_sampled(experiment, [legs[place] for place in batch], together)
-        for part, rows in zip(_split(batch, together), moved, strict=True):
-            take(part, rows)
-    return Shapes.joined(parts).taken(np.argsort(np.concatenate(places)))
+    # Dry friction needs shorter steps.
+    for smooth in (True, False):
+        for batch in _split(rest[extras[rest, 0] == smooth], IN_STEP * together):
+            moved = move_sampled(
+                experiment, [legs[place] for place in batch], together, watch.stopped
+            )
+            for part, rows in zip(_split(batch, together), moved, strict=False):
+                take(part, rows)
+    return found
 
 
 def _split(places: Ints, size: int) -> list[Ints]:

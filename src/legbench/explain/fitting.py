@@ -13,8 +13,8 @@ import numpy as np
 from legbench.design import LegDesign
 from legbench.errors import ConfigError
 from legbench.explain.causes import Cause, combined
-from legbench.explain.engine import Progress, rate_many
-from legbench.explain.least_squares import refine
+from legbench.explain.engine import NOBODY, Watch, rate_many
+from legbench.explain.least_squares import DAMPINGS, ROUNDS, refine
 from legbench.explain.targets import Target
 from legbench.imperfections import Imperfections
 from legbench.servo import PERFECT
@@ -28,6 +28,8 @@ VALLEYS = 2
 """Number of valleys of each cause or pair that are followed to their bottoms [-]."""
 DIFFERENCE = 2e-3
 """Length of the differences that give slopes, as a share of a cause's range [-]."""
+MATTERS = 0.01
+"""Change of a rating below which a cause does not matter [-]: half of what a figure shows."""
 FOLLOWED = 40
 """Number of pairs, the best on the grid, that are followed [-]."""
 
@@ -77,7 +79,7 @@ def rate(
     design: LegDesign,
     target: Target,
     legs: Sequence[Imperfections | None],
-    progress: Progress | None = None,
+    watch: Watch = NOBODY,
 ) -> tuple[Floats, Floats]:
     """Residuals (n, m) in tolerances and ratings (n, m) of legs; of none, NaN and missing."""
     known = [leg for leg in legs if leg is not None]
@@ -85,7 +87,7 @@ def rate(
     periods = len(target.shape)
     ratings, amplitude = np.full((2, len(legs), periods), np.nan)
     if known:
-        shapes = rate_many(target.experiment(design), known, periods=periods, progress=progress)
+        shapes = rate_many(target.experiment(design), known, periods=periods, watch=watch)
         ratings[places], amplitude[places] = shapes.equilibrium, shapes.amplitude
     return target.residuals(ratings, amplitude), ratings
 
@@ -106,25 +108,38 @@ def fit_singles(
     design: LegDesign,
     target: Target,
     causes: Sequence[Cause],
-    progress: Progress | None = None,
+    watch: Watch = NOBODY,
 ) -> list[Fit]:
     """Fit each cause alone, the best first."""
-    return _fit(design, target, [(cause,) for cause in causes], GRID_SINGLE, progress)
+    return _fit(design, target, [(cause,) for cause in causes], GRID_SINGLE, watch)
 
 
 def fit_pairs(
     design: LegDesign,
     target: Target,
     causes: Sequence[Cause],
-    progress: Progress | None = None,
+    watch: Watch = NOBODY,
 ) -> list[Fit]:
     """Fit every two causes together, the best first."""
-    return _fit(design, target, list(combinations(causes, 2)), GRID_PAIR, progress)
+    return _fit(design, target, list(combinations(causes, 2)), GRID_PAIR, watch)
 
 
-def count_legs(singles: int, pairs: int) -> int:
-    """Number of legs that the grids of so many single causes and pairs need, about [-]."""
-    return singles * GRID_SINGLE + pairs * GRID_PAIR**2
+def count_fitted(groups: int, causes: int) -> int:
+    """Number of legs that fits of so many groups of one or two causes rate, about [-]."""
+    grid = GRID_SINGLE if causes == 1 else GRID_PAIR**2
+    return groups * grid + min(groups, FOLLOWED) * VALLEYS * (2 + ROUNDS * (causes + len(DAMPINGS)))
+
+
+def effective(
+    design: LegDesign, target: Target, causes: Sequence[Cause], watch: Watch = NOBODY
+) -> list[Cause]:
+    """Causes that change a rating by more than `MATTERS` somewhere at the ends of their range."""
+    ends = [leg_of(design, [cause], [end]) for cause in causes for end in (cause.low, cause.high)]
+    _, ratings = rate(design, target, [PERFECT, *ends], watch)
+    apart = np.abs(ratings[1:] - ratings[0]).reshape(len(causes), -1)
+    # A period that is gone is a change, too.
+    matters = ~(apart <= MATTERS).all(axis=1)
+    return [cause for cause, counts in zip(causes, matters, strict=True) if counts]
 
 
 def sizes_of(cause: Cause, count: int) -> Floats:
@@ -142,17 +157,17 @@ def _fit(
     target: Target,
     groups: Sequence[tuple[Cause, ...]],
     count: int,
-    progress: Progress | None,
+    watch: Watch,
 ) -> list[Fit]:
     grids = [_grid(group, count) for group in groups]
-    found = _evaluated(design, target, list(zip(groups, grids, strict=True)), progress)
+    found = _evaluated(design, target, list(zip(groups, grids, strict=True)), watch)
     costs = [np.mean(np.square(residuals), axis=1) for residuals, _ in found]
     order = np.argsort([cost.min() for cost in costs])[:FOLLOWED]
     fits = _followed(
         design,
         target,
         [(groups[place], _valleys(grids[place], costs[place])) for place in order],
-        progress,
+        watch,
     )
     rest = [
         _best(groups[place], grids[place], *found[place])
@@ -172,11 +187,11 @@ def _evaluated(
     design: LegDesign,
     target: Target,
     points: Sequence[tuple[tuple[Cause, ...], Floats]],
-    progress: Progress | None,
+    watch: Watch,
 ) -> list[tuple[Floats, Floats]]:
     """Residuals and ratings of sizes (n, d) of several groups, rated together."""
     legs = [leg_of(design, group, row) for group, sizes in points for row in sizes]
-    residuals, ratings = rate(design, target, legs, progress)
+    residuals, ratings = rate(design, target, legs, watch)
     ends = np.cumsum([len(sizes) for _, sizes in points])[:-1]
     return list(zip(np.split(residuals, ends), np.split(ratings, ends), strict=True))
 
@@ -198,14 +213,14 @@ def _followed(
     design: LegDesign,
     target: Target,
     valleys: Sequence[tuple[tuple[Cause, ...], Floats]],
-    progress: Progress | None,
+    watch: Watch,
 ) -> list[Fit]:
     """Follow the valleys (v, d) of all groups at once to the best bottom of each group."""
     owners = [group for group, starts in valleys for _ in starts]
 
     def residuals(sizes: Floats, which: Ints) -> Floats:
         legs = [leg_of(design, owners[o], row) for o, row in zip(which, sizes, strict=True)]
-        return rate(design, target, legs, progress)[0]
+        return rate(design, target, legs, watch)[0]
 
     starts = np.concatenate([each for _, each in valleys])
     low, high, whole = (
@@ -217,7 +232,7 @@ def _followed(
     ends = np.where(whole, np.round(ends), ends)
     parts = np.split(ends, np.cumsum([len(each) for _, each in valleys])[:-1])
     points = [(group, part) for (group, _), part in zip(valleys, parts, strict=True)]
-    found = _evaluated(design, target, points, progress)
+    found = _evaluated(design, target, points, watch)
     return [_best(*point, *values) for point, values in zip(points, found, strict=True)]
 
 

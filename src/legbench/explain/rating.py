@@ -29,25 +29,27 @@ class Shapes:
         return len(self.counted)
 
     @classmethod
-    def joined(cls, parts: "list[Shapes]") -> "Shapes":
-        """Put batches together that have the same number of periods."""
+    def unknown(cls, count: int, periods: int) -> "Shapes":
+        """Ratings of so many runs that have still to be put in."""
+        equilibrium, motor, amplitude = np.full((3, count, periods), np.nan)
         return cls(
-            equilibrium=np.concatenate([part.equilibrium for part in parts]),
-            motor=np.concatenate([part.motor for part in parts]),
-            amplitude=np.concatenate([part.amplitude for part in parts]),
-            counted=np.concatenate([part.counted for part in parts]),
-            broken=np.concatenate([part.broken for part in parts]),
+            equilibrium=equilibrium,
+            motor=motor,
+            amplitude=amplitude,
+            counted=np.zeros(count, dtype=np.int64),
+            broken=np.zeros(count, dtype=np.bool_),
         )
 
-    def taken(self, places: Ints) -> "Shapes":
-        """Choose runs by their places, in that order."""
-        return Shapes(
-            equilibrium=self.equilibrium[places],
-            motor=self.motor[places],
-            amplitude=self.amplitude[places],
-            counted=self.counted[places],
-            broken=self.broken[places],
-        )
+    def put(self, places: Ints, some: "Shapes") -> None:
+        """Put the ratings of some runs into their places (m,)."""
+        for mine, theirs in (
+            (self.equilibrium, some.equilibrium),
+            (self.motor, some.motor),
+            (self.amplitude, some.amplitude),
+            (self.counted, some.counted),
+            (self.broken, some.broken),
+        ):
+            mine[places] = theirs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

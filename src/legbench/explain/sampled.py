@@ -1,6 +1,6 @@
 """Motion of legs whose motors move cycle by cycle, as arrays: controller, servo, play and stops."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -21,14 +21,20 @@ from legbench.signals import Floats, Observation
 
 FRICTION_PARTS = 4
 """Number of steps in a period where there is dry friction, which is then harder [-]."""
+LOOK_EVERY = 250
+"""Number of cycles after which it is asked whether to stop [-]."""
 
 
 def move_sampled(
-    experiment: Experiment, imperfections: Sequence[Imperfections], together: int
+    experiment: Experiment,
+    imperfections: Sequence[Imperfections],
+    together: int,
+    stopped: Callable[[], bool],
 ) -> Iterator[Rows]:
     """Rows of an experiment of many legs, `together` legs at a time in their order.
 
-    All legs move in step, by Runge-Kutta steps of a period or less.
+    All legs move in step, by Runge-Kutta steps of a period or less. There are no rows once
+    `stopped` says so.
     """
     count, first = len(imperfections), first_action(experiment)
     targets = targets_of_many(experiment, count)
@@ -44,6 +50,8 @@ def move_sampled(
     kept = np.empty((3, cycles - first, count, 2))
     q, v = rest.T.copy(), np.zeros_like(rest.T)
     for cycle in range(cycles):
+        if cycle % LOOK_EVERY == 0 and stopped():
+            return
         seen = _observation(cycle, servo, q.T + zero, v.T, stiffness)
         if cycle == 0:
             controller.reset(seen)

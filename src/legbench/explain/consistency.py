@@ -1,0 +1,184 @@
+"""Consistency of a fit with what else was measured on the same leg: other setups, and the jump.
+
+Every check is one statement of section VI. A statement that says nothing of a setting, such as the
+order of the setups, is tried at the target's own.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from legbench.control import BangBangConfig
+from legbench.design import LegDesign
+from legbench.design.setup import Setup, SetupKind
+from legbench.experiment import Experiment
+from legbench.explain.engine import NOBODY, Watch, rate_many
+from legbench.explain.jumping import LOWEST, Hop
+from legbench.explain.targets import READING, Target, step_experiment
+from legbench.imperfections import Imperfections
+from legbench.paper import Published
+from legbench.signals import Floats, Ints
+
+TRANSIENT = 3
+"""Number of periods before the limit cycle (Fig. 4) [-]."""
+BANG_BANG_PERIODS = 20
+"""Number of periods that the paper rates (Fig. 5) [-]."""
+DURATIONS = {SetupKind.FFS: 8.0, SetupKind.HFTS: 2.5, SetupKind.VFTS: 2.5}
+"""Setup -> time of bang-bang [s]: eight seconds as in the paper where there are fewer periods than
+are rated, and as many as show a saturated rating where there are more."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Check:
+    """One statement of the paper, tried on one leg."""
+
+    name: str
+    words: str
+    """Statement in words."""
+    value: str
+    """What the leg does, in words or numbers."""
+    held: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Predicted:
+    """Ratings of n legs in everything that is checked; each row belongs to one leg."""
+
+    bang_bang: Floats
+    """Mean P^r after the transient of bang-bang with the foot fixed (n,) [-]."""
+    steps: dict[SetupKind, Floats]
+    """Setup -> ratings of the same step (n, p), NaN where the paper would not count [-]."""
+    folded: dict[SetupKind, tuple[Floats, Floats]]
+    """Setup with fixed trunk -> mean P^r of bang-bang at the set point that the paper finds lower,
+    and at the usual one, each (n,) [-]."""
+
+
+def predict(
+    design: LegDesign,
+    target: Target,
+    numbers: Mapping[str, Published],
+    legs: Sequence[Imperfections],
+    watch: Watch = NOBODY,
+) -> Predicted:
+    """Rate legs in everything that is checked beside the target itself."""
+    middle, amplitude = (numbers[key].value for key in ("bang_bang_middle", "bang_bang_amplitude"))
+    lower = numbers["lower_rated_set_point"].value
+
+    def level(setup: SetupKind, z2: float) -> Floats:
+        experiment = bang_bang_experiment(design, setup, z2, amplitude)
+        shapes = rate_many(experiment, legs, periods=BANG_BANG_PERIODS, watch=watch)
+        return settled(shapes.equilibrium)
+
+    steps = {}
+    for setup in (SetupKind.HFTS, SetupKind.VFTS, SetupKind.FFS):
+        experiment = step_experiment(design, setup, target.z2, target.dz2)
+        shapes = rate_many(experiment, legs, periods=len(target.shape), watch=watch)
+        steps[setup] = only_counted(shapes.equilibrium, shapes.counted)
+    return Predicted(
+        bang_bang=level(SetupKind.FFS, middle),
+        steps=steps,
+        folded={
+            setup: (level(setup, lower), level(setup, middle))
+            for setup in (SetupKind.HFTS, SetupKind.VFTS)
+        },
+    )
+
+
+def count_predictions(legs: int) -> int:
+    """Number of legs that `predict` rates for so many [-]."""
+    return 8 * legs
+
+
+def bang_bang_experiment(design: LegDesign, setup: SetupKind, z2: float, dz2: float) -> Experiment:
+    """Bang-bang between z2 + dz2 and z2 - dz2 in a fixed setup."""
+    return Experiment(
+        design=design,
+        controller=BangBangConfig(z2=z2, dz2=dz2, threshold=THRESHOLD * dz2),
+        setup=Setup(kind=setup),
+        duration=DURATIONS[setup],
+    )
+
+
+THRESHOLD = 0.65
+"""Threshold of bang-bang over its amplitude [N m/rad], a quarter of the springs' stiffness: the
+ratio of the controller's own defaults."""
+
+
+def settled(ratings: Floats) -> Floats:
+    """Mean (n,) of ratings (n, p) after the transient; NaN without any."""
+    late = ratings[:, TRANSIENT:]
+    count = np.isfinite(late).sum(axis=1)
+    return np.where(count > 0, np.nansum(late, axis=1) / np.maximum(count, 1), np.nan)
+
+
+def only_counted(ratings: Floats, counted: Ints) -> Floats:
+    """Ratings (n, p) of the periods that the paper would count; NaN for the others."""
+    return np.where(np.arange(ratings.shape[1]) < counted[:, np.newaxis], ratings, np.nan)
+
+
+def checks_of(
+    predicted: Predicted, leg: int, hop: Hop | None, numbers: Mapping[str, Published]
+) -> tuple[Check, ...]:
+    """Statements of the paper on one of the legs; without a hop, none on the jump."""
+    level, wanted = float(predicted.bang_bang[leg]), numbers["bang_bang_rating"].value
+    found = [
+        Check(
+            name="bang-bang",
+            words=f"bang-bang with the foot fixed settles at {wanted:.2f}",
+            value=f"{level:.3f}",
+            held=abs(level - wanted) <= READING,
+        ),
+        *_orders(predicted, leg),
+        *(_folded(predicted, leg, setup) for setup in predicted.folded),
+    ]
+    if hop is not None:
+        found += _jump(hop, numbers)
+    return tuple(found)
+
+
+def _orders(predicted: Predicted, leg: int) -> list[Check]:
+    """Orders of the setups, in the last period that the paper would count in both."""
+
+    def compare(low: SetupKind, high: SetupKind, words: str) -> Check:
+        rows = [predicted.steps[setup][leg] for setup in (low, high)]
+        common = np.flatnonzero(np.isfinite(rows[0]) & np.isfinite(rows[1]))
+        if len(common) == 0:
+            return Check(name=f"{low} < {high}", words=words, value="no period", held=False)
+        last = int(common[-1])
+        below, above = (float(row[last]) for row in rows)
+        value = f"{below:.3f} and {above:.3f} in period {last + 1}"
+        return Check(name=f"{low} < {high}", words=words, value=value, held=below < above)
+
+    return [
+        compare(SetupKind.FFS, SetupKind.HFTS, "the fixed foot is rated lower than hfts"),
+        compare(SetupKind.FFS, SetupKind.VFTS, "the fixed foot is rated lower than vfts"),
+        compare(SetupKind.HFTS, SetupKind.VFTS, "vfts is rated better than hfts in the end"),
+    ]
+
+
+def _folded(predicted: Predicted, leg: int, setup: SetupKind) -> Check:
+    lower, usual = (float(values[leg]) for values in predicted.folded[setup])
+    return Check(
+        name=f"{setup} folded",
+        words=f"bang-bang in {setup} is rated lower at z2 = 1.8 rad",
+        value=f"{lower:.3f} and {usual:.3f}",
+        held=lower < usual - READING,
+    )
+
+
+def _jump(hop: Hop, numbers: Mapping[str, Published]) -> list[Check]:
+    """Bounds of the ratings of a jump, which hold whatever height it reaches."""
+    found = []
+    for name, words in LOWEST.items():
+        least = numbers[f"jump_rating_{name}"].value
+        value = getattr(hop, name)
+        found.append(
+            Check(
+                name=f"jump, {name}",
+                words=f"every {words} of the jump is rated above {least:.2f}",
+                value=hop.cause or f"{value:.4f}",
+                held=hop.cause is None and value > least,
+            )
+        )
+    return found
