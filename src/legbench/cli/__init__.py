@@ -18,6 +18,7 @@ COMMANDS = {
     "design": "find a leg that meets requirements and modal matching",
     "check": "check a leg against the conditions of modal matching",
     "modes": "linear and nonlinear modes of a leg",
+    "explain": "find which imperfections explain measured ratings",
     "hop": "apex return map, periodic hops and basin of a leg",
     "drives": "commission the servo drives, or emulate them",
 }

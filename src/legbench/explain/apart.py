@@ -50,6 +50,8 @@ class Proposal:
     """Smallest difference of two explanations, in accuracies of the reading [-]."""
     nearest_names: tuple[str, str]
     """Names of the two explanations that it tells apart least."""
+    names: tuple[str, ...]
+    """Names of the explanations."""
     ratings: Floats
     """Ratings P^r that each explanation predicts (k, p), NaN where no period counts [-]."""
     posture: Floats
@@ -121,6 +123,7 @@ def _proposal(
         pairs=len(pairs),
         nearest=float(apart[least]),
         nearest_names=(fits[first].name, fits[second].name),
+        names=tuple(fit.name for fit in fits),
         ratings=ratings,
         posture=posture,
     )

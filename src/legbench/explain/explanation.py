@@ -18,6 +18,7 @@ from legbench.explain.fitting import (
     perfect_fit,
 )
 from legbench.explain.jumping import Hop, hop_of
+from legbench.explain.motor_end import MotorEnd, count_ends, motor_ends
 from legbench.explain.screening import Method, Screened, count_screened, screen
 from legbench.explain.sensitivity import Sensitivity, count_sensitivities, sensitivities
 from legbench.explain.targets import MISSING, Target
@@ -65,6 +66,8 @@ class Explanation:
     """Fits of two causes, the best first; empty if they were not asked for."""
     judged: tuple[Judged, ...]
     """Best fits, those first that agree best with everything else."""
+    ends: tuple[MotorEnd, ...]
+    """One motor that ends at its range, in each setup."""
     proposals: tuple[Proposal, ...]
     """Steps that tell apart the fits that reach the target, the best first."""
     complete: bool
@@ -141,6 +144,8 @@ def explain(
     chosen = choose(singles, pairs)
     perfect, judged = _judge(design, target, numbers, chosen, scope, watch)
     alike = [fit for fit in chosen if fit.within]
+    watch.begin("a motor that ends at its range", count_ends())
+    ends = motor_ends(design, numbers, watch)
     proposals: list[Proposal] = []
     if len(alike) > 1 and not watch.stopped():
         watch.begin("the next experiment", count_proposals(len(alike)))
@@ -154,6 +159,7 @@ def explain(
         singles=tuple(singles),
         pairs=tuple(pairs),
         judged=tuple(judged),
+        ends=tuple(ends),
         proposals=tuple(proposals),
         complete=not watch.stopped(),
     )

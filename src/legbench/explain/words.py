@@ -1,0 +1,155 @@
+"""An explanation in words: ranked tables, then sentences."""
+
+import math
+from collections.abc import Sequence
+
+from legbench.explain.apart import Proposal
+from legbench.explain.explanation import Explanation, Judged
+from legbench.explain.fitting import Fit
+from legbench.explain.motor_end import MotorEnd
+from legbench.explain.screening import Screened
+from legbench.explain.sensitivity import Sensitivity
+from legbench.signals import Floats
+
+EFFECTS = 12
+"""Number of effects in the table [-]."""
+FITS = 12
+"""Number of fits in each table [-]."""
+
+
+def explanation_lines(found: Explanation) -> list[str]:
+    """Everything that was found, as lines of text."""
+    target = found.target
+    lines = [
+        f"target    step from z2 = {target.z2 + target.dz2:g} to {target.z2:g} rad, "
+        f"{target.setup}: P^r {_shape(target.shape)}, each +- {target.tolerance:g}",
+        f"perfect   P^r {_shape(found.perfect.fit.ratings)}",
+        "",
+        *_effects(found.sensitivities),
+        *_screened(found.screened),
+        "",
+        *_fits("one cause", found.singles),
+    ]
+    if found.pairs:
+        lines += ["", *_fits("two causes", found.pairs)]
+    for judged in (found.perfect, *found.judged):
+        lines += ["", *_judged(judged)]
+    return [*lines, "", *sentences(found)]
+
+
+def sentences(found: Explanation) -> list[str]:
+    """Findings in plain sentences."""
+    lines = [_verdict(found)]
+    alike = found.alike
+    if len(alike) > 1:
+        names = "; ".join(fit.name for fit in alike)
+        lines.append(
+            f"The target alone cannot tell {len(alike)} explanations apart, each within "
+            f"{found.target.tolerance:g} in every period: {names}."
+        )
+    if found.proposals:
+        lines.append(_proposal(found.proposals[0]))
+    lines += [_end(end) for end in found.ends]
+    if not found.pairs:
+        lines.append("Pairs of causes were not tried; --pairs tries them.")
+    if not found.complete:
+        lines.append("Stopped before the end: what is here is what had been found by then.")
+    return lines
+
+
+def _verdict(found: Explanation) -> str:
+    best = found.best
+    if best is None:
+        return "Nothing was found."
+    single = found.singles[0] if found.singles else None
+    alone = ""
+    if single is not None and not single.within:
+        alone = (
+            f"No single cause reaches the target: the nearest, {single.words}, is off by up to "
+            f"{single.worst * found.target.tolerance:.3f}. "
+        )
+    reach = "reaches" if best.fit.within else "comes closest to"
+    fall = "falling from period to period" if best.fit.monotone else "not falling throughout"
+    held = f" {best.held} of {len(best.checks)} other statements hold." if best.checks else ""
+    return (
+        f"{alone}What {reach} it and agrees best with the rest: {best.fit.words}; "
+        f"P^r {_shape(best.fit.ratings)}, {fall}.{held}"
+    )
+
+
+def _proposal(best: Proposal) -> str:
+    posture = 1e3 * best.posture
+    return (
+        f"The experiment to do next: in {best.setup}, a step from z2 = {best.z2 + best.dz2:g} to "
+        f"{best.z2:g} rad tells {best.told} of {best.pairs} pairs of them apart; the two nearest, "
+        f"{' and '.join(best.nearest_names)}, differ by {best.nearest:.1f} times what can be read. "
+        f"Their postures at rest lie at z1 = {posture.min():.0f} to {posture.max():.0f} mrad."
+    )
+
+
+def _end(end: MotorEnd) -> str:
+    head = f"Bang-bang at z2 = {end.z2:g} rad in {end.setup} tells motor 2 up to {end.farthest:.2f}"
+    lowest = min((level for level in end.levels if math.isfinite(level)), default=math.nan)
+    if end.lowers is None:
+        return f"{head} rad; no end of its range within reach lowers the rating."
+    return (
+        f"{head} rad; if its range ends at {end.lowers:.2f} rad or earlier, the rating falls from "
+        f"{end.levels[0]:.3f} to as little as {lowest:.3f}."
+    )
+
+
+def _effects(rows: Sequence[Sensitivity]) -> list[str]:
+    lines = ["effects of plausible sizes, one at a time, the largest first"]
+    for row in rows[:EFFECTS]:
+        size = row.cause.shown(row.size)
+        lines.append(
+            f"  {row.cause.name:<18} {size:>12}  {_shape(row.ratings)}  by {row.change:.3f}"
+        )
+    rest = rows[EFFECTS:]
+    if rest:
+        names = ", ".join(dict.fromkeys(row.cause.name for row in rest))
+        lines.append(f"  {rest[0].change:.3f} or less: {names}")
+    return lines
+
+
+def _screened(rows: Sequence[Screened]) -> list[str]:
+    if not rows:
+        return []
+    lines = ["", "weights with everything at plausible sizes at once: whole, other"]
+    return lines + [f"  {row.cause.name:<18} {row.whole:8.4f} {row.other:8.4f}" for row in rows]
+
+
+def _fits(title: str, fits: Sequence[Fit]) -> list[str]:
+    lines = [f"fits of {title}: misfit in tolerances (rms, worst), sizes, P^r"]
+    for fit in fits[:FITS]:
+        sizes = ", ".join(
+            cause.shown(size) for cause, size in zip(fit.causes, fit.sizes, strict=True)
+        )
+        mark = "*" if fit.within else " "
+        lines.append(
+            f"{mark} {fit.misfit:5.2f} {fit.worst:5.2f}  {fit.name:<38} {sizes:<26} "
+            f"{_shape(fit.ratings)}"
+        )
+    if any(fit.within for fit in fits[:FITS]):
+        lines.append("* every period within the tolerance")
+    return lines
+
+
+def _judged(judged: Judged) -> list[str]:
+    fit = judged.fit
+    lines = [f"{fit.name or 'perfect'}: {judged.held} of {len(judged.checks)} statements hold"]
+    lines += [
+        f"  {'holds' if check.held else 'fails'}  {check.words}: {check.value}"
+        for check in judged.checks
+    ]
+    hop = judged.hop
+    if hop is not None and hop.cause is None:
+        lines.append(
+            f"  jump   foot {1e3 * hop.foot_clearance:.0f} mm, trunk "
+            f"{1e3 * hop.trunk_excursion:.0f} mm, drift {1e3 * hop.drift:.0f} mm"
+        )
+    return lines
+
+
+def _shape(ratings: Sequence[float] | Floats) -> str:
+    return " ".join("  -  " if math.isnan(value) else f"{value:.3f}" for value in ratings)
