@@ -38,8 +38,10 @@ class ExplainArguments:
     screen: Literal["none", "morris", "sobol"] = "none"
     """Method that weighs the causes with all of them there at once; needs the extra
     `screening`."""
+    setups: bool = True
+    """Whether to try the best fits against everything else that was measured."""
     jump: bool = True
-    """Whether to simulate the jump of the best fits."""
+    """Whether to simulate the jump of the best fits, too."""
     seed: int = 0
     """Seed of the screening; nothing else is drawn."""
     out: Path | None = None
@@ -67,6 +69,7 @@ def main(arguments: list[str]) -> int:
     scope = Scope(
         pairs=flags.pairs,
         method=None if flags.screen == "none" else Method(flags.screen),
+        setups=flags.setups,
         jump=flags.jump,
         seed=flags.seed,
     )

@@ -14,7 +14,7 @@ from legbench.design import LegDesign
 from legbench.design.setup import Setup, SetupKind
 from legbench.experiment import Experiment
 from legbench.explain.engine import NOBODY, Watch, rate_many
-from legbench.explain.jumping import LOWEST, Hop
+from legbench.explain.jumping import Hop
 from legbench.explain.targets import READING, Target, step_experiment
 from legbench.imperfections import Imperfections
 from legbench.paper import Published
@@ -36,8 +36,8 @@ class Check:
     name: str
     words: str
     """Statement in words."""
-    value: str
-    """What the leg does, in words or numbers."""
+    value: float
+    """Number that decides, as the words say it [-]; NaN if the leg does not come to it."""
     held: bool
 
 
@@ -125,60 +125,52 @@ def checks_of(
     found = [
         Check(
             name="bang-bang",
-            words=f"bang-bang with the foot fixed settles at {wanted:.2f}",
-            value=f"{level:.3f}",
+            words=f"ffs, bang-bang settles at {wanted:.2f}",
+            value=level,
             held=abs(level - wanted) <= READING,
         ),
-        *_orders(predicted, leg),
-        *(_folded(predicted, leg, setup) for setup in predicted.folded),
+        _order(predicted, leg, SetupKind.HFTS, SetupKind.FFS),
+        _order(predicted, leg, SetupKind.VFTS, SetupKind.FFS),
+        _order(predicted, leg, SetupKind.VFTS, SetupKind.HFTS),
     ]
+    z2 = numbers["lower_rated_set_point"].value
+    for setup, (lower, usual) in predicted.folded.items():
+        fall = float(usual[leg] - lower[leg])
+        found.append(
+            Check(
+                name=f"{setup}-folded",
+                words=f"{setup}, bang-bang falls at z2 = {z2:g} by",
+                value=fall,
+                held=fall > READING,
+            )
+        )
     if hop is not None:
-        found += _jump(hop, numbers)
+        found += [
+            _lowest("stance", hop.stance, numbers),
+            _lowest("flight", hop.flight, numbers),
+        ]
     return tuple(found)
 
 
-def _orders(predicted: Predicted, leg: int) -> list[Check]:
-    """Orders of the setups, in the last period that the paper would count in both."""
-
-    def compare(low: SetupKind, high: SetupKind, words: str) -> Check:
-        rows = [predicted.steps[setup][leg] for setup in (low, high)]
-        common = np.flatnonzero(np.isfinite(rows[0]) & np.isfinite(rows[1]))
-        if len(common) == 0:
-            return Check(name=f"{low} < {high}", words=words, value="no period", held=False)
-        last = int(common[-1])
-        below, above = (float(row[last]) for row in rows)
-        value = f"{below:.3f} and {above:.3f} in period {last + 1}"
-        return Check(name=f"{low} < {high}", words=words, value=value, held=below < above)
-
-    return [
-        compare(SetupKind.FFS, SetupKind.HFTS, "the fixed foot is rated lower than hfts"),
-        compare(SetupKind.FFS, SetupKind.VFTS, "the fixed foot is rated lower than vfts"),
-        compare(SetupKind.HFTS, SetupKind.VFTS, "vfts is rated better than hfts in the end"),
-    ]
-
-
-def _folded(predicted: Predicted, leg: int, setup: SetupKind) -> Check:
-    lower, usual = (float(values[leg]) for values in predicted.folded[setup])
+def _order(predicted: Predicted, leg: int, high: SetupKind, low: SetupKind) -> Check:
+    """Order of two setups in the last period that the paper would count in both."""
+    rows = [predicted.steps[setup][leg] for setup in (high, low)]
+    common = np.flatnonzero(np.isfinite(rows[0]) & np.isfinite(rows[1]))
+    value = float(rows[0][common[-1]] - rows[1][common[-1]]) if len(common) else float("nan")
     return Check(
-        name=f"{setup} folded",
-        words=f"bang-bang in {setup} is rated lower at z2 = 1.8 rad",
-        value=f"{lower:.3f} and {usual:.3f}",
-        held=lower < usual - READING,
+        name=f"{high}-over-{low}",
+        words=f"step, {high} is rated over {low} by",
+        value=value,
+        held=value > 0.0,
     )
 
 
-def _jump(hop: Hop, numbers: Mapping[str, Published]) -> list[Check]:
-    """Bounds of the ratings of a jump, which hold whatever height it reaches."""
-    found = []
-    for name, words in LOWEST.items():
-        least = numbers[f"jump_rating_{name}"].value
-        value = getattr(hop, name)
-        found.append(
-            Check(
-                name=f"jump, {name}",
-                words=f"every {words} of the jump is rated above {least:.2f}",
-                value=hop.cause or f"{value:.4f}",
-                held=hop.cause is None and value > least,
-            )
-        )
-    return found
+def _lowest(phase: str, value: float, numbers: Mapping[str, Published]) -> Check:
+    """Bound of the ratings of a phase of the jump, which holds whatever height it reaches."""
+    least = numbers[f"jump_rating_{phase}"].value
+    return Check(
+        name=f"jump-{phase}",
+        words=f"jump, every {phase} is rated over {least:.2f}",
+        value=value,
+        held=value > least,
+    )

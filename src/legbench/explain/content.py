@@ -52,6 +52,7 @@ def _fit(fit: Fit) -> dict[str, Any]:
         "worst": fit.worst,
         "within": fit.within,
         "monotone": fit.monotone,
+        "stretch": fit.stretch,
     }
 
 

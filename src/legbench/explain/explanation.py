@@ -8,7 +8,7 @@ from legbench.experiment import Experiment
 from legbench.explain.apart import Proposal, count_proposals, propose
 from legbench.explain.causes import Cause
 from legbench.explain.consistency import Check, checks_of, count_predictions, predict
-from legbench.explain.engine import NOBODY, Watch
+from legbench.explain.engine import NOBODY, Watch, in_setup
 from legbench.explain.fitting import (
     Fit,
     count_fitted,
@@ -25,7 +25,7 @@ from legbench.explain.targets import MISSING, Target
 from legbench.paper import Published
 from legbench.servo import PERFECT
 
-JUDGED = 10
+JUDGED = 16
 """Largest number of fits that are tried against everything else that was measured [-]."""
 AT_LEAST = 3
 """Number of fits that are tried if fewer reach the target [-]."""
@@ -75,7 +75,9 @@ class Explanation:
 
     @property
     def best(self) -> Judged | None:
-        """Fit that agrees best: within the target if one is, then with most statements held."""
+        """Fit that agrees best: it reaches the target if one does, then most statements hold, then
+        its sizes are the most plausible.
+        """
         return self.judged[0] if self.judged else None
 
     @property
@@ -88,8 +90,8 @@ class Explanation:
         """Step of the target on the leg that explains it best; none without any fit."""
         if self.best is None:
             return None
-        step = self.target.experiment(self.design)
-        return replace(step, imperfections=self.best.fit.imperfections)
+        step, leg = self.target.experiment(self.design), self.best.fit.imperfections
+        return replace(step, imperfections=in_setup(leg, self.target.setup))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,8 +102,10 @@ class Scope:
     """Whether to fit two causes together."""
     method: Method | None = None
     """Method of global screening; none: no screening."""
+    setups: bool = True
+    """Whether to try the best fits in the other setups, and a motor that ends at its range."""
     jump: bool = True
-    """Whether to simulate the jump of the best fits."""
+    """Whether to simulate the jump of the best fits, too."""
     seed: int = 0
     """Seed of the screening."""
 
@@ -144,8 +148,10 @@ def explain(
     chosen = choose(singles, pairs)
     perfect, judged = _judge(design, target, numbers, chosen, scope, watch)
     alike = [fit for fit in chosen if fit.within]
-    watch.begin("a motor that ends at its range", count_ends())
-    ends = motor_ends(design, numbers, watch)
+    ends: list[MotorEnd] = []
+    if scope.setups and not watch.stopped():
+        watch.begin("a motor that ends at its range", count_ends())
+        ends = motor_ends(design, numbers, watch)
     proposals: list[Proposal] = []
     if len(alike) > 1 and not watch.stopped():
         watch.begin("the next experiment", count_proposals(len(alike)))
@@ -204,7 +210,7 @@ def _judge(
     """Try the perfect leg and the fits against everything else; the best come first."""
     perfect = perfect_fit(design, target)
     all_fits = [perfect, *fits]
-    if watch.stopped():
+    if watch.stopped() or not scope.setups:
         bare = [Judged(fit=fit, checks=(), hop=None) for fit in all_fits]
         return bare[0], bare[1:]
     legs = [PERFECT, *(fit.imperfections for fit in fits)]
@@ -224,5 +230,5 @@ def _judge(
         )
         for place, (fit, hop) in enumerate(zip(all_fits, hops, strict=True))
     ]
-    order = sorted(judged[1:], key=lambda one: (not one.fit.within, -one.held, one.fit.misfit))
+    order = sorted(judged[1:], key=lambda one: (not one.fit.within, -one.held, one.fit.stretch))
     return judged[0], order

@@ -65,6 +65,12 @@ class Fit:
         return " and ".join(f"{cause.words} ({cause.shown(size)})" for cause, size in pairs)
 
     @property
+    def stretch(self) -> float:
+        """Largest size over what is plausible [-]."""
+        pairs = zip(self.causes, self.sizes, strict=True)
+        return max((abs(size) / cause.plausible for cause, size in pairs), default=0.0)
+
+    @property
     def monotone(self) -> bool:
         """Whether the ratings fall from each period to the next."""
         return bool(np.all(np.diff(self.ratings) < 0.0))

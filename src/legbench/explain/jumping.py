@@ -16,8 +16,6 @@ from legbench.recording.reader import Recording
 
 DURATION = 4.0
 """Length of the jumping run [s]: a second in which the hop grows, and more than three jumps."""
-LOWEST = {"stance": "stance", "flight": "flight"}
-"""Rating of a jump -> word for its phase."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

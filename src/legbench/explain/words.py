@@ -13,7 +13,7 @@ from legbench.signals import Floats
 
 EFFECTS = 12
 """Number of effects in the table [-]."""
-FITS = 12
+FITS = 16
 """Number of fits in each table [-]."""
 
 
@@ -32,8 +32,8 @@ def explanation_lines(found: Explanation) -> list[str]:
     ]
     if found.pairs:
         lines += ["", *_fits("two causes", found.pairs)]
-    for judged in (found.perfect, *found.judged):
-        lines += ["", *_judged(judged)]
+    if found.perfect.checks:
+        lines += ["", *_statements([found.perfect, *found.judged])]
     return [*lines, "", *sentences(found)]
 
 
@@ -120,35 +120,54 @@ def _screened(rows: Sequence[Screened]) -> list[str]:
 
 
 def _fits(title: str, fits: Sequence[Fit]) -> list[str]:
-    lines = [f"fits of {title}: misfit in tolerances (rms, worst), sizes, P^r"]
+    lines = [
+        f"fits of {title}: misfit in tolerances (rms, worst), size over what is plausible, P^r"
+    ]
     for fit in fits[:FITS]:
         sizes = ", ".join(
             cause.shown(size) for cause, size in zip(fit.causes, fit.sizes, strict=True)
         )
         mark = "*" if fit.within else " "
         lines.append(
-            f"{mark} {fit.misfit:5.2f} {fit.worst:5.2f}  {fit.name:<38} {sizes:<26} "
-            f"{_shape(fit.ratings)}"
+            f"{mark} {fit.misfit:5.2f} {fit.worst:5.2f} {fit.stretch:5.1f}  {fit.name:<38} "
+            f"{sizes:<26} {_shape(fit.ratings)}"
         )
     if any(fit.within for fit in fits[:FITS]):
         lines.append("* every period within the tolerance")
     return lines
 
 
-def _judged(judged: Judged) -> list[str]:
-    fit = judged.fit
-    lines = [f"{fit.name or 'perfect'}: {judged.held} of {len(judged.checks)} statements hold"]
+def _statements(judged: Sequence[Judged]) -> list[str]:
+    """Table of the statements of the paper, one row each, and a column for each leg."""
+    letters = "0ABCDEFGHIJKLMNOPQRSTUVWXYZ"[: len(judged)]
+    lines = ["what else the paper says; + it holds"]
     lines += [
-        f"  {'holds' if check.held else 'fails'}  {check.words}: {check.value}"
-        for check in judged.checks
+        f"  {letter}  {one.fit.name or 'perfect leg'}: {one.held} of {len(one.checks)} hold"
+        for letter, one in zip(letters, judged, strict=True)
     ]
-    hop = judged.hop
-    if hop is not None and hop.cause is None:
+    lines.append(" " * WIDE + "".join(f"{letter:>7} " for letter in letters))
+    for place, check in enumerate(judged[0].checks):
+        cells = [one.checks[place] for one in judged]
         lines.append(
-            f"  jump   foot {1e3 * hop.foot_clearance:.0f} mm, trunk "
-            f"{1e3 * hop.trunk_excursion:.0f} mm, drift {1e3 * hop.drift:.0f} mm"
+            f"  {check.words:<{WIDE - 2}}"
+            + "".join(f"{cell.value:7.3f}{'+' if cell.held else ' '}" for cell in cells)
         )
+    for words, name in (
+        ("jump, height of the foot [mm]", "foot_clearance"),
+        ("jump, travel of the trunk [mm]", "trunk_excursion"),
+        ("jump, drift [mm]", "drift"),
+    ):
+        hops = [one.hop for one in judged if one.hop is not None]
+        if len(hops) == len(judged):
+            lines.append(
+                f"  {words:<{WIDE - 2}}"
+                + "".join(f"{1e3 * getattr(hop, name):7.0f} " for hop in hops)
+            )
     return lines
+
+
+WIDE = 42
+"""Width of the column of statements."""
 
 
 def _shape(ratings: Sequence[float] | Floats) -> str:
