@@ -53,6 +53,7 @@ class ExplainArguments:
 
 def main(arguments: list[str]) -> int:
     """Run `legbench explain`: print what explains the ratings; 130 if it was stopped."""
+    flags = parse(ExplainArguments, "explain", arguments)
     from legbench.explain.causes import causes_named
     from legbench.explain.content import explanation_content
     from legbench.explain.explanation import Scope, explain
@@ -62,7 +63,6 @@ def main(arguments: list[str]) -> int:
     from legbench.interrupts import stop_on_interrupt
     from legbench.paper import PAPER, published
 
-    flags = parse(ExplainArguments, "explain", arguments)
     path = PAPER if flags.against == "paper" else Path(flags.against)
     target, causes = step_target(flags.reading, path), causes_named(flags.causes)
     design, numbers = load_design(flags.design), published(path)

@@ -132,6 +132,7 @@ def checks_of(
         _order(predicted, leg, SetupKind.HFTS, SetupKind.FFS),
         _order(predicted, leg, SetupKind.VFTS, SetupKind.FFS),
         _order(predicted, leg, SetupKind.VFTS, SetupKind.HFTS),
+        *(_decline(predicted, leg, setup) for setup in (SetupKind.HFTS, SetupKind.VFTS)),
     ]
     z2 = numbers["lower_rated_set_point"].value
     for setup, (lower, usual) in predicted.folded.items():
@@ -162,6 +163,19 @@ def _order(predicted: Predicted, leg: int, high: SetupKind, low: SetupKind) -> C
         words=f"step, {high} is rated over {low} by",
         value=value,
         held=value > 0.0,
+    )
+
+
+def _decline(predicted: Predicted, leg: int, setup: SetupKind) -> Check:
+    """Fall of the rating from the first to the last period that the paper would count."""
+    rating = predicted.steps[setup][leg]
+    known = rating[np.isfinite(rating)]
+    value = float(known[0] - known[-1]) if len(known) > 1 else float("nan")
+    return Check(
+        name=f"{setup}-declines",
+        words=f"step, {setup} declines, by",
+        value=value,
+        held=value > READING,
     )
 
 

@@ -71,6 +71,8 @@ def rate_many(
     check(experiment, imperfections)
     legs = [in_setup(each, experiment.setup.kind) for each in imperfections]
     held = np.array([_held(experiment, each) for each in legs], dtype=np.bool_)
+    # Legs without friction and guide have shorter equations, and dry friction needs shorter steps.
+    kinds = np.array([2 * bool(leg.coulomb_friction) + bool(leg.guide_damping) for leg in legs])
     together = max(8, ROWS_TOGETHER // round(experiment.duration / PERIOD))
     counting = experiment.controller.describe().counting
     found = Shapes.unknown(len(legs), periods)
@@ -80,24 +82,27 @@ def rate_many(
         watch.advance(len(part))
 
     again: list[int] = []
-    # Legs without friction and guide have shorter equations.
-    extras = np.array([(leg.coulomb_friction is None, leg.guide_damping is None) for leg in legs])
-    for kind in np.unique(extras[held], axis=0):
-        for part in _split(np.flatnonzero(held & (extras == kind).all(axis=1)), together):
-            if not watch.stopped():
-                rows, outside = move_held(experiment, [legs[place] for place in part])
-                again.extend(part[outside])
-                take(part[~outside], rows.taken(~outside))
+    for part in _batches(np.flatnonzero(held), kinds, together):
+        if not watch.stopped():
+            rows, outside = move_held(experiment, [legs[place] for place in part])
+            again.extend(part[outside])
+            take(part[~outside], rows.taken(~outside))
     rest = np.array([*np.flatnonzero(~held), *again], dtype=np.int64)
-    # Dry friction needs shorter steps.
-    for smooth in (True, False):
-        for batch in _split(rest[extras[rest, 0] == smooth], IN_STEP * together):
-            moved = move_sampled(
-                experiment, [legs[place] for place in batch], together, watch.stopped
-            )
-            for part, rows in zip(_split(batch, together), moved, strict=False):
-                take(part, rows)
+    for batch in _batches(rest, kinds // 2, IN_STEP * together):
+        some = [legs[place] for place in batch]
+        moved = move_sampled(experiment, some, together, watch.stopped)
+        for part, rows in zip(_split(batch, together), moved, strict=False):
+            take(part, rows)
     return found
+
+
+def _batches(places: Ints, kinds: Ints, size: int) -> list[Ints]:
+    """Places in batches of one kind and of that size at the most."""
+    return [
+        part
+        for kind in np.unique(kinds[places])
+        for part in _split(places[kinds[places] == kind], size)
+    ]
 
 
 def _split(places: Ints, size: int) -> list[Ints]:

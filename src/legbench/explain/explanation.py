@@ -142,20 +142,9 @@ def explain(
         screened = screen(design, target, causes, scope.method, scope.seed, watch)
     watch.begin(f"fits of {len(causes)} causes", count_fitted(len(causes), 1))
     singles = _reached(fit_singles(design, target, causes, watch))
-    pairs: list[Fit] = []
-    if scope.pairs and not watch.stopped():
-        pairs = _pairs(design, target, causes, watch)
+    pairs = _pairs(design, target, causes, watch) if scope.pairs else []
     chosen = choose(singles, pairs)
     perfect, judged = _judge(design, target, numbers, chosen, scope, watch)
-    alike = [fit for fit in chosen if fit.within]
-    ends: list[MotorEnd] = []
-    if scope.setups and not watch.stopped():
-        watch.begin("a motor that ends at its range", count_ends())
-        ends = motor_ends(design, numbers, watch)
-    proposals: list[Proposal] = []
-    if len(alike) > 1 and not watch.stopped():
-        watch.begin("the next experiment", count_proposals(len(alike)))
-        proposals = propose(design, alike, watch)
     return Explanation(
         design=design,
         target=target,
@@ -165,14 +154,33 @@ def explain(
         singles=tuple(singles),
         pairs=tuple(pairs),
         judged=tuple(judged),
-        ends=tuple(ends),
-        proposals=tuple(proposals),
+        ends=tuple(_ends(design, numbers, scope, watch)),
+        proposals=tuple(_proposals(design, [one.fit for one in judged], watch)),
         complete=not watch.stopped(),
     )
 
 
+def _ends(
+    design: LegDesign, numbers: Mapping[str, Published], scope: Scope, watch: Watch
+) -> list[MotorEnd]:
+    if not scope.setups or watch.stopped():
+        return []
+    watch.begin("a motor that ends at its range", count_ends())
+    return motor_ends(design, numbers, watch)
+
+
+def _proposals(design: LegDesign, fits: Sequence[Fit], watch: Watch) -> list[Proposal]:
+    alike = [fit for fit in fits if fit.within]
+    if len(alike) < 2 or watch.stopped():
+        return []
+    watch.begin("the next experiment", count_proposals(len(alike)))
+    return propose(design, alike, watch)
+
+
 def _pairs(design: LegDesign, target: Target, causes: Sequence[Cause], watch: Watch) -> list[Fit]:
     """Fits of every two causes that matter at all."""
+    if watch.stopped():
+        return []
     fast = [cause for cause in causes if not cause.sampled]
     some = effective(design, target, fast if len(fast) > 1 else causes)
     count = len(some) * (len(some) - 1) // 2

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 
+from legbench.design.setup import SetupKind
 from legbench.explain.apart import Proposal
 from legbench.explain.explanation import Explanation, Judged
 from legbench.explain.fitting import Fit
@@ -49,7 +50,7 @@ def sentences(found: Explanation) -> list[str]:
         )
     if found.proposals:
         lines.append(_proposal(found.proposals[0]))
-    lines += [_end(end) for end in found.ends]
+    lines += _ends(found.ends)
     if not found.pairs:
         lines.append("Pairs of causes were not tried; --pairs tries them.")
     if not found.complete:
@@ -87,15 +88,26 @@ def _proposal(best: Proposal) -> str:
     )
 
 
-def _end(end: MotorEnd) -> str:
-    head = f"Bang-bang at z2 = {end.z2:g} rad in {end.setup} tells motor 2 up to {end.farthest:.2f}"
-    lowest = min((level for level in end.levels if math.isfinite(level)), default=math.nan)
-    if end.lowers is None:
-        return f"{head} rad; no end of its range within reach lowers the rating."
-    return (
-        f"{head} rad; if its range ends at {end.lowers:.2f} rad or earlier, the rating falls from "
-        f"{end.levels[0]:.3f} to as little as {lowest:.3f}."
-    )
+def _ends(ends: Sequence[MotorEnd]) -> list[str]:
+    """Sentences on a motor that ends at its range, with a fixed trunk and with the foot fixed."""
+    lines, nearest = [], math.inf
+    for end in ends:
+        lowest = min((level for level in end.levels if math.isfinite(level)), default=math.nan)
+        head = f"Bang-bang at z2 = {end.z2:g} rad in {end.setup} takes motor 2 to"
+        if end.setup is SetupKind.FFS and end.farthest < nearest < math.inf:
+            lines.append(
+                f"{head} {end.farthest:.2f} rad only: an end that lowers the others does not touch "
+                "it."
+            )
+        elif end.lowers is None:
+            lines.append(f"{head} {end.farthest:.2f} rad; no end that was tried lowers the rating.")
+        else:
+            nearest = min(nearest, end.lowers)
+            lines.append(
+                f"{head} {end.farthest:.2f} rad; a range that ends at {end.lowers:.2f} rad or "
+                f"earlier lowers the rating from {end.levels[0]:.3f} to as little as {lowest:.3f}."
+            )
+    return lines
 
 
 def _effects(rows: Sequence[Sensitivity]) -> list[str]:
