@@ -8,7 +8,7 @@ two joints were identified one by one.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
-from typing import Final
+from typing import Any, Final
 
 from legbench.errors import ConfigError
 from legbench.imperfections import Imperfections
@@ -232,7 +232,7 @@ def combined(causes: Sequence[Cause], sizes: Sequence[float]) -> Imperfections:
     )
 
 
-def _value(name: str, change: Pattern) -> object:
+def _value(name: str, change: Pattern) -> Any:
     """Value of a field of `Imperfections` with these changes of its components."""
     if name in SCALARS:
         return change[0]

@@ -7,7 +7,7 @@ import numpy as np
 from legbench.analytic import LegModel, Regime
 from legbench.analytic.lanes import Friction, Lanes
 from legbench.analytic.losses import CREEP
-from legbench.control import make_controllers
+from legbench.control import AbstractController, make_controllers
 from legbench.design.setup import SetupKind
 from legbench.design.statics import GRAVITY
 from legbench.errors import PlantFault
@@ -43,7 +43,7 @@ def move_held(experiment: Experiment, imperfections: Sequence[Imperfections]) ->
     try:
         lanes = _lanes(experiment, imperfections)
         lanes.start(np.concatenate([rest, np.zeros_like(rest)], axis=1))
-        path = lanes.path(np.arange(rows) * PERIOD, servo.shaft(after))
+        path = lanes.path(np.arange(rows, dtype=np.float64) * PERIOD, servo.shaft(after))
         outside = lanes.outside
     except PlantFault:
         # One leg of them runs away: the arrays, which keep legs apart, tell which.
@@ -57,7 +57,7 @@ def move_held(experiment: Experiment, imperfections: Sequence[Imperfections]) ->
 
 
 def _command_after(
-    controller: object, experiment: Experiment, motor_pos: Floats, joint_pos: Floats
+    controller: AbstractController, experiment: Experiment, motor_pos: Floats, joint_pos: Floats
 ) -> Command:
     """Command of a position jump from its step on."""
     seen = Observation(

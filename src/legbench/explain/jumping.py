@@ -11,7 +11,7 @@ from legbench.design.setup import Setup, SetupKind
 from legbench.experiment import Experiment, run_batch
 from legbench.imperfections import Imperfections
 from legbench.metrics import Analysis
-from legbench.mjcf.options import Linkage
+from legbench.mjcf.options import Linkage, LinkageKind
 from legbench.recording.reader import Recording
 
 DURATION = 4.0
@@ -42,7 +42,7 @@ def jump_experiment(design: LegDesign, imperfections: Imperfections) -> Experime
         design=design,
         controller=JumpConfig(),
         setup=Setup(kind=SetupKind.JUMP),
-        linkage=Linkage(kind="reduced"),
+        linkage=Linkage(kind=LinkageKind.REDUCED),
         imperfections=replace(imperfections, guide_damping=None),
         duration=DURATION,
     )

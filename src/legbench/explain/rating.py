@@ -82,7 +82,11 @@ def rate_rows(rows: Rows, periods: int, counting: Counting) -> Shapes:
     """Rate the leading `periods` periods of every run, whether the paper counts them or not."""
     legs, bounds, turns = turning_rows(rows.radial_rate)
     shown = min(periods, max(turns - 1, 0))
-    starts = _table(legs, bounds, len(rows.radial), turns)
+    place = np.arange(len(legs)) - np.searchsorted(legs, legs)
+    starts = np.full((len(rows.radial), turns), -1, dtype=np.int64)
+    starts[legs, place] = bounds
+    sizes = np.full(starts.shape, np.nan)
+    sizes[legs, place] = _half_range(rows.radial, legs, bounds)
     first, stop = starts[:, :shown], starts[:, 1 : shown + 1]
     known = stop >= 0
     found = [
@@ -90,9 +94,7 @@ def rate_rows(rows: Rows, periods: int, counting: Counting) -> Shapes:
         for values in (
             _mean_between(alignment(rows.about_equilibrium), first, stop),
             _mean_between(alignment(rows.about_motor), first, stop),
-            _table(legs, _half_range(rows.radial, legs, bounds), len(rows.radial), turns)[
-                :, :shown
-            ],
+            sizes[:, :shown],
         )
     ]
     for each in found:
@@ -139,14 +141,6 @@ def turning_rows(rate: Floats) -> tuple[Ints, Ints, int]:
     order = np.lexsort((rows, legs))
     turns = np.bincount(legs, minlength=1).max() if len(legs) else 0
     return legs[order], rows[order], int(turns)
-
-
-def _table(legs: Ints, values: Floats | Ints, count: int, width: int) -> Floats | Ints:
-    """Values of each run in a row of its own (count, width), -1 behind the last one."""
-    place = np.arange(len(legs)) - np.searchsorted(legs, legs)
-    table = np.full((count, width), -1, dtype=values.dtype)
-    table[legs, place] = values
-    return table
 
 
 def _mean_between(aligned: Floats, first: Ints, stop: Ints) -> Floats:

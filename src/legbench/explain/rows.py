@@ -71,7 +71,7 @@ def measured(
         radial_rate=joint_to_modal(joint_vel, convention)[..., 1],
         about_equilibrium=shown - equilibrium,
         about_motor=shown - motors,
-        broken=broken,
+        broken=np.asarray(broken),
     )
 
 
