@@ -15,12 +15,15 @@ from legbench.experiment.run import run
 from legbench.imperfections import Imperfections
 from legbench.metrics import Analysis
 from legbench.phases import Counting
+from legbench.plant.start import PERIOD
 from legbench.plants import AnalyticChoice
+from legbench.servo import PERFECT, Servo
 
 pytest.importorskip("heyoka")
 
 from legbench.explain.engine import Watch, in_setup, rate_many
 from legbench.explain.rating import Rows, count_leading, rate_rows
+from legbench.explain.rows import measured
 
 PROTOTYPE = load_design(Path(__file__).parents[2] / "models" / "prototype.toml")
 STEP = PositionJumpConfig(z2=1.0, dz2=0.3, delay=0.05)
@@ -104,6 +107,29 @@ def test_a_leg_at_its_stop_is_followed_by_the_equations_that_know_stops() -> Non
     assert knee.max() > PROTOTYPE.limits.knee[1] > knee.min()
     wanted = alone.ratings.equilibrium.periods[:2]
     assert np.allclose(shapes.equilibrium[0], wanted, rtol=0.0, atol=1e-4)
+
+
+def test_a_leg_that_its_springs_do_not_hold_has_no_ratings_and_harms_no_other() -> None:
+    template = experiment(SetupKind.FFS, STEP, 0.9)
+    soft = Imperfections(stiffness_error=(-0.7, -0.7))
+    shapes = rate_many(template, [FLAWS["perfect"], soft, FLAWS["backlash"]], periods=1)
+    assert shapes.broken.tolist() == [False, True, False]
+    assert np.isfinite(shapes.equilibrium[:, 0]).tolist() == [True, False, True]
+
+
+def test_a_leg_that_runs_away_is_broken_and_harms_no_other() -> None:
+    template = experiment(SetupKind.FFS, STEP, 0.4)
+    servo = Servo(template.servo, PERIOD, [PERFECT] * 3)
+    swing = 0.3 * np.cos(20.0 * np.arange(350) * PERIOD)
+    joint_pos = np.repeat(np.stack([-0.7 - swing, 0.7 + swing], axis=-1)[np.newaxis], 3, axis=0)
+    joint_vel = np.gradient(joint_pos, PERIOD, axis=1)
+    joint_pos[1, 200:] = [-np.inf, np.nan]
+    joint_pos[2, 300] = [0.2, 0.2]
+    motor_pos = np.tile([-0.45, 0.45], (3, 350, 1))
+    rows = measured(template, [PERFECT] * 3, servo, joint_pos, joint_vel, motor_pos)
+    shapes = rate_rows(rows, 1, Counting())
+    assert shapes.broken.tolist() == [False, True, True]
+    assert np.isfinite(shapes.equilibrium[:, 0]).tolist() == [True, False, False]
 
 
 def test_who_stops_gets_what_there_is() -> None:

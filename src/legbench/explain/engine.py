@@ -11,16 +11,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from legbench.control import PositionJumpConfig
+from legbench.control import PositionJumpConfig, make_controllers
 from legbench.design.setup import SetupKind
-from legbench.errors import ConfigError
+from legbench.errors import ConfigError, DesignError
 from legbench.experiment import Experiment
 from legbench.explain.held import move_held
 from legbench.explain.rating import Rows, Shapes, rate_rows
+from legbench.explain.rows import targets_of_many
 from legbench.explain.sampled import move_sampled
 from legbench.imperfections import Imperfections
+from legbench.plant.backlash import rest_of
 from legbench.plant.start import PERIOD
-from legbench.signals import Ints
+from legbench.signals import Bools, Ints
 
 ROWS_TOGETHER = 400_000
 """Number of rows of all legs that are kept at once [-]: some tens of megabytes, whatever number of
@@ -33,7 +35,7 @@ time for a cycle does not grow with the legs."""
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Watch:
-    """Ears and eyes of who waits for a long computation; by default nobody does."""
+    """Callbacks of a long computation; by default nobody is told of it and nobody stops it."""
 
     begin: Callable[[str, int], None] = lambda _stage, _legs: None
     """Called with the name of a stage that begins and the number of legs that it rates, about."""
@@ -44,7 +46,7 @@ class Watch:
 
 
 NOBODY = Watch()
-"""Watch of a computation that nobody waits for."""
+"""Watch that tells nobody and never stops."""
 
 
 def rate_many(
@@ -57,7 +59,8 @@ def rate_many(
     """Rate the leading periods of an experiment for many legs with imperfections of their own.
 
     A guide's damping acts in `ffs` alone and is left out elsewhere, where nothing guides the trunk.
-    Legs that were not reached before the watch stopped have no ratings (NaN).
+    Legs whose springs do not hold them in the first posture, and those that were not reached before
+    the watch stopped, have no ratings (NaN).
 
     Args:
         experiment: what is done in a fixed setup; its own imperfections and plant do not count.
@@ -70,12 +73,14 @@ def rate_many(
     """
     check(experiment, imperfections)
     legs = [in_setup(each, experiment.setup.kind) for each in imperfections]
-    held = np.array([_held(experiment, each) for each in legs], dtype=np.bool_)
+    rests = _rests(experiment, legs)
+    held = rests & np.array([_held(experiment, each) for each in legs], dtype=np.bool_)
     # Legs without friction and guide have shorter equations, and dry friction needs shorter steps.
     kinds = np.array([2 * bool(leg.coulomb_friction) + bool(leg.guide_damping) for leg in legs])
     together = max(8, ROWS_TOGETHER // round(experiment.duration / PERIOD))
     counting = experiment.controller.describe().counting
     found = Shapes.unknown(len(legs), periods)
+    found.broken[~rests] = True
 
     def take(part: Ints, rows: Rows) -> None:
         found.put(part, rate_rows(rows, periods, counting))
@@ -87,13 +92,31 @@ def rate_many(
             rows, outside = move_held(experiment, [legs[place] for place in part])
             again.extend(part[outside])
             take(part[~outside], rows.taken(~outside))
-    rest = np.array([*np.flatnonzero(~held), *again], dtype=np.int64)
+    rest = np.array([*np.flatnonzero(rests & ~held), *again], dtype=np.int64)
     for batch in _batches(rest, kinds // 2, IN_STEP * together):
         some = [legs[place] for place in batch]
         moved = move_sampled(experiment, some, together, watch.stopped)
         for part, rows in zip(_split(batch, together), moved, strict=False):
             take(part, rows)
     return found
+
+
+def _rests(experiment: Experiment, legs: Sequence[Imperfections]) -> Bools:
+    """Whether the springs of each leg hold it where the experiment begins (n,).
+
+    Raises:
+        ConfigError: the leg that the controller believes in is not held there.
+    """
+    targets = targets_of_many(experiment, len(legs))
+    motor_pos = make_controllers([experiment.controller] * len(legs), targets).start_motor_pos
+    try:
+        rest_of(targets.designs, targets.support, motor_pos, legs)
+    except DesignError:
+        if len(legs) == 1:
+            return np.zeros(1, dtype=np.bool_)
+        half = len(legs) // 2
+        return np.concatenate([_rests(experiment, legs[:half]), _rests(experiment, legs[half:])])
+    return np.ones(len(legs), dtype=np.bool_)
 
 
 def _batches(places: Ints, kinds: Ints, size: int) -> list[Ints]:

@@ -45,6 +45,8 @@ def measured(
 ) -> Rows:
     """Rows of many legs as a recording has them, and their deflections.
 
+    A leg that straightens, folds through or runs away is broken; its rows are those of no motion.
+
     Args:
         experiment: what is done.
         imperfections: of each leg.
@@ -54,8 +56,12 @@ def measured(
         motor_pos: positions that the motors' encoders show, uncounted (n, t, 2) [rad].
     """
     convention = experiment.conventions.modal
-    knee = joint_pos[..., 1] - joint_pos[..., 0]
+    with np.errstate(invalid="ignore"):  # infinity less infinity
+        knee = joint_pos[..., 1] - joint_pos[..., 0]
     whole = (knee > STRAIGHT_MARGIN) & (knee < np.pi - STRAIGHT_MARGIN)
+    whole &= np.isfinite(joint_vel).all(axis=-1)
+    kept = np.all(whole, axis=1)[:, np.newaxis, np.newaxis]
+    joint_pos, joint_vel = np.where(kept, joint_pos, 0.0), np.where(kept, joint_vel, 0.0)
     zero = np.array([each.link_zero or (0.0, 0.0) for each in imperfections])
     if experiment.servo.encoder_counts is None:
         shown, motors = joint_pos + zero[:, np.newaxis], motor_pos
@@ -65,13 +71,12 @@ def measured(
     support = experiment.setup.support
     flat = motors.reshape(-1, 2)
     equilibrium = link_equilibrium(experiment.design, flat, support).reshape(motors.shape)
-    broken = ~(whole & np.isfinite(joint_vel).all(axis=-1)).all(axis=1)
     return Rows(
         radial=joint_to_modal(shown, convention)[..., 1],
         radial_rate=joint_to_modal(joint_vel, convention)[..., 1],
         about_equilibrium=shown - equilibrium,
         about_motor=shown - motors,
-        broken=np.asarray(broken),
+        broken=~kept[:, 0, 0],
     )
 
 
