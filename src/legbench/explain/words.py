@@ -51,7 +51,7 @@ def sentences(found: Explanation) -> list[str]:
     if found.proposals:
         lines.append(_proposal(found.proposals[0]))
     lines += _ends(found.ends)
-    if not found.pairs:
+    if not found.pairs and found.complete:
         lines.append("Pairs of causes were not tried; --pairs tries them.")
     if not found.complete:
         lines.append("Stopped before the end: what is here is what had been found by then.")
@@ -62,19 +62,25 @@ def _verdict(found: Explanation) -> str:
     best = found.best
     if best is None:
         return "Nothing was found."
-    single = found.singles[0] if found.singles else None
-    alone = ""
-    if single is not None and not single.within:
-        alone = (
-            f"No single cause reaches the target: the nearest, {single.words}, is off by up to "
-            f"{single.worst * found.target.tolerance:.3f}. "
-        )
-    reach = "reaches" if best.fit.within else "comes closest to"
-    fall = "falling from period to period" if best.fit.monotone else "not falling throughout"
+    fit = best.fit
+    off = f"off by up to {fit.worst * found.target.tolerance:.3f}"
+    reach = f"reaches the target ({off})" if fit.within else f"comes nearest to the target ({off})"
+    rest = " and agrees best with the rest" if best.checks else ""
+    fall = "falling from period to period" if fit.monotone else "not falling throughout"
     held = f" {best.held} of {len(best.checks)} other statements hold." if best.checks else ""
     return (
-        f"{alone}What {reach} it and agrees best with the rest: {best.fit.words}; "
-        f"P^r {_shape(best.fit.ratings)}, {fall}.{held}"
+        f"{_alone(found)}What {reach}{rest}: {fit.words}; P^r {_shape(fit.ratings)}, {fall}.{held}"
+    )
+
+
+def _alone(found: Explanation) -> str:
+    """Sentence on single causes, where none reaches the target."""
+    if not found.singles or found.singles[0].within:
+        return ""
+    nearest = found.singles[0]
+    return (
+        f"No single cause reaches the target: the nearest, {nearest.words}, is off by up to "
+        f"{nearest.worst * found.target.tolerance:.3f}. "
     )
 
 
