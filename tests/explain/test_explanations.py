@@ -183,6 +183,9 @@ def test_words_name_what_cannot_be_told_apart() -> None:
     assert "link-zero-polar + guide-upward; stiffness-apart + damping" in text
     assert "a range that ends at 1.25 rad or earlier lowers the rating from 0.980" in text
     assert "in ffs takes motor 2 to 0.83 rad only: an end that lowers the others" in text
+    more = "\n".join(sentences(replace(found, judged=found.judged[:1] * 2, pairs=found.pairs * 2)))
+    assert "cannot tell 4 explanations apart" in more
+    assert "in every period, 2 of which are link-zero-polar + guide-upward" in more
     table = "\n".join(explanation_lines(found))
     assert "A  link-zero-polar + guide-upward: 1 of 1 hold" in table
     assert "jump, height of the foot [mm]" in table

@@ -29,8 +29,9 @@ class ExplainArguments:
     reading: Literal["text", "caption"] = "text"
     """Which of the paper's two descriptions of the step counts: z2 from 1.7 to 1.4 rad (text), or
     from 0.7 to 1.0 rad (caption)."""
-    design: Path = Path("models/prototype.toml")
-    """Design file of the leg that the controller believes in."""
+    design: Path = Path("prototype")
+    """Design file of the leg that the controller believes in, or the name of a design that comes
+    with the package."""
     causes: tuple[str, ...] = field(default_factory=tuple)
     """Causes to consider, by name; by default all."""
     pairs: bool = False

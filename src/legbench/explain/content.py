@@ -34,6 +34,7 @@ def explanation_content(found: Explanation) -> dict[str, Any]:
         "singles": [_fit(fit) for fit in found.singles],
         "pairs": [_fit(fit) for fit in found.pairs],
         "judged": [_judged(judged) for judged in found.judged],
+        "reaching": found.reaching,
         "alike": [fit.name for fit in found.alike],
         "motor_ends": [{**asdict(end), "setup": str(end.setup)} for end in found.ends],
         "proposals": [_proposal(each) for each in found.proposals],

@@ -86,6 +86,11 @@ class Explanation:
         return tuple(judged.fit for judged in self.judged if judged.fit.within)
 
     @property
+    def reaching(self) -> int:
+        """Number of fits that reach the target, whether they were judged or not."""
+        return sum(fit.within for fit in plain(self.singles, self.pairs))
+
+    @property
     def experiment(self) -> Experiment | None:
         """Step of the target on the leg that explains it best; none without any fit."""
         if self.best is None:
@@ -196,15 +201,20 @@ def _reached(fits: Sequence[Fit]) -> list[Fit]:
 
 
 def choose(singles: Sequence[Fit], pairs: Sequence[Fit]) -> list[Fit]:
-    """Fits that are worth to be judged: those within the target, or else the best few.
-
-    A pair of which one cause alone reaches the target explains nothing more.
-    """
-    enough = {fit.causes[0].name for fit in singles if fit.within}
-    plain = [fit for fit in pairs if not any(cause.name in enough for cause in fit.causes)]
-    ranked = sorted([*singles, *plain], key=lambda fit: fit.misfit)
+    """Fits that are worth to be judged: those within the target, or else the best few."""
+    ranked = sorted(plain(singles, pairs), key=lambda fit: fit.misfit)
     within = [fit for fit in ranked if fit.within]
     return within[:JUDGED] if len(within) >= AT_LEAST else ranked[:AT_LEAST]
+
+
+def plain(singles: Sequence[Fit], pairs: Sequence[Fit]) -> list[Fit]:
+    """Fits of one cause, and of two where neither of them reaches the target alone.
+
+    A pair of which one cause is enough explains nothing more.
+    """
+    enough = {fit.causes[0].name for fit in singles if fit.within}
+    needed = [fit for fit in pairs if not any(cause.name in enough for cause in fit.causes)]
+    return [*singles, *needed]
 
 
 def _judge(

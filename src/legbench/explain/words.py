@@ -44,9 +44,10 @@ def sentences(found: Explanation) -> list[str]:
     alike = found.alike
     if len(alike) > 1:
         names = "; ".join(fit.name for fit in alike)
+        some = f", {len(alike)} of which are" if found.reaching > len(alike) else ":"
         lines.append(
-            f"The target alone cannot tell {len(alike)} explanations apart, each within "
-            f"{found.target.tolerance:g} in every period: {names}."
+            f"The target alone cannot tell {found.reaching} explanations apart, each within "
+            f"{found.target.tolerance:g} in every period{some} {names}."
         )
     if found.proposals:
         lines.append(_proposal(found.proposals[0]))
