@@ -77,7 +77,7 @@ def main(arguments: list[str]) -> int:
     if flags.out is not None:
         make_folder(flags.out)
     with stop_on_interrupt() as stop:
-        watch = Onlooking(lambda: stop.is_set).watch()
+        watch = StageProgress(lambda: stop.is_set).watch()
         found = explain(design, target, causes, numbers, scope, watch)
     if flags.out is not None:
         write_explanation(found, flags.out)
@@ -109,7 +109,7 @@ def write_explanation(found: "Explanation", out: Path) -> None:
 
 
 @final
-class Onlooking:
+class StageProgress:
     """Progress of the present stage on stderr, with the time that it will still take."""
 
     def __init__(self, stopped: Callable[[], bool]) -> None:

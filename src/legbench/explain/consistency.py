@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from legbench.control import BangBangConfig
+from legbench.control.bang_bang import RATED_PERIODS
 from legbench.design import LegDesign
 from legbench.design.setup import Setup, SetupKind
 from legbench.experiment import Experiment
@@ -20,10 +21,6 @@ from legbench.imperfections import Imperfections
 from legbench.paper import Published
 from legbench.signals import Floats, Ints
 
-TRANSIENT = 3
-"""Number of periods before the limit cycle (Fig. 4) [-]."""
-BANG_BANG_PERIODS = 20
-"""Number of periods that the paper rates (Fig. 5) [-]."""
 DURATIONS = {SetupKind.FFS: 8.0, SetupKind.HFTS: 2.5, SetupKind.VFTS: 2.5}
 """Setup -> time of bang-bang [s]: eight seconds as in the paper where there are fewer periods than
 are rated, and as many as show a saturated rating where there are more."""
@@ -64,11 +61,12 @@ def predict(
     """Rate legs in everything that is checked beside the target itself."""
     middle, amplitude = (numbers[key].value for key in ("bang_bang_middle", "bang_bang_amplitude"))
     lower = numbers["lower_rated_set_point"].value
+    transient = round(numbers["bang_bang_transient"].value)
 
     def level(setup: SetupKind, z2: float) -> Floats:
         experiment = bang_bang_experiment(design, setup, z2, amplitude)
-        shapes = rate_many(experiment, legs, periods=BANG_BANG_PERIODS, watch=watch)
-        return settled(shapes.equilibrium)
+        shapes = rate_many(experiment, legs, periods=RATED_PERIODS, watch=watch)
+        return settled(shapes.equilibrium, transient)
 
     steps = {}
     for setup in (SetupKind.HFTS, SetupKind.VFTS, SetupKind.FFS):
@@ -105,9 +103,9 @@ THRESHOLD = 0.65
 ratio of the controller's own defaults."""
 
 
-def settled(ratings: Floats) -> Floats:
-    """Mean (n,) of ratings (n, p) after the transient; NaN without any."""
-    late = ratings[:, TRANSIENT:]
+def settled(ratings: Floats, transient: int) -> Floats:
+    """Mean (n,) of ratings (n, p) after a transient of so many periods; NaN without any."""
+    late = ratings[:, transient:]
     count = np.isfinite(late).sum(axis=1)
     return np.where(count > 0, np.nansum(late, axis=1) / np.maximum(count, 1), np.nan)
 

@@ -10,10 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from legbench.control.bang_bang import RATED_PERIODS
 from legbench.design import LegDesign
 from legbench.design.setup import SetupKind
 from legbench.experiment import targets_of
-from legbench.explain.consistency import BANG_BANG_PERIODS, bang_bang_experiment, settled
+from legbench.explain.consistency import bang_bang_experiment, settled
 from legbench.explain.engine import NOBODY, Watch, rate_many
 from legbench.explain.targets import READING
 from legbench.imperfections import Imperfections
@@ -55,6 +56,7 @@ def motor_ends(
     """Try ends of motor 2 in every fixed setup, at the set point that the paper rates lower."""
     z2 = numbers["lower_rated_set_point"].value
     dz2 = numbers["bang_bang_amplitude"].value
+    transient = round(numbers["bang_bang_transient"].value)
     found = []
     for setup in (SetupKind.HFTS, SetupKind.VFTS, SetupKind.FFS):
         if watch.stopped():
@@ -64,14 +66,14 @@ def motor_ends(
         middle, far = (float(targets.motor_at(at, "z2")[1]) for at in (z2, z2 + dz2))
         ends = tuple(middle + share * (far - middle) for share in SHARES)
         legs = [Imperfections(motor_range=(FREE, (FREE[0], end))) for end in ends]
-        shapes = rate_many(experiment, legs, periods=BANG_BANG_PERIODS, watch=watch)
+        shapes = rate_many(experiment, legs, periods=RATED_PERIODS, watch=watch)
         found.append(
             MotorEnd(
                 setup=setup,
                 z2=z2,
                 farthest=far,
                 ends=ends,
-                levels=tuple(np.round(settled(shapes.equilibrium), 6).tolist()),
+                levels=tuple(np.round(settled(shapes.equilibrium, transient), 6).tolist()),
             )
         )
     return found

@@ -10,12 +10,10 @@ from legbench.explain.rating import Rows
 from legbench.imperfections import Imperfections
 from legbench.kinematics import joint_to_modal
 from legbench.metrics.rating import link_equilibrium
+from legbench.plant.analytic import STRAIGHT_MARGIN
 from legbench.plant.start import PERIOD
 from legbench.servo import Servo
 from legbench.signals import Floats
-
-STRAIGHT_MARGIN = 0.02
-"""Distance of a knee from 0 or pi at which it has gone through its stop, as in a run [rad]."""
 
 
 def targets_of_many(experiment: Experiment, count: int) -> LegTargets:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from legbench.control import PositionJumpConfig
+from legbench.control.position_jump import RATED_SHARE
 from legbench.design import LegDesign
 from legbench.design.setup import Setup, SetupKind
 from legbench.errors import ConfigError
@@ -77,7 +78,7 @@ class Target:
         """
         wanted = np.asarray(self.shape)
         apart = (ratings[:, : len(wanted)] - wanted) / self.tolerance
-        least = COUNTED * abs(self.dz2)
+        least = RATED_SHARE * abs(self.dz2)
         size = np.nan_to_num(amplitude[:, : len(wanted)], nan=0.0)
         small = np.maximum(0.0, 1.0 - size / least)
         return np.where(np.isfinite(apart) & (small == 0.0), apart, MISSING * (1.0 + small))
@@ -85,8 +86,6 @@ class Target:
 
 MISSING = 10.0
 """Difference that stands for a period that is not there [tolerances]."""
-COUNTED = 0.1
-"""Share of the deflection that the amplitude of a period must exceed to count (Fig. 5) [-]."""
 
 
 def step_experiment(design: LegDesign, setup: SetupKind, z2: float, dz2: float) -> Experiment:
