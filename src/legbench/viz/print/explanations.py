@@ -24,7 +24,7 @@ def plot_explanation(found: Explanation, path: Path) -> Path:
     fits = [judged.fit for judged in found.judged[:SHOWN]]
     with styled():
         proposed = found.proposals[0] if found.proposals else None
-        figure = Figure(figsize=(9.6 if proposed else 5.4, 4.8), layout="constrained")
+        figure = Figure(figsize=(9.6 if proposed else 5.4, 5.6), layout="constrained")
         axes = np.atleast_1d(figure.subplots(1, 2 if proposed else 1))
         _shapes(axes[0], found, fits)
         if proposed is not None:
@@ -37,7 +37,15 @@ def plot_explanation(found: Explanation, path: Path) -> Path:
                 f"{proposed.z2 + proposed.dz2:g} to {proposed.z2:g} rad",
                 xlabel="oscillation period",
                 ylabel="$P^r$ about the equilibrium [-]",
+                xticks=range(1, proposed.ratings.shape[1] + 1),
             )
+        figure.legend(
+            *axes[0].get_legend_handles_labels(),
+            loc="outside lower center",
+            ncols=2 if proposed else 1,
+            frameon=False,
+            fontsize=8,
+        )
         return save_figure(figure, path, DPI)
 
 
@@ -58,11 +66,11 @@ def _shapes(axes: Any, found: Explanation, fits: list[Fit]) -> None:
     axes.plot(periods, found.perfect.fit.ratings, color="k", lw=0.9, ls=":", label="perfect leg")
     for place, fit in enumerate(fits):
         _line(axes, np.asarray(fit.ratings), place, _label(fit))
-    axes.legend(frameon=False, fontsize=7.5, loc="lower left")
     axes.set(
         title=f"step from z2 = {target.z2 + target.dz2:g} to {target.z2:g} rad, {target.setup}",
         xlabel="oscillation period",
         ylabel="$P^r$ about the equilibrium [-]",
+        xticks=periods,
     )
 
 
