@@ -17,7 +17,7 @@ from legbench.cli.hop_tables import (
     family_lines,
     hop_lines,
 )
-from legbench.cli.output import make_folder, note, print_json, progress, write_json
+from legbench.cli.output import note, print_json, progress, results_in, write_json
 from legbench.cli.parse import parse
 from legbench.control import JumpConfig
 from legbench.design import LegDesign, load_design
@@ -91,21 +91,20 @@ def main(arguments: list[str]) -> int:
     flags = parse(HopArguments, "hop", arguments)
     _check(flags)
     design = load_design(flags.design)
-    if flags.out is not None:
-        make_folder(flags.out)
-    if flags.passive:
-        from legbench.cli.hop_passive import answer
+    with results_in(flags.out):
+        if flags.passive:
+            from legbench.cli.hop_passive import answer
 
-        content, lines = answer(design, flags.rest)
-    else:
-        content, lines = _driven(flags, design)
-    if flags.json:
-        print_json(content)
-    else:
-        print("\n".join(lines))
-    if flags.out is not None:
-        write_json(flags.out / "hop.json", content)
-        note(f"wrote {flags.out / 'hop.json'}")
+            content, lines = answer(design, flags.rest)
+        else:
+            content, lines = _driven(flags, design)
+        if flags.json:
+            print_json(content)
+        else:
+            print("\n".join(lines))
+        if flags.out is not None:
+            write_json(flags.out / "hop.json", content)
+            note(f"wrote {flags.out / 'hop.json'}")
     # Who asks for a map and gets none is told so by the status, too.
     return int(flags.basin > 0 and "basin" not in content)
 
