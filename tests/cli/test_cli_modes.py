@@ -172,7 +172,7 @@ def test_an_interrupt_leaves_no_empty_folder(
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("legbench.cli.hop._driven", interrupt)
+    monkeypatch.setattr("legbench.cli.hop_driven.answer", interrupt)
     monkeypatch.setattr("legbench.cli.modes._found", interrupt)
     kept = tmp_path / "there"
     kept.mkdir()

@@ -5,6 +5,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from legbench.modes.branches import Branch
 from legbench.modes.family import Family
@@ -101,6 +102,28 @@ def _explain(axes: Axes, families: Sequence[Family], branched: bool) -> None:
     )
 
 
+def _curves_of_energy(
+    axes: Axes, scene: Scene, families: Sequence[Family], reach: float
+) -> NDArray[np.float64]:
+    """Draw curves of equal energy, and return points of the outermost one's inside (n, 2) [rad].
+
+    All of it is shown, as far as it closes within twice the reach of the orbits around the rest.
+    """
+    highest = max(found.energy for family in families for found in family.orbits)
+    q1, q2 = (middle + np.linspace(-2.0 * reach, 2.0 * reach, 240) for middle in scene.rest)
+    grid = np.stack(np.meshgrid(q1, q2), axis=-1)
+    potential = scene.potential(grid)
+    axes.contour(
+        q1,
+        q2,
+        potential,
+        levels=np.linspace(0.0, highest, 6)[1:],
+        colors="#cccccc",
+        linewidths=0.7,
+    )
+    return grid[potential <= highest]
+
+
 def _joint_space(axes: Axes, scene: Scene, families: Sequence[Family]) -> None:
     rest, ends = np.asarray(scene.rest), [np.asarray([scene.rest])]
     for family in families:
@@ -115,19 +138,9 @@ def _joint_space(axes: Axes, scene: Scene, families: Sequence[Family]) -> None:
         axes.plot(*family.shooting.carrier.path(start, times)[:, :2].T, lw=1.2, color=colour)
         ends.append(generator)
     points = np.vstack(ends)
-    low, high = points.min(axis=0) - 0.15, points.max(axis=0) + 0.15
-    q1, q2 = (np.linspace(a, b, 120) for a, b in zip(low, high, strict=True))
-    grid = np.stack(np.meshgrid(q1, q2), axis=-1)
-    energies = [found.energy for family in families for found in family.orbits]
-    axes.contour(
-        q1,
-        q2,
-        scene.potential(grid),
-        levels=np.linspace(0.0, max(energies), 6)[1:],
-        colors="#cccccc",
-        linewidths=0.7,
-    )
     reach = float(np.max(np.abs(points - rest)))
+    points = np.vstack([points, _curves_of_energy(axes, scene, families, reach)])
+    low, high = points.min(axis=0) - 0.05, points.max(axis=0) + 0.05
     for sign in (-1.0, 1.0):
         line = rest + reach * np.array([[sign, -1.0], [-sign, 1.0]])
         axes.plot(*line.T, lw=0.7, ls=":", color=GREY)
