@@ -71,8 +71,7 @@ def run_on_bench(
     """
     if not 0.0 <= pause < 3600.0:
         raise ConfigError(f"pause is {pause:g} s; it must be 0 to 3600 s")
-    for each in plan.planned:
-        _choice(each)
+    _check_buses(plan)
     asked, say = stop or StopFlag(), note if note is not None else _silent
     places = {each.hash: place for place, each in enumerate(plan.planned)}
     shards = sorted(shards_of(plan, 1), key=lambda shard: places[shard.planned[0].hash])
@@ -95,6 +94,12 @@ def run_on_bench(
 
 def _silent(_line: str) -> None:
     """Tell nobody."""
+
+
+def _check_buses(plan: Plan) -> None:
+    """Refuse another plant and a wrong bus file before anything is begun; raises ConfigError."""
+    for file in dict.fromkeys(_choice(each).bus for each in plan.planned):
+        load_bus(file)
 
 
 def _choice(planned: Planned) -> CanChoice:

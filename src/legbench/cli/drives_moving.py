@@ -137,6 +137,7 @@ class Jog:
         from legbench.commissioning.jog import jog
 
         design = bench.leg()
+        bench.config()  # A bus file that is wrong is named before the limits beside it.
         path = bench.limits or bench.choice.bus_file.parent / LIMITS_NAME
         limits = limits_for(path, design)
         tell_waived(None, limits)
