@@ -10,7 +10,7 @@ from tyro.conf import Positional, UseAppendAction
 from legbench.cli.output import note, print_json
 from legbench.cli.parse import parse
 from legbench.cli.table import print_comparison, print_summary
-from legbench.metrics import Analysis, Comparison, compare, summarise
+from legbench.metrics import Analysis, Comparison, Summary, compare, summarise
 from legbench.recording.reader import Recording, load
 
 SHOWN = 4
@@ -57,7 +57,9 @@ def main(arguments: list[str]) -> int:
         for comparison in comparisons:
             print_comparison(comparison)
     if chosen.rrd is not None or chosen.view or chosen.serve:
-        show(recording, others, chosen)
+        # Signals that were read for the figures make room for those that are shown.
+        del run, against
+        show(recording, others, chosen, summary)
     return 0
 
 
@@ -78,12 +80,14 @@ def _compared(run: Analysis, other: Analysis) -> Comparison:
     return comparison
 
 
-def show(recording: Recording, others: list[Recording], chosen: ReplayArguments) -> None:
+def show(
+    recording: Recording, others: list[Recording], chosen: ReplayArguments, summary: Summary
+) -> None:
     """Write the rerun file, and open it where that was asked for."""
     from legbench.viz.live.rrd import write_rrd
     from legbench.viz.live.viewer import open_viewer
 
-    rrd = write_rrd(recording, chosen.rrd or recording.path / "view.rrd", others)
+    rrd = write_rrd(recording, chosen.rrd or recording.path / "view.rrd", others, summary)
     note(f"wrote {rrd}")
     if not (chosen.view or chosen.serve):
         return

@@ -167,19 +167,23 @@ class WholeBatches:
         self.rows = self.end = self.damaged = 0
         self.tear: str | None = None
         self._ended = False
-        try:
-            schema = ipc.read_schema(self._file)
-            # Names are decoded when they are asked for, and may have rotted.
-            names = schema.names
-        except (OSError, pa.ArrowException, UnicodeDecodeError):
-            names = None
-        if names is None:
+        schema = self._read_schema()
+        if schema is None:
             self.tear = f"{path.name} is torn before its first row"
             return
         self.schema = schema
         self.end = self._file.tell()
         self._file.seek(0)
         self._checker = Checker(self._file.read(self.end), schema)
+
+    def _read_schema(self) -> pa.Schema | None:
+        """Schema of the stream, None where its message is torn or its names have rotted."""
+        try:
+            schema = ipc.read_schema(self._file)
+            # Names are decoded when they are asked for.
+            return schema if schema.names else None
+        except (OSError, pa.ArrowException, UnicodeDecodeError):
+            return None
 
     @property
     def torn(self) -> int:

@@ -63,18 +63,23 @@ class Publisher:
         document = rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
         self._stream.log("/run", document, static=True)
 
+    def lay_out(self, rows: Recorded) -> None:
+        """Send the layout once, with views that have room for these rows."""
+        if self._laid_out:
+            return
+        hip = hip_of(rows, self._facts)
+        room = leg_room(self._facts, hip, live=self._live)
+        keys = [other.key for other in self._others]
+        layout = blueprint(self._facts, room=room, live=self._live, others=keys)
+        self._stream.send_blueprint(layout)
+        self._laid_out = True
+
     def push(self, rows: Recorded) -> None:
         """Add the rows that follow those pushed before."""
         if len(rows.time) == 0:
             return
         trace = self._tracer.extend(rows)
-        if not self._laid_out:
-            hip = hip_of(rows, self._facts)
-            room = leg_room(self._facts, hip, live=self._live)
-            keys = [other.key for other in self._others]
-            layout = blueprint(self._facts, room=room, live=self._live, others=keys)
-            self._stream.send_blueprint(layout)
-            self._laid_out = True
+        self.lay_out(rows)
         for section in self._sections:
             section.push(trace)
 
