@@ -28,7 +28,7 @@ from legbench.viz.print.overlay import (
 )
 from legbench.viz.print.own_signals import draw_own_signals, own_signals_of
 from legbench.viz.print.panels import panels_of, size_of
-from legbench.viz.print.thinning import stride
+from legbench.viz.print.thinning import draw_line, plane_stride
 
 WIDTH, WIDE = 1.3, 2.4
 """Widths of the coloured lines alone, and under the lines of another run [pt]."""
@@ -61,7 +61,7 @@ def phase_figure(recording: Recorded, against: Sequence[Recorded] = ()) -> Figur
         require_rows(each)
     facts, colouring = facts_of(run.description), colouring_of(run)
     own, convention = len(own_signals_of(run)), facts.run.convention
-    faint = planes_of(run, convention, slice(None, None, stride(len(run.time))))
+    faint = planes_of(run, convention, slice(None, None, plane_stride(run.time)))
     bright = _bright(run, colouring, convention)
     with styled():
         figure = Figure(figsize=size_of(bool(against), own), layout="constrained")
@@ -96,7 +96,9 @@ def _bright(
 ) -> list[tuple[Floats, Floats, Floats]]:
     """Points in the three planes of each stretch that is highlighted."""
     stretches = colouring.stretches
-    step = stride(sum(stretch.stop - stretch.first for stretch in stretches))
+    step = 1
+    if stretches:
+        step = plane_stride(run.time[stretches[0].first : stretches[-1].stop])
     rows = [slice(stretch.first, stretch.stop + 1, step) for stretch in stretches]
     return [planes_of(run, convention, each) for each in rows]
 
@@ -108,7 +110,8 @@ def _draw(
 
     Lines are pixels in vector files, which else would weigh megabytes.
     """
-    panel.plot(*points.T, color=FAINT_COLOUR, linewidth=0.5, zorder=1, rasterized=True)
+    x, y = points.T
+    draw_line(panel, x, y, color=FAINT_COLOUR, linewidth=0.5, zorder=1, rasterized=True)
     bright = LineCollection(
         lines,
         colors=[stretch.colour for stretch in colouring.stretches],

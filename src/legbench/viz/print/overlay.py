@@ -12,7 +12,7 @@ from legbench.signals import Floats
 from legbench.viz import style
 from legbench.viz.colouring import colouring_of
 from legbench.viz.print._matplotlib import Axes
-from legbench.viz.print.thinning import peaks, stride
+from legbench.viz.print.thinning import draw_line, peaks, plane_stride, stride
 
 Dashes = tuple[float, tuple[float, ...]]
 
@@ -65,11 +65,13 @@ def draw_other(
     """Draw those rows of another run over the planes that its own figure would highlight."""
     stretches, look = colouring_of(other).stretches, look_of(place)
     first, stop = (stretches[0].first, stretches[-1].stop + 1) if stretches else (0, None)
-    count = len(other.time[first:stop])
-    shown = slice(first, stop, stride(count))
+    shown = slice(first, stop, plane_stride(other.time[first:stop]))
     for panel, points in zip(panels, planes_of(other, convention, shown), strict=True):
-        panel.plot(
-            *points.T,
+        x, y = points.T
+        draw_line(
+            panel,
+            x,
+            y,
             color=look.colour,
             linestyle=look.dashes,
             linewidth=0.8,
@@ -98,7 +100,8 @@ def draw_differences(
         ):
             size = np.maximum(np.abs(values), LEAST)
             rows = peaks(size, stride(len(size)))
-            panel.plot(
+            draw_line(
+                panel,
                 apart.time[rows],
                 size[rows],
                 color=colour,

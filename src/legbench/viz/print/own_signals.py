@@ -8,7 +8,7 @@ from legbench.signals import Signal
 from legbench.viz import style
 from legbench.viz.print._matplotlib import Axes
 from legbench.viz.print.overlay import look_of
-from legbench.viz.print.thinning import peaks, stride
+from legbench.viz.print.thinning import draw_line, peaks, stride
 
 COLOURS = tuple(map(style.unit, style.COMPONENTS))
 """Colours of a signal's components in turn."""
@@ -53,7 +53,8 @@ def _draw(panel: Axes, signal: Signal, run: Recorded, other: int | None = None) 
     names = signal.components or (signal.name,)
     for place, (name, values) in enumerate(zip(names, rows.T, strict=True)):
         shown = peaks(values, stride(len(values)))
-        panel.plot(
+        draw_line(
+            panel,
             run.time[shown],
             values[shown],
             color=COLOURS[place % len(COLOURS)] if other is None else look_of(other).colour,
