@@ -23,7 +23,9 @@ def write_parquet(recording: Recording, path: Path, progress: Progress) -> None:
     about = {name.encode(): as_json(each) for name, each in described(recording).items()}
     metadata = carrying(recording.manifest) | about
     units, done = recording.layout.units, 0
-    empty = arrow_table({n: v[:0] for n, v in recording.columns.items()}, units, {})
+    # A slice alone would keep the whole column.
+    none = {name: values[:0].copy() for name, values in recording.columns.items()}
+    empty = arrow_table(none, units, {})
     with parquet.ParquetWriter(
         str(path),
         empty.schema.with_metadata(metadata),
