@@ -13,6 +13,7 @@ COMMANDS = {
     "run": "run a controller on a leg and record it",
     "replay": "rate and show a recorded run again",
     "recover": "repair a run that was cut off",
+    "compare": "put recorded runs side by side, aligned by event",
     "runs": "list, filter and sort recorded runs",
     "export": "write a recorded run as CSV, Parquet, MAT or MCAP",
     "model": "write or view the MuJoCo model of a design",

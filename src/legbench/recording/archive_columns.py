@@ -1,9 +1,11 @@
 """Columns of a long run, which are decoded each time they are asked for instead of being kept."""
 
+import shutil
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import mkdtemp
 from typing import Any, Final, final
+from weakref import finalize
 
 import numpy as np
 import pyarrow as pa
@@ -29,14 +31,9 @@ class ArchiveColumns(Mapping[str, np.ndarray]):
         RecordingError: the file is damaged, also where a column is asked for.
     """
 
-    def __init__(self, path: Path, folder: "TemporaryDirectory[str] | None" = None) -> None:
-        """Read the footer of the archive.
-
-        Args:
-            path: the archive.
-            folder: temporary folder that holds it, which goes when these columns go.
-        """
-        self._path, self._folder = path, folder
+    def __init__(self, path: Path) -> None:
+        """Read the footer of the archive at a path."""
+        self._path = path
         try:
             with parquet.ParquetFile(str(path)) as file:
                 self.schema: pa.Schema = file.schema_arrow
@@ -80,9 +77,15 @@ def spooled(stream: WholeBatches, manifest: Mapping[str, Any]) -> ArchiveColumns
     Raises:
         RecordingError: there is no room for it where temporary files go.
     """
-    folder = TemporaryDirectory(prefix="legbench-")
-    write_archive(Path(folder.name), stream, manifest)
-    return ArchiveColumns(Path(folder.name) / ARCHIVE, folder)
+    folder = Path(mkdtemp(prefix="legbench-"))
+    try:
+        write_archive(folder, stream, manifest)
+        columns = ArchiveColumns(folder / ARCHIVE)
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+    finalize(columns, shutil.rmtree, folder, ignore_errors=True)
+    return columns
 
 
 def column_values(column: pa.ChunkedArray) -> np.ndarray:
