@@ -17,8 +17,12 @@ from legbench.viz.display import has_display
 LOOPBACK = "127.0.0.1"
 """Address that the viewer listens on; its own default is every network interface."""
 PORT, WEB_PORT = 9876, 9090
-MEMORY = ("--memory-limit", "2GB", "--server-memory-limit", "512MB")
-"""Memory limits of the viewer, whose default is three quarters of the whole machine's memory."""
+MEMORY = ("--memory-limit", "2GB", "--server-memory-limit", "256MB")
+"""Memory limits of the viewer, whose default is three quarters of the whole machine's memory.
+
+A server that reaches its limit forgets the oldest rows, which the page has by then; one that is
+opened later begins after them. It counts what messages hold, not what they cost: in small ones, as
+of a run that is watched, it needs some 2.5 times as much."""
 
 
 def proxy_url(port: int = PORT) -> str:
