@@ -13,7 +13,7 @@ from legbench.design.toml import load_design
 from legbench.errors import RecordingError
 from legbench.kinematics import modal_to_joint
 from legbench.metrics import Analysis, compare, summarise
-from legbench.metrics.events import Event, common_event, event_time, event_times
+from legbench.metrics.events import CommonEvent, common_event, event_time, event_times
 from legbench.metrics.side_by_side import side_by_side
 from legbench.phases import PhaseInfo, Role
 from legbench.recording.reader import Recording
@@ -36,23 +36,23 @@ def delayed(run: Recording, rows: int, name: str = "late") -> Recording:
 
 def test_touchdowns_and_liftoffs_are_those_of_the_closed_form() -> None:
     run = Analysis(HOP.recording())
-    down, up = event_times(run, Event.TOUCHDOWN), event_times(run, Event.LIFTOFF)
+    down, up = event_times(run, CommonEvent.TOUCHDOWN), event_times(run, CommonEvent.LIFTOFF)
     np.testing.assert_allclose(down, [HOP.touchdown(n) for n in range(len(down))], atol=1e-4)
     np.testing.assert_allclose(up, [HOP.liftoff(n) for n in range(len(up))], atol=1e-3)
     assert len(down) >= 4
-    assert event_time(run, Event.TOUCHDOWN, 2) == down[1]
-    assert event_time(run, Event.TOUCHDOWN, -1) == down[-1]
-    assert event_time(run, Event.CLOCK) == 0.0
+    assert event_time(run, CommonEvent.TOUCHDOWN, 2) == down[1]
+    assert event_time(run, CommonEvent.TOUCHDOWN, -1) == down[-1]
+    assert event_time(run, CommonEvent.CLOCK) == 0.0
 
 
 def test_switches_lie_between_acting_phases() -> None:
     phase = np.array([0, 0, 1, 1, 2, 2, 2, 1, 0, 1])
     run = Analysis(guest(phase, (REST, FOLDED, STRETCHED), setup={"kind": "ffs"}))
-    np.testing.assert_allclose(event_times(run, Event.SWITCH), [0.004, 0.007])
-    np.testing.assert_allclose(event_times(run, Event.ACTION), [0.002])
-    assert common_event([run]) is Event.SWITCH
+    np.testing.assert_allclose(event_times(run, CommonEvent.SWITCH), [0.004, 0.007])
+    np.testing.assert_allclose(event_times(run, CommonEvent.ACTION), [0.002])
+    assert common_event([run]) is CommonEvent.SWITCH
     resting = Analysis(guest(0 * phase, (REST, FOLDED), setup={"kind": "ffs"}))
-    assert common_event([run, resting]) is Event.CLOCK
+    assert common_event([run, resting]) is CommonEvent.CLOCK
 
 
 @pytest.mark.parametrize("number", [1, 3, -1])
@@ -63,12 +63,12 @@ def test_a_delayed_run_is_the_same_run_after_its_event(number: int) -> None:
     pair = [Analysis(run), Analysis(late)]
     found = side_by_side(pair, number=number, span=0.2)
     (apart,) = found.apart
-    assert found.event is Event.TOUCHDOWN
+    assert found.event is CommonEvent.TOUCHDOWN
     assert found.times[1] - found.times[0] == pytest.approx(0.037, abs=1e-9)
     assert max(apart.joint_max, apart.z2_max, apart.x1_max) < 1e-9
     assert apart.run == "runs/late"
     assert (apart.other_leg, apart.otherwise_unlike) == ([], [])
-    by_clock = side_by_side(pair, event=Event.CLOCK, span=0.2).apart[0]
+    by_clock = side_by_side(pair, event=CommonEvent.CLOCK, span=0.2).apart[0]
     assert by_clock.joint_max > 0.05
 
 
@@ -84,7 +84,7 @@ def test_a_known_distance_is_measured_in_each_coordinate() -> None:
         return Analysis(recording(time, entries, joint_pos=joint))
 
     runs = [swung(0.0, 0.1), swung(0.02, 0.1), swung(0.0, 0.13)]
-    first, second = side_by_side(runs, event=Event.CLOCK).apart
+    first, second = side_by_side(runs, event=CommonEvent.CLOCK).apart
     assert first.z2_max == pytest.approx(0.0, abs=1e-12)
     # x1 = (q1 + q2) / 2 is z1 over the root of two.
     assert first.x1_max == pytest.approx(0.02 / np.sqrt(2.0), rel=1e-4)
@@ -116,10 +116,10 @@ def test_figures_are_those_of_the_runs_alone() -> None:
 
 def test_events_that_are_not_there_are_refused() -> None:
     run = Analysis(HOP.recording())
-    count = len(event_times(run, Event.TOUCHDOWN))
+    count = len(event_times(run, CommonEvent.TOUCHDOWN))
     for number in (0, count + 1, -count - 1):
         with pytest.raises(RecordingError, match=rf"has {count} events of kind touchdown, so none"):
-            side_by_side([run, run], event=Event.TOUCHDOWN, number=number)
+            side_by_side([run, run], event=CommonEvent.TOUCHDOWN, number=number)
     early = Analysis(replace(HOP.recording(), time=HOP.recording().time + 9.0))
     with pytest.raises(RecordingError, match="no rows around their event"):
-        side_by_side([early, early], event=Event.CLOCK, span=0.5)
+        side_by_side([early, early], event=CommonEvent.CLOCK, span=0.5)

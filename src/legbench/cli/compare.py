@@ -12,7 +12,7 @@ from legbench.cli.output import note, print_json
 from legbench.cli.parse import parse
 from legbench.errors import ConfigError
 from legbench.metrics import Analysis, Summary
-from legbench.metrics.events import Event
+from legbench.metrics.events import CommonEvent
 from legbench.metrics.rating_text import shown
 from legbench.metrics.side_by_side import SPAN, SideBySide, side_by_side
 from legbench.recording.reader import load
@@ -32,7 +32,7 @@ class CompareArguments:
 
     runs: Annotated[tuple[Path, ...], Positional]
     """Run folders, two or more; distances are from the first."""
-    align: Event | None = None
+    align: CommonEvent | None = None
     """Event at which the runs are laid over each other; by default the first of touchdown, switch
     and action that all runs have."""
     number: int = 1
@@ -100,7 +100,7 @@ def print_table(runs: Sequence[Analysis], found: SideBySide) -> None:
     """Print one column a run, then the distances; rows that no run shows are left out."""
     columns = [dict(_cells(*pair)) for pair in zip(runs, found.summaries, strict=True)]
     table = [(label, [column[label] for column in columns]) for label in columns[0]]
-    event = f"{found.event.value} [s]" if found.event is not Event.CLOCK else "from [s]"
+    event = f"{found.event.value} [s]" if found.event is not CommonEvent.CLOCK else "from [s]"
     table.append((event, [f"{time:.5g}" for time in found.times]))
     for label, values in (
         ("|dq|, max [rad]", [each.joint_max for each in found.apart]),

@@ -17,7 +17,7 @@ from legbench.recording.description import RunDescription
 from legbench.signals import Floats
 
 
-class Event(StrEnum):
+class CommonEvent(StrEnum):
     """Kind of event on which runs are aligned."""
 
     TOUCHDOWN = "touchdown"
@@ -32,41 +32,41 @@ class Event(StrEnum):
     """Plant time zero: no event at all."""
 
 
-BEST_FIRST = (Event.TOUCHDOWN, Event.SWITCH, Event.ACTION)
+BEST_FIRST = (CommonEvent.TOUCHDOWN, CommonEvent.SWITCH, CommonEvent.ACTION)
 """Events in the order in which the first is chosen that every run has."""
 
 
-def event_times(run: Analysis, event: Event) -> Floats:
+def event_times(run: Analysis, event: CommonEvent) -> Floats:
     """Times of all events of one kind in a run, in order (m,) [s].
 
     Touchdown and lift-off lie between the rows if there is truth. A leg that is put down in its
     first rows does not land.
     """
     gait = run.gait
-    if event is Event.CLOCK:
+    if event is CommonEvent.CLOCK:
         return np.zeros(1)
-    if event is Event.ACTION:
+    if event is CommonEvent.ACTION:
         return run.time[run.first_action : run.first_action + 1]
-    if event is Event.SWITCH:
+    if event is CommonEvent.SWITCH:
         phase = run["phase"]
         acts = ~resting(phase, run.description.phases)
         changed = np.flatnonzero((phase[1:] != phase[:-1]) & acts[1:] & acts[:-1]) + 1
         return run.time[changed]
-    down = event is Event.TOUCHDOWN
+    down = event is CommonEvent.TOUCHDOWN
     ends = (gait.stance.start, gait.flight.end) if down else (gait.stance.end, gait.flight.start)
     times = np.unique(np.concatenate(ends))
     return times[times > run.time[0] + MINIMUM_PHASE] if len(run.time) else times
 
 
-def common_event(runs: Sequence[Analysis]) -> Event:
+def common_event(runs: Sequence[Analysis]) -> CommonEvent:
     """Best kind of event that all runs have; the clock where they share none."""
     for event in BEST_FIRST:
         if all(len(event_times(run, event)) for run in runs):
             return event
-    return Event.CLOCK
+    return CommonEvent.CLOCK
 
 
-def event_time(run: Analysis, event: Event, number: int = 1) -> float:
+def event_time(run: Analysis, event: CommonEvent, number: int = 1) -> float:
     """Time of one event of a run [s].
 
     Args:

@@ -10,7 +10,7 @@ from legbench.errors import RecordingError
 from legbench.kinematics import polar_angle
 from legbench.metrics.analysis import Analysis
 from legbench.metrics.compare import differences
-from legbench.metrics.events import Event, Shifted, common_event, event_time
+from legbench.metrics.events import CommonEvent, Shifted, common_event, event_time
 from legbench.metrics.summary import Summary, summarise
 from legbench.metrics.window import Window
 from legbench.recording.unlike import unlike
@@ -51,7 +51,7 @@ class Aligned:
 class SideBySide:
     """Figures of several runs, and their distances from the first."""
 
-    event: Event
+    event: CommonEvent
     """Kind of event on which they are aligned."""
     number: int
     """Number of that event in each run, from 1; from the end where it is negative."""
@@ -76,7 +76,11 @@ class SideBySide:
 
 
 def side_by_side(
-    runs: Sequence[Analysis], *, event: Event | None = None, number: int = 1, span: float = SPAN
+    runs: Sequence[Analysis],
+    *,
+    event: CommonEvent | None = None,
+    number: int = 1,
+    span: float = SPAN,
 ) -> SideBySide:
     """Put runs side by side, of the same leg or of different ones.
 
@@ -91,7 +95,7 @@ def side_by_side(
         FormatError: a run describes no leg.
     """
     chosen = common_event(runs) if event is None else event
-    number = 1 if chosen in (Event.ACTION, Event.CLOCK) else number
+    number = 1 if chosen in (CommonEvent.ACTION, CommonEvent.CLOCK) else number
     times = [event_time(run, chosen, number) for run in runs]
     first, *others = [Shifted(run, time) for run, time in zip(runs, times, strict=True)]
     return SideBySide(

@@ -1,7 +1,6 @@
 """Everything that is known of one run as a flat row: figures first, then settings by dotted key."""
 
 import json
-import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -9,6 +8,7 @@ from typing import Any
 from legbench.errors import LegbenchError
 from legbench.metrics.summary import Summary, summarise
 from legbench.recording.reader import load
+from legbench.strict_json import null_for_nan
 
 Cell = float | str | bool | None
 """Value of a column in one run; none where the run does not show it."""
@@ -38,7 +38,8 @@ def measure(run: Path) -> Row:
         "plant": described.plant,
     }
     settings = dict(_flat(described.experiment))
-    return {name: _cell(value) for name, value in (named | ending | figures | settings).items()}
+    row = null_for_nan(named | ending | figures | settings)
+    return {name: _cell(value) for name, value in row.items()}
 
 
 def _figures(summary: Summary) -> dict[str, Any]:
@@ -70,9 +71,7 @@ def _flat(entries: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any
 
 
 def _cell(value: Any) -> Cell:
-    """Value as the index can hold it: a list becomes its JSON text, no number is none."""
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if value is None or isinstance(value, bool | int | str):
+    """Value as a table can hold it: a list becomes its JSON text."""
+    if value is None or isinstance(value, bool | int | float | str):
         return value
     return json.dumps(value)

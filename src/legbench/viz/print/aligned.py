@@ -7,7 +7,7 @@ import numpy as np
 
 from legbench.kinematics import joint_to_modal, polar_angle
 from legbench.metrics.analysis import Analysis
-from legbench.metrics.events import Event
+from legbench.metrics.events import CommonEvent
 from legbench.metrics.side_by_side import BEFORE, SideBySide
 from legbench.viz import style
 from legbench.viz.drafts import require_rows
@@ -42,7 +42,7 @@ def aligned_figure(runs: Sequence[Analysis], found: SideBySide, span: float) -> 
         grid = figure.add_gridspec(2, 3)
         radial, polar = figure.add_subplot(grid[0, :2]), figure.add_subplot(grid[1, :2])
         plane, ratings = figure.add_subplot(grid[0, 2]), figure.add_subplot(grid[1, 2])
-        since = "time" if found.event is Event.CLOCK else f"time since {_named(found)}"
+        since = "time" if found.event is CommonEvent.CLOCK else f"time since {_named(found)}"
         for panel, title, x, y in (
             (radial, "(a) radial mode", f"{since} [s]", style.Z2.math),
             (plane, f"(b) {style.MODAL}", style.Z2.math, style.DZ2.math),
@@ -70,7 +70,7 @@ def aligned_figure(runs: Sequence[Analysis], found: SideBySide, span: float) -> 
 
 def _named(found: SideBySide) -> str:
     """Name of the event with its number, where there can be several."""
-    if found.event is Event.ACTION:
+    if found.event is CommonEvent.ACTION:
         return "the first control action"
     if found.number > 0:
         return f"{found.event.value} {found.number}"
