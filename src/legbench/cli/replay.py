@@ -87,7 +87,7 @@ def show(
     from legbench.viz.live.rrd import write_rrd
     from legbench.viz.live.viewer import open_viewer
 
-    rrd = write_rrd(recording, chosen.rrd or recording.path / "view.rrd", others, summary)
+    rrd = write_rrd(recording, chosen.rrd or recording.path / "view.rrd", others, summary=summary)
     note(f"wrote {rrd}")
     if not (chosen.view or chosen.serve):
         return

@@ -19,6 +19,7 @@ def write_rrd(
     recording: Recording,
     path: Path,
     against: Sequence[Recording] = (),
+    *,
     summary: Summary | None = None,
 ) -> Path:
     """Write a run with its layout as an `.rrd` file; an older one is replaced when all is well.
