@@ -66,18 +66,18 @@ def test_a_missing_mcap_names_its_extra(
 
 
 @pytest.mark.parametrize(
-    ("flags", "message"),
+    ("flags", "status", "message"),
     [
-        ([], "no format was chosen; choose one of --csv, --parquet, --mat, --mcap"),
-        (["--csv", "--mat"], "one file has one format; choose one of --csv"),
-        (["--out", "run.xlsx"], "no format was chosen"),
-        (["--csv", "--out", "/dev/null/run.csv"], "cannot write /dev/null/run.csv"),
+        ([], 2, "no format was chosen; choose one of --csv, --parquet, --mat, --mcap"),
+        (["--csv", "--mat"], 2, "one file has one format; choose one of --csv"),
+        (["--out", "run.xlsx"], 2, "no format was chosen"),
+        (["--csv", "--out", "/dev/null/run.csv"], 1, "cannot write /dev/null/run.csv"),
     ],
 )
 def test_the_command_says_what_it_needs(
-    jump: Path, flags: list[str], message: str, capsys: pytest.CaptureFixture[str]
+    jump: Path, flags: list[str], status: int, message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["export", str(jump), *flags]) == 1
+    assert main(["export", str(jump), *flags]) == status
     told = capsys.readouterr()
     assert told.out == ""
     assert told.err.startswith("legbench: ")

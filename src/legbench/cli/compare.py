@@ -9,8 +9,7 @@ from typing import Annotated
 from tyro.conf import Positional
 
 from legbench.cli.output import note, print_json
-from legbench.cli.parse import parse
-from legbench.errors import ConfigError
+from legbench.cli.parse import parse, wrong_usage
 from legbench.metrics import Analysis, Summary
 from legbench.metrics.events import CommonEvent
 from legbench.metrics.rating_text import shown
@@ -49,9 +48,14 @@ def main(arguments: list[str]) -> int:
     """Run `legbench compare`."""
     chosen = parse(CompareArguments, "compare", arguments)
     if len(chosen.runs) < 2:
-        raise ConfigError("one run has nothing to be compared with; name two or more")
+        return wrong_usage("compare", "one run has nothing to be compared with; name two or more")
     if not 0.0 < chosen.span < math.inf:
-        raise ConfigError(f"--span is {chosen.span:g} s; it must be more than 0 s, and finite")
+        told = f"--span is {chosen.span:g} s; it must be more than 0 s, and finite"
+        return wrong_usage("compare", told)
+    if chosen.figure is not None:
+        from legbench.viz.print.save import check_suffix
+
+        check_suffix(chosen.figure)
     runs = [_analysed(path) for path in chosen.runs]
     found = side_by_side(runs, event=chosen.align, number=chosen.number, span=chosen.span)
     for line in unlike_lines(runs, found):
@@ -158,4 +162,4 @@ def _mean(ratings: list[float]) -> str:
 
 
 def _number(value: float | None) -> str:
-    return "-" if value is None or not math.isfinite(value) else f"{value:.4g}"
+    return "-" if value is None or math.isnan(value) else f"{value:.4g}"

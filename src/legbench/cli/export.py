@@ -7,8 +7,7 @@ from typing import Annotated
 from tyro.conf import Positional
 
 from legbench.cli.output import note, print_json, progress
-from legbench.cli.parse import parse
-from legbench.errors import ConfigError
+from legbench.cli.parse import parse, wrong_usage
 from legbench.export.formats import Format, export
 from legbench.recording.reader import load
 
@@ -37,7 +36,12 @@ class ExportArguments:
 def main(arguments: list[str]) -> int:
     """Run `legbench export`."""
     chosen = parse(ExportArguments, "export", arguments)
-    kind = _format(chosen)
+    kinds = _formats(chosen)
+    if len(kinds) != 1:
+        flags = ", ".join(f"--{kind.value}" for kind in Format)
+        said = "one file has one format" if kinds else "no format was chosen"
+        return wrong_usage("export", f"{said}; choose one of {flags}")
+    (kind,) = kinds
     recording = load(chosen.run)
     if recording.torn is not None:
         note(f"legbench: {chosen.run} is torn ({recording.torn}); written as far as it goes")
@@ -51,15 +55,8 @@ def main(arguments: list[str]) -> int:
     return 0
 
 
-def _format(chosen: ExportArguments) -> Format:
-    """Format that a flag or the suffix asks for; raises ConfigError unless there is one."""
+def _formats(chosen: ExportArguments) -> list[Format]:
+    """Formats that the flags ask for or, where none does, the suffix of the file."""
     asked = [kind for kind in Format if getattr(chosen, kind.value)]
-    flags = ", ".join(f"--{kind.value}" for kind in Format)
-    if len(asked) > 1:
-        raise ConfigError(f"one file has one format; choose one of {flags}")
-    if asked:
-        return asked[0]
     suffix = "" if chosen.out is None else chosen.out.suffix.lower().lstrip(".")
-    if suffix not in list(Format):
-        raise ConfigError(f"no format was chosen; choose one of {flags}")
-    return Format(suffix)
+    return asked or [kind for kind in Format if kind.value == suffix]
