@@ -35,11 +35,11 @@ def test_the_outline_of_a_thinned_line_is_that_of_the_whole(values: list[float],
 def test_strides_leave_short_lines_alone() -> None:
     most = thinning.MOST_POINTS
     assert [stride(rows) for rows in (0, 1, most, most + 1, 10 * most)] == [1, 1, 1, 2, 10]
-    assert plane_stride(np.arange(most) * 1e-3) == 1
-    assert plane_stride(np.arange(3 * most) * 1e-3) == 3
+    assert plane_stride(1e-3 * np.arange(most, dtype=np.float64)) == 1
+    assert plane_stride(1e-3 * np.arange(3 * most, dtype=np.float64)) == 3
     # A jump has forty points however long the run is.
-    assert plane_stride(np.arange(50 * most) * 1e-3) == 5
-    assert plane_stride(np.arange(50 * most) * 1e-2) == 1
+    assert plane_stride(1e-3 * np.arange(50 * most, dtype=np.float64)) == 5
+    assert plane_stride(1e-2 * np.arange(50 * most, dtype=np.float64)) == 1
 
 
 def test_a_long_line_is_drawn_in_parts_that_meet(monkeypatch: pytest.MonkeyPatch) -> None:

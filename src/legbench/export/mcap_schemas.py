@@ -82,7 +82,7 @@ def joint_states(part: Recording, times: Sequence[int]) -> Iterator[bytes]:
         for place, name in enumerate(names)
     ]
     columns = [each for _, values in joints for each in values.values()]
-    known: list[bool] = np.isfinite(columns).all(axis=0).tolist()
+    known = np.all(np.isfinite(np.stack(columns)), axis=0).tolist()
     template = _template(joints)
     texts = zip(*(map(repr, each.tolist()) for each in columns), strict=True)
     for row, (time, values, whole) in enumerate(zip(times, texts, known, strict=True)):

@@ -1,7 +1,7 @@
 """Print figure of runs laid over each other at an event: motion over time, phase plane, ratings."""
 
 from collections.abc import Sequence
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -77,7 +77,7 @@ def _named(found: SideBySide) -> str:
     return f"{found.event.value} {-found.number} from the end"
 
 
-def _look(place: int) -> dict[str, object]:
+def _look(place: int) -> dict[str, Any]:
     """Look of a run: the first drawn through, the others dashed over it."""
     if place == 0:
         return {"color": FIRST, "linewidth": 1.8, "zorder": 2}
