@@ -84,6 +84,23 @@ def test_a_tail_of_zeros_is_no_row(run: Path, samples: bytes, kept: int) -> None
     assert len(load(run).time) == 3 * ROWS
 
 
+def test_bytes_that_rot_before_the_close_are_told_and_kept(tmp_path: Path) -> None:
+    writer = RunWriter.create(tmp_path, {})
+    append_rows(writer, ROWS * BATCHES)
+    path = writer.path / "samples.arrows"
+    samples = path.read_bytes()
+    with path.open("r+b") as file:
+        file.seek(ends_of(samples)[1] - 777)
+        file.write(b"rotten")
+    writer.close()
+    told = load(writer.path).manifest["archive_error"]
+    assert told.startswith("150 of 200 rows could be read back: samples.arrows has rotten bytes")
+    assert path.exists()
+    report = recover(writer.path)
+    assert (report.rows_kept, report.status) == (150, "complete")
+    assert (writer.path / "samples.arrows.torn").exists()
+
+
 def test_a_flip_of_any_byte_is_noticed(run: Path, samples: bytes) -> None:
     path = run / "samples.arrows"
     written = np.arange(ROWS * BATCHES) / 1000
