@@ -2,8 +2,6 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from legbench.kinematics import ModalConvention
 from legbench.metrics.analysis import analysed
 from legbench.metrics.source import Recorded
@@ -11,16 +9,10 @@ from legbench.signals import Floats
 from legbench.viz import style
 from legbench.viz.colouring import Colouring, colouring_of
 from legbench.viz.drafts import require_rows
-from legbench.viz.facts import Facts, facts_of
+from legbench.viz.facts import facts_of
 from legbench.viz.names import names_of
-from legbench.viz.print._matplotlib import (
-    Axes,
-    Figure,
-    FigureCanvasAgg,
-    LineCollection,
-    styled,
-)
-from legbench.viz.print.legend import FAINT_COLOUR, explain
+from legbench.viz.print._matplotlib import Axes, Figure, FigureCanvasAgg, LineCollection, styled
+from legbench.viz.print.legend import explain
 from legbench.viz.print.overlay import (
     draw_differences,
     draw_other,
@@ -28,16 +20,11 @@ from legbench.viz.print.overlay import (
 )
 from legbench.viz.print.own_signals import draw_own_signals, own_signals_of
 from legbench.viz.print.panels import panels_of, size_of
+from legbench.viz.print.planes import FAINT, PLANES, draw_modes, widen
 from legbench.viz.print.thinning import draw_line, plane_stride
 
 WIDTH, WIDE = 1.3, 2.4
 """Widths of the coloured lines alone, and under the lines of another run [pt]."""
-PLANES = (
-    (style.POLAR, style.X1, style.X2),
-    (style.JOINT, style.Q1, style.Q2),
-    (style.MODAL, style.Z2, style.DZ2),
-)
-"""Title and axes of the three panels."""
 
 
 def phase_figure(recording: Recorded, against: Sequence[Recorded] = ()) -> Figure:
@@ -83,8 +70,8 @@ def phase_figure(recording: Recorded, against: Sequence[Recorded] = ()) -> Figur
         if others:
             draw_differences(rows.differences, run, others)
         draw_own_signals(rows.own, len(panels) + len(rows.differences), run, others)
-        _at_least(panels[0], style.POLAR_LEAST)
-        _draw_modes(panels[1], facts, run["joint_pos"])
+        widen(panels[0], style.POLAR_LEAST)
+        draw_modes(panels[1], facts, run["joint_pos"])
         explain(figure, panels, colouring, names_of([run, *others]) if others else [])
         title = " — ".join(filter(None, [facts.headline, colouring.ratings]))
         figure.suptitle(title, fontsize=10.5)
@@ -111,7 +98,7 @@ def _draw(
     Lines are pixels in vector files, which else would weigh megabytes.
     """
     x, y = points.T
-    draw_line(panel, x, y, color=FAINT_COLOUR, linewidth=0.5, zorder=1, rasterized=True)
+    draw_line(panel, x, y, color=FAINT, linewidth=0.5, zorder=1, rasterized=True)
     bright = LineCollection(
         lines,
         colors=[stretch.colour for stretch in colouring.stretches],
@@ -122,35 +109,3 @@ def _draw(
     )
     panel.add_collection(bright)
     panel.margins(0.06)
-
-
-def _at_least(panel: Axes, span: float) -> None:
-    """Show a range of x no shorter than this."""
-    low, high = panel.get_xlim()
-    if high - low < span:
-        centre = 0.5 * (low + high)
-        panel.set_xlim(centre - 0.5 * span, centre + 0.5 * span)
-
-
-def _draw_modes(panel: Axes, facts: Facts, joint: Floats) -> None:
-    """w1 and w2 through the rest posture, as long as the motion is wide; equal axes."""
-    panel.set_aspect("equal", adjustable="datalim")
-    low, high = joint.min(axis=0), joint.max(axis=0)
-    centre = 0.5 * (low + high) if facts.rest is None else np.array(facts.rest)
-    reach = 0.62 * float((high - low).max())
-    for name, colour, arm in (
-        ("$w_1$", style.MODE_1, np.array([1.0, 1.0])),
-        ("$w_2$", style.MODE_2, np.array([1.0, -1.0])),
-    ):
-        ends = np.stack([centre - reach * arm, centre + reach * arm])
-        panel.plot(
-            *ends.T, color=style.unit(colour), linewidth=1.1, linestyle=(0, (5, 2)), zorder=2
-        )
-        panel.annotate(
-            name,
-            (float(ends[1, 0]), float(ends[1, 1])),
-            xytext=(2, 0),
-            textcoords="offset points",
-            color=style.unit(colour),
-            va="center",
-        )
