@@ -10,7 +10,7 @@ from legbench.metrics import analysis as analysis_module
 from legbench.metrics.energy import Flows
 from legbench.metrics.rating import rate_phases
 from legbench.metrics.source import Reference
-from legbench.metrics.window import Window, spans
+from legbench.metrics.window import RowWindow, spans
 
 RUN = Analysis(Hop().recording())
 COUNT = len(RUN.time)
@@ -27,7 +27,7 @@ def test_energy_flows_do_not_show_the_windows(rows: int) -> None:
 
 def test_runs_too_short_for_an_interval_have_no_flows() -> None:
     for count in (0, 1, 2, 3):
-        flows = energy_flows(Window(RUN, 0, count))
+        flows = energy_flows(RowWindow(RUN, 0, count))
         assert len(flows.gain) == max(count - 1, 0)
 
 
@@ -57,4 +57,4 @@ def test_windows_cover_the_rows_once() -> None:
         rows = [row for first, stop in spans(count, 3) for row in range(first, stop)]
         assert rows == list(range(count))
         assert list(spans(count, 3))
-    np.testing.assert_array_equal(Window(RUN, 3, 9)["joint_pos"], RUN["joint_pos"][3:9])
+    np.testing.assert_array_equal(RowWindow(RUN, 3, 9)["joint_pos"], RUN["joint_pos"][3:9])

@@ -9,7 +9,7 @@ from legbench.metrics.built import built_of
 from legbench.metrics.changes import changes
 from legbench.metrics.rows import runs_of
 from legbench.metrics.source import Recorded
-from legbench.metrics.window import WINDOW_ROWS, Window, spans
+from legbench.metrics.window import WINDOW_ROWS, RowWindow, spans
 from legbench.signals import Bools, Floats
 
 STOP_MARGIN = 0.02
@@ -54,7 +54,7 @@ def energy_flows(recording: Recorded, rows: int = WINDOW_ROWS) -> Flows:
     for first, stop in spans(last, rows):
         # An interval's integral asks for the rows around it: one before, two after.
         low, high = max(first - 1, 0), min(stop + 2, last + 1)
-        part = _flows(Window(recording, low, high))
+        part = _flows(RowWindow(recording, low, high))
         inside = slice(first - low, first - low + stop - first)
         parts.append([getattr(part, name)[inside] for name in names])
     joined = map(np.concatenate, zip(*parts, strict=True))

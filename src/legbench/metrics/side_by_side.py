@@ -12,7 +12,7 @@ from legbench.metrics.analysis import Analysis
 from legbench.metrics.compare import differences
 from legbench.metrics.events import CommonEvent, Shifted, common_event, event_time
 from legbench.metrics.summary import Summary, summarise
-from legbench.metrics.window import Window
+from legbench.metrics.window import RowWindow
 from legbench.recording.unlike import unlike
 from legbench.signals import Floats
 from legbench.strict_json import null_for_nan
@@ -128,10 +128,10 @@ def _apart(first: Shifted, other: Shifted, event: float, span: float) -> Aligned
     )
 
 
-def _near(run: Shifted, span: float) -> Window:
+def _near(run: Shifted, span: float) -> RowWindow:
     """Rows of a run around its event."""
     first, stop = np.searchsorted(run.time, [-BEFORE, span])
-    return Window(run, int(first), int(stop))
+    return RowWindow(run, int(first), int(stop))
 
 
 def _largest(values: Floats) -> float:

@@ -16,7 +16,7 @@ than those of a short one: four minutes at 1 kHz, 2 MB a column."""
 
 
 @final
-class Window:
+class RowWindow:
     """Rows [first, stop) of a run, which is best an `Analysis`, since that keeps its signals.
 
     Attributes:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from legbench.metrics.summary import Summary, summarise
-from legbench.metrics.window import Window
+from legbench.metrics.window import RowWindow
 from legbench.recording.reader import Recording
 from legbench.viz.drafts import draft_of, require_rows
 from legbench.viz.facts import facts_of
@@ -50,7 +50,7 @@ def write_rrd(
         stream = rr.RecordingStream(APPLICATION, recording_id=facts.run.id)
         stream.save(draft)
         publisher = Publisher(stream, facts, others=others, playback=playback)
-        publisher.lay_out(Window(recording, rows.start, rows.stop))
+        publisher.lay_out(RowWindow(recording, rows.start, rows.stop))
         _push(publisher, recording, rows)
         publisher.finish()
         publisher.describe(facts, summarise(recording) if summary is None else summary)
