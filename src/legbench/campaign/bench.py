@@ -111,7 +111,7 @@ def _run_one(shard: Shard, folder: Path, stop: StopFlag, note: Note) -> str | No
     where = f"{planned.block}, cell {planned.cell}, trial {planned.trial}"
     choice = _choice(planned)
     try:
-        with open_session(load_bus(choice.bus), choice, leads=False) as session:
+        with open_session(load_bus(choice.bus_file), choice, leads=False) as session:
             troubles = drive_troubles(session)
         if troubles:
             return f"{where}: before the run {'; '.join(troubles)}; see to it and call again"
