@@ -7,6 +7,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, Final
 
+from legbench.campaign.again import CAMPAIGN, EXAMPLES, examples_of
 from legbench.campaign.data import Settings
 from legbench.campaign.locks import locked
 from legbench.campaign.plan import Plan
@@ -17,7 +18,6 @@ from legbench.errors import CampaignError
 from legbench.strict_json import null_for_nan
 from legbench.writing import reason, write_whole
 
-CAMPAIGN: Final = "campaign.json"
 SOURCE: Final = "campaign.toml"
 LOCK: Final = ".lock"
 """File whose lock is held by whoever works in the folder; the system lets go of it when a process
@@ -165,6 +165,7 @@ def description(plan: Plan) -> Mapping[str, Any]:
         ],
         "repeated": plan.repeated,
         "provenance": provenance(),
+        EXAMPLES: examples_of(plan),
     }
 
 
