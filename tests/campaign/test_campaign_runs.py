@@ -185,6 +185,7 @@ def test_recordings_are_run_folders(tmp_path: Path) -> None:
     assert found.torn is None
     for name in alone.columns.keys() - {"cycle_us", "late_us"}:
         assert found.columns[name].tobytes() == alone.columns[name].tobytes(), name
+    assert not found["cycle_us"].any()
     assert found.events == alone.events
     assert legbench.Experiment.from_run(found.path) == each.experiment
     # Recordings that are asked for later are made later.

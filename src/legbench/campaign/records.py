@@ -3,8 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final
 
+import numpy as np
+
+from legbench.recording.columns import PER_CYCLE
 from legbench.recording.reader import Recording
 from legbench.recording.saved import save_recording
 
@@ -17,6 +21,8 @@ def write_record(
 ) -> None:
     """Write the recording of an experiment under its hash, whole or not at all.
 
+    The wall times of cycles are left out, as zeros: in a batch they are those of all legs together.
+
     Args:
         recording: what the run left.
         folder: where recordings are kept.
@@ -28,4 +34,7 @@ def write_record(
         RecordingError: it cannot be written.
     """
     manifest = {**recording.manifest, "experiment": dict(tables)}
-    save_recording(replace(recording, manifest=manifest), folder / experiment)
+    timeless = {name: np.zeros(len(recording.time)) for name in PER_CYCLE}
+    columns = MappingProxyType({**recording.columns, **timeless})
+    kept = replace(recording, manifest=manifest, columns=columns)
+    save_recording(kept, folder / experiment)
