@@ -47,6 +47,7 @@ bench: $(STAMP) ## performance targets as ratios against a baseline in the same 
 	$(BIN)/python scripts/bench.py
 	$(BIN)/python scripts/bench_design.py
 	$(BIN)/python scripts/bench_modes.py
+	$(BIN)/python scripts/bench_explain.py
 	$(BIN)/python scripts/bench_drives.py
 	$(BIN)/python scripts/bench_campaign.py
 
