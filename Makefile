@@ -33,8 +33,8 @@ check: $(STAMP) typings/mujoco/__init__.pyi dist ## lint, format, types, layers,
 	$(BIN)/pyright
 	$(BIN)/lint-imports
 
-test: check ## check, then the tests
-	$(BIN)/pytest
+test: check ## check, then the tests, a file a processor at a time
+	$(BIN)/pytest --numprocesses auto --dist loadfile
 
 test-engine: $(STAMP) ## the tests against Pinocchio, which is installed for them
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[pinocchio]'

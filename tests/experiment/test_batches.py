@@ -83,16 +83,16 @@ def same(first: Recording, second: Recording) -> None:
 
 @pytest.mark.parametrize("controllers", ["mixed", "step", "swing", "hop"])
 def test_every_leg_is_as_alone(controllers: str) -> None:
-    legs = all_different(12)
+    legs = all_different(9)
     if controllers != "mixed":
         kind = ("step", "swing", "hop").index(controllers)
-        legs = [leg for place, leg in enumerate(all_different(18)) if place % 3 == kind]
+        legs = [leg for place, leg in enumerate(all_different(12)) if place % 3 == kind]
     for leg, together in zip(legs, run_batch(legs, threads=2), strict=True):
         same(record_in_memory(leg), together)
 
 
 def test_company_and_threads_change_nothing() -> None:
-    legs = all_different(16)
+    legs = all_different(12)
     whole = run_batch(legs, threads=1)
     for again in (run_batch(legs, threads=2), run_batch(legs[::-1])[::-1]):
         for first, second in zip(whole, again, strict=True):

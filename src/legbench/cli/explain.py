@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, final
 
-from legbench.cli.output import make_folder, note, print_json, progress, report_error, write_json
+from legbench.cli.output import note, print_json, progress, report_error, results_in, write_json
 from legbench.cli.parse import parse
 from legbench.design import load_design
 
@@ -74,13 +74,11 @@ def main(arguments: list[str]) -> int:
         jump=flags.jump,
         seed=flags.seed,
     )
-    if flags.out is not None:
-        make_folder(flags.out)
-    with stop_on_interrupt() as stop:
+    with results_in(flags.out), stop_on_interrupt() as stop:
         watch = StageProgress(lambda: stop.is_set).watch()
         found = explain(design, target, causes, numbers, scope, watch)
-    if flags.out is not None:
-        write_explanation(found, flags.out)
+        if flags.out is not None:
+            write_explanation(found, flags.out)
     if flags.json:
         print_json(explanation_content(found))
     else:
