@@ -1,4 +1,4 @@
-"""Whether a fit leaves noise alone: whiteness of each run and joint, and what else would explain it.
+"""Whether a fit leaves noise alone: whiteness by run and joint, and what else would explain it.
 
 Means over a few rows are small if residuals are white, and large if they hang together. What the
 counts of the encoders explain is allowed; so is what equations and simulation differ by.
@@ -63,13 +63,14 @@ class Score:
     value: float
     """Value that it would take, about, with all others as they are [unit]."""
     gain: float
-    """Fall of the sum of squares, for noise as coloured as the counts make it [-]."""
+    """Fall of the sum of squares, against what coloured noise and rounded motors make of it [-]."""
 
 
 def residuals_of(misfit: Misfit, trials: Sequence[Trial]) -> list[Residual]:
     """Residuals of a fit by run and joint."""
     found = []
-    for trial, residuals in zip(trials, misfit.residuals, strict=True):
+    runs = zip(trials, misfit.residuals, misfit.rounding, strict=True)
+    for trial, residuals, rounding in runs:
         for joint in (0, 1):
             own, sigma = residuals[:, joint], float(trial.sigma[joint])
             square, chance = _of_means(own)
@@ -80,7 +81,7 @@ def residuals_of(misfit: Misfit, trials: Sequence[Trial]) -> list[Residual]:
                     rms=sigma * float(np.sqrt(np.mean(own**2))),
                     sigma=sigma,
                     coloured=sigma * math.sqrt(max(0.0, square - chance)),
-                    allowed=_explained(trial, joint),
+                    allowed=_explained(trial, rounding, joint),
                 )
             )
     return found
@@ -93,10 +94,15 @@ def _of_means(residuals: Floats) -> tuple[float, float]:
     return float(np.mean(means**2)), (1.0 + RARE * math.sqrt(2.0 / count)) / ROWS
 
 
-def _explained(trial: Trial, joint: int) -> float:
-    """Coloured residual that the counts of link and motor encoder explain [rad]."""
-    counts = trial.links[joint].count, trial.motors[joint].count
-    return math.hypot(FLOOR, math.hypot(*counts) / math.sqrt(12.0))
+def _explained(trial: Trial, rounding: Floats, joint: int) -> float:
+    """Coloured residual that the counts of link and motor encoders explain [rad].
+
+    A motor that stands may be half a count beside what its encoder shows: sqrt(3) standard
+    deviations, and a leg that leans on its springs moves by more than they do.
+    """
+    link = trial.links[joint].count / math.sqrt(12.0)
+    motors = float(trial.sigma[joint] * np.sqrt(np.mean(np.sum(rounding[:, joint] ** 2, axis=-1))))
+    return math.hypot(FLOOR, link, math.sqrt(3.0) * motors)
 
 
 def scores_of(problem: Problem, misfit: Misfit) -> list[Score]:
@@ -107,7 +113,7 @@ def scores_of(problem: Problem, misfit: Misfit) -> list[Score]:
     own = np.concatenate([each.reshape(-1, each.shape[-1]) for each in misfit.jacobians])
     left = np.concatenate([each.ravel() for each in misfit.residuals])
     base = np.linalg.qr(own / np.linalg.norm(own, axis=0))[0]
-    excess = _excess(misfit, problem.trials)
+    excess, hidden = _excess(misfit, problem.trials), _hidden(misfit)
     found = []
     for name, slope in zip(others, slopes.T, strict=True):
         bare = slope - base @ (base.T @ slope)
@@ -116,14 +122,11 @@ def scores_of(problem: Problem, misfit: Misfit) -> list[Score]:
             continue
         score = float(bare @ left)
         value = float(misfit.guess.values[INDEX[name]])
-        step = (
-            float(np.clip(score / size, -1.0 / PARAMETERS[name].positive, 1.0))
-            if (PARAMETERS[name].positive)
-            else score / size
-        )
-        found.append(
-            Score(name=name, value=moved(name, value, step), gain=score**2 / size / excess)
-        )
+        step = score / size
+        if PARAMETERS[name].positive:
+            step = float(np.clip(step, -1.0, 1.0))
+        variance = size * excess + float(np.sum((bare @ hidden) ** 2))
+        found.append(Score(name=name, value=moved(name, value, step), gain=score**2 / variance))
     return sorted(found, key=lambda each: -each.gain)
 
 
@@ -140,15 +143,25 @@ def _other_slopes(problem: Problem, guess: Guess, names: Sequence[str]) -> Float
     )
 
 
+def _hidden(misfit: Misfit) -> Floats:
+    """Slopes of all rows by the rounding of each motor in each run (rows, 2 r) [-]."""
+    ends = np.cumsum([0, *(each.size for each in misfit.residuals)])
+    found = np.zeros((ends[-1], 2 * len(misfit.rounding)))
+    for place, each in enumerate(misfit.rounding):
+        found[ends[place] : ends[place + 1], 2 * place : 2 * place + 2] = each.reshape(-1, 2)
+    return found
+
+
 def _excess(misfit: Misfit, trials: Sequence[Trial]) -> float:
     """Factor by which coloured noise raises the variance of a score [-].
 
     It is measured from the residuals, and bounded by what the counts of the encoders can make.
     """
     most = 1.0
-    for trial, residuals in zip(trials, misfit.residuals, strict=True):
+    runs = zip(trials, misfit.residuals, misfit.rounding, strict=True)
+    for trial, residuals, rounding in runs:
         for joint in (0, 1):
             measured = ROWS * _of_means(residuals[:, joint])[0]
-            bound = 1.0 + ROWS * (_explained(trial, joint) / float(trial.sigma[joint])) ** 2
-            most = max(most, min(measured, bound))
+            share = _explained(trial, rounding, joint) / float(trial.sigma[joint])
+            most = max(most, min(measured, 1.0 + ROWS * share**2))
     return most

@@ -35,6 +35,12 @@ class Precision:
     count: float
     """Angle of one count [rad]; zero: no count can be seen."""
 
+    def counting(self, count: float) -> "Precision":
+        """Return this precision with a count [rad] that was not seen in the readings."""
+        if self.count > 0.0:
+            return self
+        return Precision(sigma=max(self.sigma, count / math.sqrt(12.0)), count=count)
+
 
 def precision_of(values: Floats, noise: float | None = None) -> Precision:
     """Measure the precision of an encoder from its readings (n,) [rad].

@@ -1,5 +1,6 @@
 """Least-squares problem of some runs: residuals in standard deviations, and their Jacobian."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import final
@@ -27,6 +28,9 @@ class Misfit:
     """Measured less predicted (n, 2) of each run [-]."""
     jacobians: tuple[Floats, ...]
     """Derivatives of the prediction by the fit's steps (n, 2, m) of each run [-]."""
+    rounding: tuple[Floats, ...]
+    """Derivatives of the prediction by what the motors' counts hide, one for each motor, in
+    standard deviations of a rounding (n, 2, 2) of each run [-]."""
     cost: float
     """Sum of squares [-]."""
 
@@ -67,14 +71,19 @@ class Problem:
     def misfit(self, guess: Guess, horizon: float | None = None) -> Misfit:
         """Compare a guess with the runs; raises PlantFault as `Predictor.predict`."""
         predicted = self._predictor.predict(guess, horizon)
-        residuals, jacobians = [], []
+        residuals, jacobians, rounding = [], [], []
         for place, (trial, each) in enumerate(zip(self.trials, predicted, strict=True)):
             rows = len(each.links)
             residuals.append((trial.joint_pos[:rows] - each.links) / trial.sigma)
             jacobians.append(self._slope(place, trial, each, guess))
+            rounding.append(_rounding(trial, each))
         cost = float(sum(np.sum(each * each) for each in residuals))
         return Misfit(
-            guess=guess, residuals=tuple(residuals), jacobians=tuple(jacobians), cost=cost
+            guess=guess,
+            residuals=tuple(residuals),
+            jacobians=tuple(jacobians),
+            rounding=tuple(rounding),
+            cost=cost,
         )
 
     def _slope(self, place: int, trial: Trial, each: Prediction, guess: Guess) -> Floats:
@@ -98,6 +107,13 @@ class Problem:
         for (run, part), amount in zip(self._starts, step[own:].tolist(), strict=True):
             starts[run, part] += amount * START_SCALE[part]
         return replace(guess, values=values, starts=starts)
+
+
+def _rounding(trial: Trial, each: Prediction) -> Floats:
+    """Derivatives of one run's prediction by the rounding of both motors (n, 2, 2) [-]."""
+    places = [INDEX["motor_zero1"], INDEX["motor_zero2"]]
+    hidden = np.array([motor.count for motor in trial.motors]) / math.sqrt(12.0)
+    return each.by_values[:, :, places] * hidden / trial.sigma[:, np.newaxis]
 
 
 def all_slopes(each: Prediction, trial: Trial, values: Floats) -> Floats:

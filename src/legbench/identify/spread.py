@@ -30,6 +30,8 @@ class Spread:
     """Standard errors that white noise of the encoders would give (m,) [-]."""
     block: Floats
     """Standard errors from the residuals in blocks (m,) [-]."""
+    rounding: Floats
+    """Standard errors from what the motors' counts hide, which stays the same in a run (m,) [-]."""
     correlation: Floats
     """Correlation of the errors (m, m) [-]."""
     quantile: float
@@ -37,8 +39,8 @@ class Spread:
 
     @property
     def errors(self) -> Floats:
-        """Larger of both standard errors (m,) [-]."""
-        return np.maximum(self.white, self.block)
+        """Larger of the first two standard errors, and the rounding of the motors (m,) [-]."""
+        return np.hypot(np.maximum(self.white, self.block), self.rounding)
 
 
 def spread_of(misfit: Misfit, trials: Sequence[Trial]) -> Spread:
@@ -59,9 +61,15 @@ def spread_of(misfit: Misfit, trials: Sequence[Trial]) -> Spread:
     middle = scores.T @ scores * (count / freedom)
     sandwich = inverse @ middle @ inverse
     white = np.sqrt(np.diag(inverse))
+    hidden = [
+        np.einsum("njm,njr->mr", slopes, rounding)
+        for slopes, rounding in zip(misfit.jacobians, misfit.rounding, strict=True)
+    ]
+    moved = inverse @ np.concatenate(hidden, axis=1)
     return Spread(
         white=white,
         block=np.sqrt(np.diag(sandwich)),
+        rounding=np.linalg.norm(moved, axis=1),
         correlation=inverse / np.outer(white, white),
         quantile=float(student.ppf(0.5 + 0.5 * LEVEL, freedom)),
     )

@@ -91,8 +91,11 @@ def trial_of(recording: Recording, *, noise: float | None = None) -> Trial:
             f"{np.ptp(joint_pos, axis=0).max():.2g} rad, less than {LEAST_MOTION:g} rad; "
             "take a step or a chirp"
         )
-    motors = tuple(precision_of(motor_pos[:, joint]) for joint in (0, 1))
     links = tuple(precision_of(joint_pos[:, joint], noise) for joint in (0, 1))
+    # Two postures of a motor do not show its count; encoders of both sides are mostly alike.
+    motors = tuple(
+        precision_of(motor_pos[:, joint]).counting(links[joint].count) for joint in (0, 1)
+    )
     return Trial(
         name=name,
         setup=run.setup.kind,
