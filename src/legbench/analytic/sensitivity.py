@@ -10,6 +10,7 @@ each instruction; stretches in which no motor moves are one call.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, Final, final
 
 import numpy as np
@@ -91,7 +92,7 @@ class SensitiveLegs:
         whole[0] = block.state
         moves = np.any(motors[1:] != motors[:-1], axis=(1, 2))
         edges = [0, *(np.flatnonzero(moves) + 1), length - 1]
-        for begin, end in zip(edges[:-1], edges[1:], strict=True):
+        for begin, end in pairwise(edges):
             block.pars[MOTOR : MOTOR + 2] = motors[begin]
             most = SPARE_STEPS + STEPS_PER_INTERVAL * (end - begin)
             if end == begin + 1:

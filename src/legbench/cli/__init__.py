@@ -19,6 +19,7 @@ COMMANDS = {
     "check": "check a leg against the conditions of modal matching",
     "modes": "linear and nonlinear modes of a leg",
     "hop": "apex return map, periodic hops and basin of a leg",
+    "identify": "parameters of a leg from recorded runs",
     "drives": "commission the servo drives, or emulate them",
 }
 """Command -> one line of help; the module is `legbench.cli.<command>` with `main(arguments)`."""

@@ -10,6 +10,7 @@ from typing import Final
 
 import numpy as np
 
+from legbench import __version__
 from legbench.analytic.terms import Bars, floating_terms
 from legbench.design import LegDesign, Segment
 from legbench.design.statics import GRAVITY
@@ -19,7 +20,6 @@ from legbench.identify.base import base_of
 from legbench.identify.outcome import Outcome
 from legbench.identify.parameters import GROUPS, INDEX, PARAMETERS
 from legbench.signals import Floats
-from legbench import __version__
 
 NAMES: Final = ("thigh", "shank", "foot")
 """Segments in their order."""
