@@ -9,12 +9,12 @@ from legbench.lazily import lazy_names
 
 if TYPE_CHECKING:
     from legbench.identify.asking import question_of, read_runs
+    from legbench.identify.back_to_design import design_text, written_back
     from legbench.identify.gate import UnidentifiableError
     from legbench.identify.outcome import Estimate, Outcome
     from legbench.identify.parameters import Freedom, parse_free
     from legbench.identify.repeated import Repeated, repeat
     from legbench.identify.staged import Question, identify
-    from legbench.identify.written_back import design_text, written_back
 
 __all__ = [
     "Estimate",
@@ -40,12 +40,12 @@ __getattr__ = lazy_names(
         "Question": "legbench.identify.staged",
         "Repeated": "legbench.identify.repeated",
         "UnidentifiableError": "legbench.identify.gate",
-        "design_text": "legbench.identify.written_back",
+        "design_text": "legbench.identify.back_to_design",
         "identify": "legbench.identify.staged",
         "parse_free": "legbench.identify.parameters",
         "question_of": "legbench.identify.asking",
         "read_runs": "legbench.identify.asking",
         "repeat": "legbench.identify.repeated",
-        "written_back": "legbench.identify.written_back",
+        "written_back": "legbench.identify.back_to_design",
     },
 )

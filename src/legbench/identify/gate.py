@@ -76,15 +76,18 @@ def check_gate(gate: Gate, setups: Collection[SetupKind]) -> None:
         UnidentifiableError: a parameter leaves no trace, or some can change together unseen; says
             which, and what to add.
     """
+    faults = []
     if gate.blind:
-        raise UnidentifiableError(
+        faults.append(
             f"{', '.join(gate.blind)} leave no trace in these runs: {_for_blind(gate.blind)}"
         )
-    if not gate.open:
-        raise UnidentifiableError(
+    if gate.condition >= SINGULAR:
+        faults.append(
             f"{in_words(gate.direction)} (condition {gate.condition:.1g}): "
             f"{_remedy(gate.direction, setups)}"
         )
+    if faults:
+        raise UnidentifiableError("; ".join(faults))
 
 
 def in_words(direction: dict[str, float]) -> str:
@@ -95,6 +98,11 @@ def in_words(direction: dict[str, float]) -> str:
     alike = max(own.values()) - min(own.values()) < PART if own else False
     if alike and set(own) == nine:
         return "all nine scale together, and nothing that is measured changes"
+    if alike and set(own) == nine - {"s1", "s2"}:
+        return (
+            "all nine scale together (those that leave a trace: "
+            f"{', '.join(own)}), and nothing that is measured changes"
+        )
     if alike and set(own) == nine | {"mass"}:
         return "all nine and the mass scale together, and nothing that is measured changes"
     if alike:
