@@ -23,6 +23,8 @@ from legbench.signals import Floats
 
 LEAST_DAMPING: Final = 1e-5
 """Damping from which a fit of its logarithm starts where the design has none [N m s/rad]."""
+MOST_RAISES, RAISE = 40, 1.2
+"""Most times that inertias are raised to those of a body, and the factor each time [-]."""
 FRICTION_WIDTH: Final = 0.02
 """Rate at which three quarters of Coulomb friction act [rad/s]: narrow against the tenths of a
 radian a second of a swinging leg, wide enough for a smooth integrator."""
@@ -120,3 +122,27 @@ def can_be(values: Floats, reach: float) -> bool:
         if not (one > 0.0 and two > 0.0 and one * two > found[COUPLING] ** 2):
             return False
     return bool(np.all(np.isfinite(values)))
+
+
+def mended(values: Floats, reach: float) -> Floats:
+    """Nearest parameters of some body: the coupling between what both setups allow, in its middle.
+
+    With the trunk held `|B| < sqrt(J1 J2)`, with the foot pinned the same of the shifted inertias;
+    where no coupling satisfies both, the inertias are too small and are raised.
+    """
+    found = values.copy()
+    for _ in range(MOST_RAISES):
+        if can_be(found, reach):
+            return found
+        hung, _ = equation_parameters(found, reach, SetupKind.HFTS)
+        stood, _ = equation_parameters(found, reach, SetupKind.FFS)
+        limit, pinned = (
+            np.sqrt(max(each[INERTIA], 0.0) * max(each[INERTIA + 1], 0.0)) for each in (hung, stood)
+        )
+        middle = found[INDEX["B"]] - stood[COUPLING]
+        low, high = max(-limit, middle - pinned), min(limit, middle + pinned)
+        found[INDEX["B"]] = 0.5 * (low + high)
+        if low >= high or found[INDEX["B"]] <= 0.0:
+            found[[INDEX["J1"], INDEX["J2"]]] *= RAISE
+            found[INDEX["B"]] = values[INDEX["B"]]
+    return found

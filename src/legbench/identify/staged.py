@@ -17,7 +17,7 @@ from legbench.design import LegDesign
 from legbench.errors import ConfigError, PlantFault
 from legbench.identify.adequacy import residuals_of, scores_of
 from legbench.identify.alternatives import explain
-from legbench.identify.base import Leg, can_be
+from legbench.identify.base import Leg, mended
 from legbench.identify.checks import Finding, check_data
 from legbench.identify.estimates import estimates_of
 from legbench.identify.fitting import Fit, fit
@@ -161,13 +161,15 @@ def _fits(question: Question, problem: Problem, guess: Guess) -> list[Fit]:
 def beside(
     guess: Guess, free: Freedom, reach: float, random: np.random.Generator, apart: float
 ) -> Guess:
-    """Guess whose free positive parameters are off by factors, as far as such a leg can be."""
+    """Guess whose free positive parameters are off by factors, mended to be a leg."""
     names = [name for name in free.names if guess.values[INDEX[name]] > 0.0]
-    factors = random.uniform(-apart, apart, len(names))
-    for share in (1.0, 0.5, 0.25):
-        found = guess
-        for name, factor in zip(names, factors.tolist(), strict=True):
-            found = found.at(name, float(guess.values[INDEX[name]]) * float(np.exp(share * factor)))
-        if can_be(found.values, reach):
-            return found
-    return guess
+    factors = np.exp(random.uniform(-apart, apart, len(names)))
+    found = guess
+    for name, factor in zip(names, factors.tolist(), strict=True):
+        found = found.at(name, float(guess.values[INDEX[name]]) * factor)
+    return replace(found, values=mended(found.values, reach)) if _shapes(free) else found
+
+
+def _shapes(free: Freedom) -> bool:
+    """Whether the coupling of the inertias may be changed."""
+    return "B" in free.names
