@@ -5,7 +5,7 @@ of the runs so far, and the inverse of the sum tells the errors that would be le
 best are then simulated, within the safety limits, before one is proposed.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -48,14 +48,19 @@ class Plan:
 
 
 def ranked(
-    question: Question, outcome: Outcome | None, *, sharpen: str | None = None
+    question: Question,
+    outcome: Outcome | None,
+    *,
+    sharpen: str | None = None,
+    among: Iterable[tuple[str, Experiment]] | None = None,
 ) -> list[Plan]:
-    """Rank all candidates, the best first.
+    """Rank candidates, the best first.
 
     Args:
         question: the runs so far, and what is free.
         outcome: what was learned from them; none: nothing, and the design is believed.
         sharpen: the parameter whose error matters; none: all that are free.
+        among: candidates with their names; none: all of `candidates`.
 
     Raises:
         ConfigError: no candidate can be predicted.
@@ -69,7 +74,7 @@ def ranked(
     )
     before = _errors(now)
     found = []
-    for name, experiment in candidates(question):
+    for name, experiment in candidates(question) if among is None else among:
         try:
             trial = trial_of_candidate(name, experiment, question)
             after = _errors(now + _information(question, trial, values))

@@ -27,7 +27,7 @@ class Guess:
     """Parameters in the order of `PARAMETERS` (p,)."""
     starts: Floats
     """Posture against the rest posture, and rates, in the first row of each run (r, 4)
-    [rad, rad/s]."""
+    [rad, rad/s]; of a run that begins in motion against what its first rows show."""
 
     def at(self, name: str, value: float) -> "Guess":
         """Return this guess with another value of one parameter."""
@@ -95,11 +95,19 @@ class _Begun:
 
 
 def _begun(trial: Trial, guess: Guess, start: Floats, reach: float, rows: int) -> _Begun:
-    """Begin at the rest posture of the first motor positions, plus what is free in it."""
+    """Begin at the rest posture of the first motor positions, plus what is free in it.
+
+    A run that begins in motion begins where its first rows show it, whatever its parameters are.
+    """
     found, slope = equation_parameters(guess.values, reach, trial.setup)
     zeros = guess.values[[INDEX["motor_zero1"], INDEX["motor_zero2"]]]
     slope[[MOTOR, MOTOR + 1], [INDEX["motor_zero1"], INDEX["motor_zero2"]]] = 1.0
     motors = trial.motor_pos[:rows] + zeros
+    by = np.zeros((STATES, len(found)))
+    if trial.moving:
+        first = trial.first_state + start
+        track = Track(times=trial.time[:rows], motors=motors[1:], start=first, parameters=found)
+        return _Begun(track=track, start_by_equations=by, equations_by_values=slope)
     stiffness, moment = found[STIFFNESS : STIFFNESS + 2], found[MOMENT : MOMENT + 2]
     rest = motors[0].copy()
     for share in SHARES:
@@ -110,7 +118,6 @@ def _begun(trial: Trial, guess: Guess, start: Floats, reach: float, rows: int) -
         hold.min() > 0.0 and np.all(np.abs(stiffness * stretch - moment * np.sin(rest)) < 1e-8)
     ):
         raise PlantFault("no rest posture", "the springs do not carry the leg at its start")
-    by = np.zeros((STATES, len(found)))
     for joint in (0, 1):
         by[joint, STIFFNESS + joint] = stretch[joint] / hold[joint]
         by[joint, MOMENT + joint] = -np.sin(rest[joint]) / hold[joint]

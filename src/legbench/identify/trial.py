@@ -20,6 +20,8 @@ FEWEST_ROWS: Final = 50
 """Fewest rows of a run from which anything can be learned [-]."""
 LEAST_MOTION: Final = 0.02
 """Smallest range of the link angles of a run that moves [rad]."""
+FIRST_ROWS: Final = 15
+"""Rows through which the first posture and rates of a moving leg are guessed [-]."""
 STILL_RATE: Final = 0.05
 """Rate up to which a leg counts as being at rest [rad/s]: one that was let go 2 mrad beside its
 rest posture is no faster."""
@@ -56,6 +58,15 @@ class Trial:
     def sigma(self) -> Floats:
         """Standard deviation of both link encoders (2,) [rad]."""
         return np.array([each.sigma for each in self.links])
+
+    @property
+    def first_state(self) -> Floats:
+        """Angles and rates in the first row (4,), by a parabola through the first rows."""
+        rows = min(FIRST_ROWS, len(self.time))
+        parabola = np.polynomial.polynomial.polyfit(
+            self.time[:rows] - self.time[0], self.joint_pos[:rows], 2
+        )
+        return np.concatenate([parabola[0], parabola[1]])
 
     def with_links(self, joint_pos: Floats) -> "Trial":
         """Return this trial with other link angles (n, 2), as if wired otherwise."""
