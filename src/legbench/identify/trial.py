@@ -183,7 +183,8 @@ def quietened(motor_pos: Floats, applied_pos: Floats, sigma: Floats) -> Floats:
                 continue
             late = measured[(begin + end) // 2 : end]
             away = np.abs(measured[begin:end] - late.mean()) > 6.0 * sigma[joint]
-            settled = begin + (int(np.flatnonzero(away)[-1]) + 1 if away.any() else 0)
+            # As long again as it took to come near, for the tail that noise hides.
+            settled = begin + (2 * (int(np.flatnonzero(away)[-1]) + 1) if away.any() else 0)
             if end - settled >= SETTLED_ROWS:
                 found[settled:end, joint] = measured[settled:end].mean()
     return found
