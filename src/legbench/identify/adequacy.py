@@ -97,12 +97,13 @@ def _of_means(residuals: Floats) -> tuple[float, float]:
 def _explained(trial: Trial, rounding: Floats, joint: int) -> float:
     """Coloured residual that the counts of link and motor encoders explain [rad].
 
-    A motor that stands may be half a count beside what its encoder shows: sqrt(3) standard
+    A motor that stands may be half a count beside what its encoder shows, sqrt(3) standard
     deviations, and a leg that leans on its springs moves by more than they do.
     """
     link = trial.links[joint].count / math.sqrt(12.0)
-    motors = float(trial.sigma[joint] * np.sqrt(np.mean(np.sum(rounding[:, joint] ** 2, axis=-1))))
-    return math.hypot(FLOOR, link, math.sqrt(3.0) * motors)
+    moved = float(trial.sigma[joint] * np.sqrt(np.mean(np.sum(rounding[:, joint] ** 2, axis=-1))))
+    motor = max(moved, trial.motors[joint].count / math.sqrt(12.0))
+    return math.hypot(FLOOR, link, math.sqrt(3.0) * motor)
 
 
 def scores_of(problem: Problem, misfit: Misfit) -> list[Score]:

@@ -25,7 +25,7 @@ MOST_STEPS: Final = 60
 SMALLEST_GAIN: Final = 1e-9
 """Share of the sum of squares below which a step has gained nothing [-]."""
 ROUGH_GAIN: Final = 1e-3
-"""The same of a horizon that is not the whole run [-]."""
+"""Such share for a horizon that is not the whole run [-]."""
 LONGEST_STEP: Final = 1.0
 """Longest step in any logarithm or scale [-]: a factor of e."""
 FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e9
@@ -34,7 +34,7 @@ FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e9
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fit:
-    """Where a fit has ended."""
+    """End of a fit."""
 
     misfit: Misfit
     evaluations: int

@@ -19,9 +19,9 @@ GAIN: Final = math.comb(2 * ORDER, ORDER)
 """Sum of the squares of that difference's coefficients [-]."""
 NORMAL: Final = 0.6744897501960817
 """Median of the size of a standard normal number [-]."""
-FLOOR: Final = 1e-5
+FLOOR: Final = 2e-5
 """Smallest standard deviation that a fit believes [rad]: equations and simulation of a leg with
-bars agree to 8e-6 rad."""
+bars agree to 8e-6 rad in a step and to 1.5e-5 rad in a chirp."""
 FINEST: Final = 1e-6
 """Finest count that is looked for [rad]: six million counts a revolution."""
 

@@ -7,6 +7,7 @@ from legbench.identify.alternatives import Alternative
 from legbench.identify.checks import Finding
 from legbench.identify.gate import Gate
 from legbench.identify.held_out import HeldOut
+from legbench.identify.problem import Misfit
 from legbench.signals import Floats
 
 
@@ -46,6 +47,8 @@ class Outcome:
     """Pairs of parameters that are hard to tell apart."""
     values: Floats | None = None
     """All parameters in the order of `PARAMETERS` (p,)."""
+    misfit: Misfit | None = None
+    """What the fit leaves, row by row."""
     residuals: tuple[Residual, ...] = ()
     scores: tuple[Score, ...] = ()
     alternatives: tuple[Alternative, ...] = ()

@@ -126,6 +126,7 @@ def _judged(question: Question, problem: Problem, misfit: Misfit, begun: Outcome
         correlation=correlation,
         alike=tuple(pairs_alike(correlation, names, ALIKE)),
         values=values,
+        misfit=misfit,
         residuals=tuple(residuals_of(misfit, trials)),
         scores=tuple(scores),
         alternatives=tuple(explain(problem, misfit, scores)),
