@@ -29,7 +29,7 @@ from legbench.identify.parameters import GROUPS, INDEX, USUAL, Freedom
 from legbench.identify.prediction import Guess, Predictor, nothing_moved
 from legbench.identify.problem import Problem
 from legbench.identify.spread import spread_of
-from legbench.identify.staged import Question
+from legbench.identify.staged import Question, fits_from
 from legbench.identify.trial import FIXED, Trial, bars_of, trial_of
 from legbench.recording.reader import Recording
 from legbench.signals import Floats
@@ -38,6 +38,8 @@ PROTOTYPE = load_design(Path(__file__).parents[1] / "models" / "prototype.toml")
 NOISE, COUNT = math.radians(0.1), 2.0 * math.pi / 16384
 PRECISION = Precision(sigma=math.hypot(NOISE, COUNT / math.sqrt(12.0)), count=COUNT)
 NINE = GROUPS["nine"]
+STARTS = 3
+"""Number of starts that `legbench identify` makes."""
 
 
 def shaken(design: LegDesign, random: np.random.Generator, share: float) -> LegDesign:
@@ -225,18 +227,21 @@ def starts(repeats: int, duration: float) -> None:
     for names in (USUAL, NINE):
         problem = Problem(trials, leg.reach, Freedom(names=names))
         truth = Guess(values=leg.values, starts=nothing_moved(trials))
-        bottom, good, evaluations = problem.misfit(truth).cost, 0, 0
+        bottom, once, good, evaluations = problem.misfit(truth).cost, 0, 0, 0
         for _ in range(repeats):
             factors = random.uniform(math.log(0.4), math.log(3.0), len(names))
             start = truth
             for name, factor in zip(names, factors.tolist(), strict=True):
                 start = start.at(name, float(leg.values[INDEX[name]]) * math.exp(factor))
             start = replace(start, values=mended(start.values, leg.reach))
-            found = fit(problem, start)
-            evaluations += found.evaluations
-            good += found.misfit.cost < bottom * 1.001
-        print(f"starts, {len(names)} free: {good} of {repeats} at the truth's misfit, "
-              f"{evaluations / repeats:.0f} evaluations each")  # fmt: skip
+            found = fits_from(problem, start, STARTS)
+            evaluations += found[0].evaluations
+            once += found[0].misfit.cost < bottom * 1.001
+            good += min(each.misfit.cost for each in found) < bottom * 1.001
+        print(
+            f"starts, {len(names)} free: {once} of {repeats} at the truth's misfit alone, {good} "
+            f"with the best of {STARTS}; {evaluations / repeats:.0f} evaluations each"
+        )
 
 
 def main() -> None:

@@ -59,7 +59,7 @@ def test_predicted_errors_are_those_of_the_fit_after_the_run(steps: tuple[Trial,
 
 def test_a_run_beyond_the_safety_limits_is_passed_over(steps: tuple[Trial, ...]) -> None:
     short = ChirpConfig(coordinate=ChirpCoordinate.Q1, sweep=0.3, delay=0.05)
-    calm = replace(short, amplitude=0.01)
+    calm = replace(short, amplitude=0.003)
     among = [("wild", candidate(short, 0.4)), ("calm", candidate(calm, 0.4))]
     plans = ranked(nine(steps), None, among=among)
     assert plans[0].name == "wild"

@@ -59,7 +59,7 @@ def test_a_twin_behind_emulated_drives_is_identified_and_its_hop_predicted(
     design = written_back(PROTOTYPE, outcome, question.bars)
     (tmp_path / "identified.toml").write_text(design_text(design, outcome))
     identified = load_design(tmp_path / "identified.toml")
-    recorded = driven(JumpConfig(), SetupKind.JUMP, 1.6)
+    recorded = driven(JumpConfig(), SetupKind.JUMP, 2.6)
     hop = repeat(recorded, identified)
     assert hop.good, hop.text
     assert not repeat(recorded, PROTOTYPE).good

@@ -95,7 +95,7 @@ def identify(question: Question, say: Say = lambda _: None) -> Outcome:
     gate = look(problem.misfit(guess), problem.names)
     check_gate(gate, {trial.setup for trial in trials})
     say("fitting")
-    fits = _fits(question, problem, guess)
+    fits = fits_from(problem, guess, question.starts, question.seed)
     best = min(fits, key=lambda each: each.misfit.cost)
     agreeing = [each for each in fits if each.misfit.cost <= best.misfit.cost * (1.0 + SAME)]
     outcome = Outcome(
@@ -147,13 +147,13 @@ def _findings(question: Question, leg: Leg) -> list[Finding]:
     return [each for each in found if each.run not in rewired or each.what != "stop"] + wrong
 
 
-def _fits(question: Question, problem: Problem, guess: Guess) -> list[Fit]:
-    """Fits from the design and from legs beside it; the first must succeed."""
+def fits_from(problem: Problem, guess: Guess, starts: int, seed: int = 0) -> list[Fit]:
+    """Fits from a guess and from legs beside it; raises PlantFault where the first cannot be."""
     found = [fit(problem, guess)]
-    random = np.random.default_rng(question.seed)
-    for _ in range(question.starts - 1):
+    random = np.random.default_rng(seed)
+    for _ in range(starts - 1):
         try:
-            found.append(fit(problem, beside(guess, question.free, problem.reach, random, APART)))
+            found.append(fit(problem, beside(guess, problem.freedom, problem.reach, random, APART)))
         except PlantFault:
             continue
     return found
