@@ -98,7 +98,7 @@ def synthetic(
     like = Trial(
         name="",
         setup=SetupKind.FFS,
-        time=np.arange(2.0),
+        time=np.array([0.0, 1.0]),
         motor_pos=np.zeros((2, 2)),
         joint_pos=np.zeros((2, 2)),
         applied_pos=np.zeros((2, 2)),

@@ -53,13 +53,13 @@ def test_its_phase_is_the_integral_of_a_frequency_that_rises_steadily(
 def test_it_moves_its_coordinate_alone(prototype: LegDesign, coordinate: ChirpCoordinate) -> None:
     config = ChirpConfig(coordinate=coordinate, f0=2.5, f1=2.5, sweep=1.0, delay=0.0)
     found = deflections(config, prototype, np.array([0.1]))[0]
-    values = dict(zip(("q1", "q2"), found, strict=True))
+    values: dict[str, float] = dict(zip(("q1", "q2"), found, strict=True))
     values |= dict(
         zip(("z1", "z2"), joint_to_modal(found, ModalConvention.ORTHONORMAL), strict=True)
     )
     assert values[coordinate] == pytest.approx(config.amplitude)
-    partner = {"q1": "q2", "q2": "q1", "z1": "z2", "z2": "z1"}[coordinate]
-    assert values[partner] == pytest.approx(0.0, abs=1e-15)
+    partners: dict[str, str] = {"q1": "q2", "q2": "q1", "z1": "z2", "z2": "z1"}
+    assert values[partners[coordinate]] == pytest.approx(0.0, abs=1e-15)
 
 
 def test_a_square_wave_steps_between_its_ends(prototype: LegDesign) -> None:

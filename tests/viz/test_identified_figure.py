@@ -26,7 +26,7 @@ def test_intervals_and_residuals_are_drawn_as_they_are(prototype: LegDesign) -> 
     trial = Trial(
         name="run",
         setup=SetupKind.HFTS,
-        time=PERIOD * np.arange(rows),
+        time=PERIOD * np.arange(rows, dtype=np.float64),
         motor_pos=motors,
         joint_pos=shown,
         applied_pos=motors,

@@ -59,7 +59,7 @@ def _nearest(design: LegDesign, target: Floats, bars: Bars | None) -> LegDesign:
 
     Each step solves `min |x| s.t. h(x_k) + A (x - x_k) = target` for the relative changes x.
     """
-    change = np.zeros(10)
+    change: Floats = np.zeros(10)
     for _ in range(STEPS):
         now = _combined(design, change, bars)
         if np.all(np.abs(now - target) <= EXACT * np.abs(target)):
@@ -75,7 +75,8 @@ def _nearest(design: LegDesign, target: Floats, bars: Bars | None) -> LegDesign:
         )
         size = np.abs(target)
         right = (target - now + slope @ change) / size
-        change = np.linalg.lstsq(slope / size[:, np.newaxis], right, rcond=None)[0]
+        found = np.linalg.lstsq(slope / size[:, np.newaxis], right, rcond=None)[0]
+        change = np.asarray(found, dtype=np.float64)
     try:
         return _changed(design, change)
     except DesignError as error:

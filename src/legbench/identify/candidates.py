@@ -81,7 +81,7 @@ def trial_of_candidate(name: str, experiment: Experiment, question: Question) ->
     return Trial(
         name=name,
         setup=experiment.setup.kind,
-        time=PERIOD * np.arange(rows),
+        time=PERIOD * np.arange(rows, dtype=np.float64),
         motor_pos=motors,
         joint_pos=np.zeros_like(motors),
         applied_pos=motors,

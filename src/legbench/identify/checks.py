@@ -7,7 +7,7 @@ import numpy as np
 
 from legbench.design.leg import Limits
 from legbench.identify.trial import Trial
-from legbench.signals import Bools, Floats
+from legbench.signals import Bools, Floats, Ints
 
 RATE_ERROR: Final = 1e-3
 """Largest share by which rows may come faster or slower than the control period [-]."""
@@ -146,7 +146,8 @@ def _frozen(
     return longest
 
 
-def stretches(flags: Bools) -> tuple[Floats, Floats]:
+def stretches(flags: Bools) -> tuple[Ints, Ints]:
     """Begin and end of each stretch of true flags (n,), as indices of the rows around them."""
     edges = np.diff(np.concatenate([[0], flags.astype(np.int8), [0]]))
-    return np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    begins, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    return begins.astype(np.int64), ends.astype(np.int64)

@@ -134,7 +134,8 @@ def _remedy(direction: dict[str, float], setups: Collection[SetupKind]) -> str:
 def pairs_alike(correlation: Floats, names: Sequence[str], limit: float) -> list[str]:
     """Pairs of parameters whose errors are correlated beyond a limit, with the correlation."""
     found = []
-    for row, column in zip(*np.triu_indices(len(names), 1), strict=True):
+    rows, columns = np.triu_indices(len(names), 1)
+    for row, column in zip(rows.tolist(), columns.tolist(), strict=True):
         value = float(correlation[row, column])
         if abs(value) >= limit:
             found.append(f"{names[row]} and {names[column]} (correlation {value:+.3f})")

@@ -57,7 +57,7 @@ PARAMETERS: Final = {each.name: each for each in (*NINE, *OTHERS)}
 """Every parameter of a leg by its name."""
 INDEX: Final = {name: place for place, name in enumerate(PARAMETERS)}
 """Place of a parameter in an array of all of them."""
-GROUPS: Final = {
+GROUPS: Final[dict[str, tuple[str, ...]]] = {
     "springs": ("k1", "k2"),
     "dampers": ("d1", "d2"),
     "inertia": ("J1", "J2", "B", "s1", "s2"),
@@ -67,9 +67,9 @@ GROUPS: Final = {
     "motor_zero": ("motor_zero1", "motor_zero2"),
 }
 """Words for several parameters."""
-USUAL: Final = ("k1", "k2", "d1", "d2")
+USUAL: Final[tuple[str, ...]] = ("k1", "k2", "d1", "d2")
 """Parameters that are free unless others are named."""
-SEGMENTS: Final = ("m1", "m2", "m3", "c1", "c2", "c3", "I1", "I2", "I3", "mt")
+SEGMENTS: Final[tuple[str, ...]] = ("m1", "m2", "m3", "c1", "c2", "c3", "I1", "I2", "I3", "mt")
 """Names of quantities of single segments, which no recording of the joints shows."""
 
 
