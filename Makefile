@@ -1,7 +1,9 @@
 .DEFAULT_GOAL := help
-.PHONY: help setup jump test test-engine test-socketcan check bench mutants models clean
+.PHONY: help setup jump dist test test-engine test-socketcan check bench mutants models clean
 
-PYTHON ?= python3.11
+# The first of these that is new enough; another one by make PYTHON=...
+PYTHON ?= $(shell for name in python3 python3.14 python3.13 python3.12 python3.11; do \
+  $$name -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$name && break; done)
 BIN := .venv/bin
 STAMP := .venv/.installed
 
@@ -9,7 +11,7 @@ help: ## show this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 
 $(STAMP): pyproject.toml constraints.txt
-	@command -v $(PYTHON) >/dev/null || { echo "needs $(PYTHON); or say make PYTHON=python3.12" >&2; exit 1; }
+	@test -n "$(PYTHON)" || { echo "needs Python 3.11 or later; or say make PYTHON=/path/to/it" >&2; exit 1; }
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[viz,render,modes,dev]'
 	@touch $@
@@ -22,7 +24,10 @@ jump: $(STAMP) ## the prototype jumps: table, recording, .rrd and phase plots in
 typings/mujoco/__init__.pyi: $(STAMP)
 	@$(BIN)/python scripts/stubs.py typings
 
-check: $(STAMP) typings/mujoco/__init__.pyi ## lint, format, types, layers
+dist: $(STAMP) ## wheel and sdist in dist/, installed and used in an empty folder
+	$(BIN)/python scripts/dist.py
+
+check: $(STAMP) typings/mujoco/__init__.pyi dist ## lint, format, types, layers, wheel
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright

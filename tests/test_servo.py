@@ -70,7 +70,7 @@ def test_a_delay_is_exact_in_cycles(commands: list[float], delay: int) -> None:
 
 
 @BY_LAW
-@given(angle=st.floats(-7.0, 7.0), counts=st.integers(1, 1 << 20))
+@given(angle=st.floats(-7.0, 7.0), counts=st.integers(64, 1 << 20))
 def test_an_encoder_is_off_by_half_a_count_at_most(angle: float, counts: int) -> None:
     count = 2.0 * np.pi / counts
     shown = servo(np.zeros(2), encoder_counts=counts).encode(np.full(2, angle))

@@ -17,8 +17,10 @@ from contextlib import contextmanager
 from types import FrameType, TracebackType
 from typing import Any, Self, final
 
-STOP_SIGNALS = (signal.SIGHUP, signal.SIGTERM, signal.SIGINT)
-"""Signals that end a run: the end of the terminal, a request to end, and ^C."""
+STOP_SIGNALS = tuple(
+    getattr(signal, name) for name in ("SIGHUP", "SIGTERM", "SIGINT") if name in vars(signal)
+)
+"""Signals that end a run: the end of the terminal, where it has a signal; a request to end; ^C."""
 INSIST = 2.0
 """A signal that comes so long after the first raises once more: the first was lost in code that
 swallows exceptions, or hangs. Every stop of drives is over by then [s]."""
@@ -153,11 +155,15 @@ def children_without_interrupts() -> Iterator[None]:
 
     A new process inherits which signals are blocked; here a ^C waits until the block has ended.
     """
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    mask = getattr(signal, "pthread_sigmask", None)
+    if mask is None:  # Windows: the processes themselves ignore ^C, an instant later
+        yield
+        return
+    before = mask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        mask(signal.SIG_SETMASK, before)
 
 
 def ignore_interrupts() -> None:

@@ -1,5 +1,6 @@
 """Files that a user hands over: read once, bounded in size and depth, whatever they are."""
 
+import codecs
 import json
 import os
 import stat
@@ -19,6 +20,19 @@ LONGEST_LINE = 8192
 """Longest line of a TOML file [bytes]: the parser's time grows with the square of a dotted key."""
 DEEPEST = 32
 """Largest number of tables or lists within each other; the shipped files have 4."""
+# Without O_NONBLOCK a FIFO that nobody writes to would never be opened; each system has some.
+_FLAGS = os.O_RDONLY
+for _name in ("O_NONBLOCK", "O_NOCTTY", "O_CLOEXEC", "O_BINARY"):
+    _FLAGS |= getattr(os, _name, 0)
+_MARKS = {
+    codecs.BOM_UTF8: "UTF-8",
+    # The marks of UTF-32 begin with those of UTF-16.
+    codecs.BOM_UTF32_LE: "UTF-32",
+    codecs.BOM_UTF32_BE: "UTF-32",
+    codecs.BOM_UTF16_LE: "UTF-16",
+    codecs.BOM_UTF16_BE: "UTF-16",
+}
+"""First bytes of texts in other encodings than plain UTF-8."""
 _KINDS = (
     (stat.S_ISDIR, "a directory"),
     (stat.S_ISFIFO, "a FIFO"),
@@ -44,8 +58,7 @@ def read_file(path: Path, largest: int) -> bytes:
         UnreadableError: it is a directory, FIFO, socket or device, too large, or unreadable.
     """
     try:
-        # Without O_NONBLOCK a FIFO that nobody writes to would never be opened.
-        fd = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
+        fd = os.open(path, _FLAGS)
     except (FileNotFoundError, NotADirectoryError):
         raise FileNotFoundError(str(path)) from None
     except (OSError, ValueError) as error:
@@ -88,6 +101,11 @@ def parse_toml(content: bytes) -> dict[str, Any]:
     Raises:
         UnreadableError: it is no UTF-8 or no TOML, too wide or too deep.
     """
+    for mark, encoding in _MARKS.items():
+        if content.startswith(mark):
+            raise UnreadableError(
+                f"begins with the byte order mark of {encoding}; save it as UTF-8 without one"
+            )
     longest = max(map(len, content.split(b"\n")))
     if longest > LONGEST_LINE:
         raise UnreadableError(

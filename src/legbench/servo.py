@@ -20,6 +20,10 @@ PERFECT: Final = Imperfections()
 """Imperfections of motors and encoders that have none."""
 
 
+MIN_COUNTS: Final = 64
+"""Smallest number of counts per revolution that an encoder may have: one count is 0.1 rad then."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServoConfig:
     """Limits of both drives; a limit that is not given does not act.
@@ -45,6 +49,12 @@ class ServoConfig:
         ):
             if value is not None and not value > 0:
                 raise ConfigError(f"servo {name} is {value:g} {unit}; it must be positive")
+        if self.encoder_counts is not None and self.encoder_counts < MIN_COUNTS:
+            raise ConfigError(
+                f"servo encoder_counts is {self.encoder_counts}: one count would be "
+                f"{2.0 * math.pi / self.encoder_counts:.2g} rad, as much as a leg's whole stroke; "
+                f"take {MIN_COUNTS} or more"
+            )
         if not 0 <= self.delay_cycles <= MAX_DELAY_CYCLES:
             raise ConfigError(
                 f"servo delay_cycles is {self.delay_cycles}; it must be 0 to {MAX_DELAY_CYCLES}"

@@ -73,7 +73,7 @@ def test_a_reader_that_has_gone(tmp_path: Path) -> None:
 
 def test_a_design_that_is_not_there(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     done = called(capfd, "run", "jump", "--design", tmp_path / "x.toml", "--out", tmp_path / "r")
-    done.refused("x.toml: no such design file", "models/optimal.toml")
+    done.refused("x.toml: no such design file", "optimal, prototype, table2")
     assert list(tmp_path.iterdir()) == []
 
 

@@ -100,7 +100,7 @@ def test_a_hop_that_is_not_stable_has_no_basin_and_the_status_says_so(
 @pytest.mark.skipif(os.name == "nt", reason="signals of a terminal")
 def test_a_map_that_is_interrupted_ends_and_keeps_its_rows(tmp_path: Path) -> None:
     rows = tmp_path / "basin.jsonl"
-    command = [sys.executable, "-m", "legbench", "hop", str(PROTOTYPE), "--basin", "300"]
+    command = [sys.executable, "-m", "legbench", "hop", str(PROTOTYPE), "--basin", "100"]
     process = subprocess.Popen(
         [*command, "--out", str(tmp_path)],
         stdout=subprocess.DEVNULL,
@@ -121,7 +121,7 @@ def test_a_map_that_is_interrupted_ends_and_keeps_its_rows(tmp_path: Path) -> No
     assert process.returncode == 130
     assert said.endswith("legbench: interrupted\n")
     lines = rows.read_text(encoding="utf-8").splitlines()
-    assert all(len(json.loads(line)["fates"]) == 300 for line in lines[1:])
+    assert all(len(json.loads(line)["fates"]) == 100 for line in lines[1:])
 
 
 @pytest.mark.parametrize(

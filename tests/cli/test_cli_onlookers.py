@@ -28,7 +28,7 @@ def ran(
     """A run in a process of its own, started by a shell with a redirection."""
     code = CALL.format(before=before)
     command = [sys.executable, "-c", code, "run", "jump", *DESIGN, "--json", *arguments]
-    command += ["--duration", "0.6", "--out", str(tmp_path / "runs")]
+    command += ["--duration", "0.25", "--out", str(tmp_path / "runs")]
     line = f"{shlex.join(command)} {redirect}"
     return subprocess.run(
         ["sh", "-c", line], capture_output=True, text=True, timeout=300, cwd=tmp_path, check=False
@@ -57,7 +57,7 @@ def test_a_stderr_that_takes_nothing_ends_no_run(
     (run,) = (tmp_path / "runs").iterdir()
     recording = load(run)
     assert recording.complete
-    assert len(recording.time) == 600
+    assert len(recording.time) == 250
 
 
 @pytest.mark.parametrize("redirect", ["2>&-", "2>/dev/full"])

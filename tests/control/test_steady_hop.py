@@ -13,7 +13,7 @@ from legbench.mjcf import Linkage, LinkageKind
 from legbench.plant.sim import SimPlant
 from legbench.servo import ServoConfig
 
-SETTLED, LATER, END = 8_000, 18_000, 20_000
+SETTLED, LATER, END = 6_500, 9_500, 10_500
 """Cycles by which the hop has grown, from which on the push is looked for, and of the end."""
 PUSH = 0.02
 """Angle by which the leg is turned about its hip, in the air [rad]."""
@@ -21,7 +21,7 @@ LIMITED = ServoConfig(slew_rate=10.0, bandwidth=30.0, delay_cycles=2, encoder_co
 
 
 def polar_rest(design: LegDesign, settings: JumpConfig, servo: ServoConfig) -> float:
-    """Largest |x1| in the last two seconds of twelve after the push [rad]."""
+    """Largest |x1| in the last of four seconds after the push [rad]."""
     chosen = Experiment(
         design=design, controller=settings, linkage=Linkage(kind=LinkageKind.REDUCED)
     )

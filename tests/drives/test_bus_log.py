@@ -17,6 +17,7 @@ from legbench.drives.master.session import Session
 from legbench.drives.setup.bus_file import load_bus
 from legbench.experiment import record
 from legbench.loop import run
+from legbench.plant.landing import End
 from legbench.plants import BUS_LOG, CanChoice
 from legbench.recording import writer as writing
 from legbench.recording.files import Appender, append_to
@@ -71,7 +72,7 @@ def test_a_disk_that_is_full_is_an_event_of_the_run(
         return Appender(os.open("/dev/full", os.O_WRONLY)) if full else append_to(path)
 
     monkeypatch.setattr(writing, "append_to", opened)
-    choice = CanChoice(bus=BUS, interface="legbench")
+    choice = CanChoice(bus=BUS, interface="legbench", end=End.STOP)
     chosen = experiment(JumpConfig(), 0.3)
     finished = record(replace(chosen, plant=choice), tmp_path)
     assert finished.outcome.status == "complete"

@@ -64,4 +64,4 @@ def test_a_part_that_dies_is_found_in_time(
 def test_a_healthy_leg_is_left_alone(
     emulation: Emulation, controller: str, servo: ServoConfig
 ) -> None:
-    assert watch_healthy(BENCH, emulation, controller, servo, 3.0) is None
+    assert watch_healthy(BENCH, emulation, controller, servo, 1.5) is None

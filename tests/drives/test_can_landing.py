@@ -6,20 +6,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from can_rig import BUS, LIMITS, Stage, experiment, stage
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from can_rig import BUS, LIMITS, Stage, experiment, stage, staged
 
 from legbench.control import BangBangConfig, JumpConfig, PositionJumpConfig
 from legbench.design.setup import Setup, SetupKind
 from legbench.drives.emulated.faults import NodeFault, NodeFaultKind
 from legbench.drives.protocol.cia402 import DriveState
 from legbench.drives.setup.bus_file import load_bus, load_limits
-from legbench.experiment import ControllerSettings, record
+from legbench.experiment import ControllerSettings, Experiment, record
 from legbench.limits.safety import SafetyLimits
 from legbench.loop import Outcome, StopFlag, run
+from legbench.mjcf import Linkage, LinkageKind
 from legbench.plant import landing
 from legbench.plant.landing import PATIENCE, STILL_RANGE, STILL_TIME, End, StillWatch, land, towards
+from legbench.plant.sim import SimPlant
 from legbench.plants import CanChoice
 from legbench.recording.reader import Recording, load
 from legbench.signals import Command, Observation
@@ -28,7 +28,17 @@ EMULATED = CanChoice(bus=BUS, interface="legbench")
 SPEED = load_bus(BUS).start_speed
 SLOW = 0.3
 """No joint of a leg at rest is faster [rad/s]: 0.01 rad at 4 Hz, and what the bars add."""
+JUMPS, HARDLY_SWINGS = 3.0, 12.0
+"""Damping of the leg that is led to rest, as a multiple of the paper's: it still leaves the ground,
+or it swings for 2 s instead of 18 s. That the paper's own leg rests in time has its own test."""
 ENABLED, OFF = DriveState.OPERATION_ENABLED, DriveState.SWITCH_ON_DISABLED
+
+
+def calm(controller: ControllerSettings, calming: float = JUMPS) -> Experiment:
+    """The optimal leg with dampers that let it rest soon."""
+    usual = experiment(controller)
+    first, second = usual.design.damping
+    return replace(usual, design=replace(usual.design, damping=(calming * first, calming * second)))
 
 
 def states(it: Stage) -> list[DriveState]:
@@ -58,16 +68,12 @@ def stands(it: Stage) -> None:
     np.testing.assert_allclose(angles, it.start.motor_pos, atol=1e-4)
 
 
-@settings(
-    max_examples=3,
-    deadline=None,
-    derandomize=True,
-    suppress_health_check=[HealthCheck.too_slow],
+@pytest.mark.parametrize(
+    ("phase", "cycles"), [("pushing", 150), ("released", 500), ("flying", 545), ("folding", 620)]
 )
-@given(cycles=st.integers(110, 700))
-def test_a_jump_ends_on_the_ground_whenever_its_time_is_over(cycles: int) -> None:
-    """Pushing, released, flying or folding: power goes when the foot stands and joints are slow."""
-    with stage(experiment(JumpConfig())) as it:
+def test_a_jump_ends_on_the_ground_whenever_its_time_is_over(phase: str, cycles: int) -> None:
+    """In each phase, power goes when the foot stands and joints are slow."""
+    with stage(calm(JumpConfig())) as it:
         outcome = run(it.plant, it.controller, cycles)
         assert (outcome.status, outcome.message, outcome.cycles) == ("complete", None, cycles)
         assert it.plant.landing is not None
@@ -90,9 +96,9 @@ def airborne(it: Stage) -> int:
 
 
 def test_in_mid_flight_the_leg_lands_first_and_slowly() -> None:
-    with stage(experiment(JumpConfig())) as it:
+    with stage(calm(JumpConfig())) as it:
         cycles = airborne(it)
-    with stage(experiment(JumpConfig())) as it:
+    with stage(calm(JumpConfig())) as it:
         marks: list[int] = []
 
         class Marking:
@@ -112,9 +118,10 @@ def test_in_mid_flight_the_leg_lands_first_and_slowly() -> None:
 
 
 def test_a_run_that_is_to_stop_stops_in_mid_flight(tmp_path: Path) -> None:
-    with stage(experiment(JumpConfig())) as it:
+    chosen = calm(JumpConfig())
+    with stage(chosen) as it:
         cycles = airborne(it)
-    chosen = experiment(JumpConfig(), (cycles + 1) * 1e-3)
+    chosen = replace(chosen, duration=(cycles + 1) * 1e-3)
     ends: dict[str, Recording] = {}
     for end in End:
         choice = replace(EMULATED, end=end)
@@ -143,25 +150,50 @@ def test_a_run_that_is_to_stop_stops_in_mid_flight(tmp_path: Path) -> None:
 def test_a_leg_that_is_held_ends_in_its_rest_posture(
     kind: SetupKind, config: ControllerSettings
 ) -> None:
-    chosen = replace(experiment(config), setup=Setup(kind=kind))
-    with stage(chosen) as it:
+    with stage(replace(calm(config, HARDLY_SWINGS), setup=Setup(kind=kind))) as it:
         outcome = run(it.plant, it.controller, 310)
         assert outcome.status == "complete"
         assert it.plant.landing is not None
         angles = [drive.axis.motion.angle for drive in it.network.drives]
         np.testing.assert_allclose(angles, it.start.motor_pos, atol=1e-4)
-        # The paper's leg swings for long where its foot is pinned: 11 to 20 s.
         assert it.plant.landing.rested
         assert it.plant.landing.swing <= STILL_RANGE
-        assert it.plant.landing.duration < 0.75 * PATIENCE
         assert np.max(np.abs(it.body._plant.data.qvel)) < SLOW
         assert outcome.message is None
+
+
+def test_the_papers_leg_rests_in_time_where_it_swings_longest() -> None:
+    """With its foot pinned, in the simulation that also moves the emulated bench."""
+    chosen = replace(experiment(PositionJumpConfig()), setup=Setup(kind=SetupKind.FFS))
+    controller, start = staged(chosen)
+    linkage = Linkage(kind=LinkageKind.REDUCED)
+    leg = SimPlant(chosen.design, replace(chosen.options, linkage=linkage), start)
+    seen = leg.reset()
+    controller.reset(seen)
+    command = controller.step(seen)
+    for _ in range(310):
+        seen = leg.step(command)
+        command = controller.step(seen)
+
+    def exchange(wanted: Sequence[float]) -> tuple[Sequence[float], Sequence[float]]:
+        return wanted, leg.step(Command.holding(np.array(wanted))).joint_pos.tolist()
+
+    done = land(
+        exchange,
+        controller.start_motor_pos.tolist(),
+        command.motor_pos.tolist(),
+        speed=SPEED,
+        period=1e-3,
+        interrupted=lambda: False,
+    )
+    assert done.rested
+    assert 10.0 < done.duration < 0.75 * PATIENCE
 
 
 def test_a_leg_that_swings_for_too_long_loses_its_power_and_it_is_told_by_how_much(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(landing, "PATIENCE", 2.0)
+    monkeypatch.setattr(landing, "PATIENCE", 1.0)
     chosen = replace(experiment(PositionJumpConfig()), setup=Setup(kind=SetupKind.FFS))
     with stage(chosen) as it:
         outcome = run(it.plant, it.controller, 310)
@@ -169,10 +201,10 @@ def test_a_leg_that_swings_for_too_long_loses_its_power_and_it_is_told_by_how_mu
         done = it.plant.landing
         assert done is not None
         assert not done.rested
-        assert done.duration >= 2.0
+        assert done.duration >= 1.0
         assert 0.03 < done.swing < 0.3
         assert outcome.message == (
-            f"the leg still swung by {done.swing:.3f} rad after 2 s in its rest posture, one at "
+            f"the leg still swung by {done.swing:.3f} rad after 1 s in its rest posture, one at "
             "rest by less than 0.01 rad; its power went then"
         )
 

@@ -14,7 +14,7 @@ from legbench.plants import EMULATED, CanChoice
 from legbench.recording.events import read_events
 from legbench.recording.manifest import read_manifest
 
-GONE_NS = 1700 * MS
+GONE_NS = 1000 * MS
 """On the bus's time, about half a second into the run."""
 
 
@@ -27,7 +27,7 @@ def silent_run(folder: Path, limits: str) -> Experiment:
     (folder / "leg.toml").write_bytes(BUS.read_bytes())
     (folder / "limits.toml").write_text(limits, encoding="utf-8")
     gone = FrameFault(kind=FrameFaultKind.DROP, cob_id=0x182, start_ns=GONE_NS)
-    chosen = experiment(JumpConfig(), duration=1.5)
+    chosen = experiment(JumpConfig(), duration=0.9)
     plant = CanChoice(bus=folder / "leg.toml", interface=EMULATED, end=End.STOP, faults=(gone,))
     return Experiment(
         design=chosen.design,

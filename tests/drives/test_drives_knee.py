@@ -47,7 +47,7 @@ def test_whatever_is_wished_the_knee_the_ranges_and_the_speed_are_kept(
 EXACT = st.tuples(st.integers(-15_000, 15_000), st.integers(-15_000, 15_000))
 
 
-@settings(derandomize=True, max_examples=1000)
+@settings(derandomize=True, max_examples=300)
 @given(last=EXACT, wish=EXACT, step=st.integers(1, 8000))
 def test_a_slewed_command_has_a_knee_between_the_last_and_the_wanted_one(
     last: tuple[int, int], wish: tuple[int, int], step: int

@@ -115,7 +115,7 @@ def test_the_jitter_of_answers_is_no_alarm(
         def look(_cycle: int) -> None:
             assert it.link.cycle.axes[1].motor_counts == now_at_sync()
 
-        sway(it, 2000, look)
+        sway(it, 700, look)
         assert (it.link.cycle.silent_total, it.link.cycle.late_frames) == (0, 0)
 
 

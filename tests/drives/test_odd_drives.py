@@ -1,4 +1,4 @@
-"""Drives that differ from the standard: each difference alone, and 200 random combinations."""
+"""Drives that differ from the standard: each difference alone, and random combinations."""
 
 import random
 from dataclasses import replace
@@ -23,7 +23,7 @@ from legbench.drives.setup.quirks import ModeShown
 from legbench.drives.setup.units import AxisUnits
 
 T = DataType
-BLOCKS, OF = 10, 20
+BLOCKS, OF = 3, 20
 
 
 def led(*drives: Drawn) -> str | None:

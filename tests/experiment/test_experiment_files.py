@@ -51,7 +51,7 @@ def test_a_file_gives_the_same_experiment_back(controller: str, plant: str, tmp_
     z2=st.floats(allow_nan=False),
     duration=st.floats(0.001, 1e300),
     slew=st.none() | POSITIVE,
-    radius=POSITIVE,
+    radius=st.floats(0.5, 1e300),
     seed=st.integers(0, (1 << 63) - 1),
     name=st.text(st.characters(exclude_categories=("Cs",))),
     torque=st.none() | st.floats(1e-300, 50.0),

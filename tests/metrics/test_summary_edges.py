@@ -11,6 +11,9 @@ from legbench.metrics.summary import summarise
 from legbench.signals import MEASURED
 
 LOSSES = ("motor_work", "damper_loss", "impact_loss", "stop_loss", "contact_loss", "other_loss")
+UNRATED = (
+    "nothing was rated: no stance or flight lies complete within the run; give it a longer duration"
+)
 
 
 def test_a_budget_is_shown_as_its_mean_over_the_limit_cycle() -> None:
@@ -79,9 +82,9 @@ def test_each_caveat_is_told_where_it_holds_and_only_there() -> None:
     assert told == "the run has no rows: there is nothing to rate"
     short = Hop(hops=0.4)
     (told,) = warnings_of(Analysis(short.recording()))
-    assert told == "nothing was rated: no stance or flight lies complete within the run"
+    assert told == UNRATED
     (told,) = warnings_of(Analysis(short.real()))
-    assert told == "nothing was rated: no stance or flight lies complete within the run"
+    assert told == UNRATED
 
 
 def test_what_an_analysis_has_read_cannot_be_changed_and_the_recording_stays_as_it_was() -> None:

@@ -34,7 +34,7 @@ def random_legs(count: int) -> list[LegDesign]:
     return found
 
 
-LEGS = random_legs(20)
+LEGS = random_legs(10)
 
 
 def departure(
@@ -62,7 +62,7 @@ def test_a_feasible_leg_keeps_its_mode(leg: LegDesign) -> None:
 
 def test_the_step_of_the_papers_legs_would_not_keep_every_mode() -> None:
     lost = [leg.name for leg in LEGS if departure(leg, "reduced", timestep=STEP) > 1e-6]
-    assert lost == ["random 1", "random 7", "random 15", "random 18"]
+    assert lost == ["random 1", "random 7"]
 
 
 @pytest.mark.parametrize("setup", ["hfts", "ffs"])

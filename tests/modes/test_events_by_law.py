@@ -55,10 +55,10 @@ def test_legs_settle_that_cross_a_level_up_and_down_in_one_step(
     assert abs(apexes[-1].height - apex) < 1e-5
 
 
-@pytest.mark.parametrize("first", range(0, 200, 40))
+@pytest.mark.parametrize("first", [0, 20, 40])
 def test_random_hops_are_told_as_dense_events_tell_them(first: int) -> None:
     errors = []
-    for seed in range(first, first + 40):
+    for seed in range(first, first + 20):
         verdict = compare(random_case(np.random.default_rng(seed)), MAP_TOLERANCE)
         assert verdict is not None
         assert verdict.same or verdict.grazes, (seed, verdict.why)
@@ -145,6 +145,6 @@ def test_every_reading_has_its_place() -> None:
 
 @pytest.mark.parametrize(("name", "seed"), [("prototype", 3), ("optimal", 4)])
 def test_cells_of_a_basin_are_those_of_brute_force(name: str, seed: int) -> None:
-    question = random_question(design_of(name), seed, 9)
+    question = random_question(design_of(name), seed, 6)
     wrong, _ = differing(question, 3, seed)
     assert wrong == []

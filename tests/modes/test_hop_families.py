@@ -19,7 +19,8 @@ from legbench.modes.drive import JumpLaw
 from legbench.modes.fixed_point import UNITS, differences
 from legbench.modes.hop import Apex, return_map, settle
 from legbench.modes.hop_family import follow_hop
-from legbench.modes.hop_setting import Setting, tools_at
+from legbench.modes.hop_setting import tools_at
+from legbench.modes.settings import Setting
 
 MODELS = Path(__file__).parents[2] / "models"
 OPTIMAL, PROTOTYPE = (load_design(MODELS / f"{name}.toml") for name in ("optimal", "prototype"))

@@ -21,11 +21,14 @@ from legbench.imperfections import Imperfections
 from legbench.kinematics import leg_points
 from legbench.metrics.energy import energy_flows, energy_residual
 from legbench.mjcf import Linkage, LinkageKind
+from legbench.plant.landing import End
 from legbench.plants import AnalyticChoice, CanChoice, PlantSettings, SimChoice
 from legbench.recording.reader import Recording
 from legbench.signals import Floats
 
 BUS = Path(__file__).parents[2] / "hardware" / "leg.toml"
+EMULATED = CanChoice(interface="legbench", bus=BUS, end=End.STOP)
+"""The emulated bench, whose power goes at the last row: a pinned leg would swing for 20 s."""
 REDUCED = Linkage(kind=LinkageKind.REDUCED)
 STEP = PositionJumpConfig(z2=0.9, dz2=0.15, delay=0.05)
 LEG = Imperfections(
@@ -269,12 +272,7 @@ def test_an_emulated_leg_has_them_too(name: str) -> None:
     step = PositionJumpConfig(z2=0.9, dz2=0.05, delay=0.05)
     bars = Linkage()
     simulated = ran(ALL[name], controller=step, linkage=bars)
-    emulated = ran(
-        ALL[name],
-        CanChoice(interface="legbench", bus=BUS),
-        controller=step,
-        linkage=bars,
-    )
+    emulated = ran(ALL[name], EMULATED, controller=step, linkage=bars)
     assert emulated.complete
     bound = 0.02 if name == "noise" else 1.5e-3
     assert np.max(np.abs(simulated["joint_pos"] - emulated["joint_pos"])) < bound
@@ -291,8 +289,7 @@ def test_emulated_motors_are_slow_and_late_each_for_itself() -> None:
     motors = Imperfections(motor_slew_rate=(20.0, 9.0), motor_delay_cycles=(3, 0))
     step = PositionJumpConfig(z2=0.9, dz2=0.05, delay=0.05)
     shown = [
-        ran(each, CanChoice(interface="legbench", bus=BUS), controller=step, duration=0.2)
-        for each in (Imperfections(), motors)
+        ran(each, EMULATED, controller=step, duration=0.2) for each in (Imperfections(), motors)
     ]
     ideal, slow = (run["motor_pos"] for run in shown)
     first = [
@@ -309,7 +306,7 @@ def test_a_motor_that_ends_at_its_range_ends_a_run_on_the_bench() -> None:
     """As on the real one: the watch over the encoders takes it for jammed."""
     stuck = Imperfections(motor_range=((-2.0, -0.37), (-2.0, 2.0)))
     step = PositionJumpConfig(z2=0.9, dz2=0.05, delay=0.05)
-    run = ran(stuck, CanChoice(interface="legbench", bus=BUS), controller=step)
+    run = ran(stuck, EMULATED, controller=step)
     assert not run.complete
 
 

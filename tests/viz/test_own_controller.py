@@ -14,7 +14,8 @@ from legbench.viz.print.figures import phase_figure
 ROOT = Path(__file__).parents[2]
 OWN = ROOT / "scripts" / "examples" / "own_controller.py"
 LEG = ("--design", str(ROOT / "models" / "prototype.toml"))
-EMULATED = ("can", "--interface", "legbench", "--bus", str(ROOT / "hardware" / "leg.toml"))
+BUS = str(ROOT / "hardware" / "leg.toml")
+EMULATED = ("can", "--interface", "legbench", "--end", "stop", "--bus", BUS)
 PLANTS = pytest.mark.parametrize("plant", [("sim",), ("analytic",), EMULATED], ids=lambda p: p[0])
 
 

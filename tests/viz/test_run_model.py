@@ -27,7 +27,7 @@ from legbench.viz.run_model import model_of
 
 MODELS = Path(__file__).parents[2] / "models"
 BAD: list[object] = [1e308, -1, "x", None, {}, 10**400]
-"""What stands in the place of each entry of a manifest, in turn."""
+"""What stands in the place of each entry of a manifest, by turns."""
 FAR_BOOM = {"kind": "ffs", "boom_radius": 5e5}
 INCLUDE = '<mujoco><include file="/etc/passwd"/></mujoco>'
 REPLICATE = (
@@ -103,12 +103,15 @@ def entries(table: Mapping[str, Any], path: tuple[Any, ...] = ()) -> Iterator[tu
 
 
 def test_every_entry_of_a_manifest_may_be_nonsense(run: Path, tmp_path: Path) -> None:
-    """Whatever an entry holds, a run is summarised and drawn, or refused by one line."""
+    """Whatever an entry holds, a run is summarised and drawn, or refused by one line.
+
+    Each entry holds two of the kinds of nonsense, and each kind is held by a third of the entries.
+    """
     folder = sent(run, tmp_path / "run")
     manifest = json.loads((folder / "run.json").read_text())
     refused: list[str] = []
-    for way in list(entries(manifest)):
-        for value in BAD:
+    for place, way in enumerate(entries(manifest)):
+        for value in (BAD[place % len(BAD)], BAD[(place + 2) % len(BAD)]):
             changed = copy.deepcopy(manifest)
             table: Any = changed
             for key in way[:-1]:
@@ -119,7 +122,7 @@ def test_every_entry_of_a_manifest_may_be_nonsense(run: Path, tmp_path: Path) ->
                 shown(folder)
             except LegbenchError as error:
                 refused.append(str(error))
-    assert len(refused) > 200
+    assert len(refused) > 70
     assert not any("\n" in line for line in refused)
 
 

@@ -1,6 +1,5 @@
 """What a user sees: the real viewer, without a window, asked whether it has anything to report."""
 
-import socket
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,16 +18,10 @@ DEADLINE = 30.0
 pytestmark = pytest.mark.skipif(not ICDS, reason="no Vulkan: install mesa-vulkan-drivers")
 
 
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind((viewer.LOOPBACK, 0))
-        return probe.getsockname()[1]
-
-
 @pytest.fixture
 def port() -> Iterator[int]:
     """Of a viewer without a window, started as the viewer for people is."""
-    number = free_port()
+    number = viewer.free_port()
     command = [*viewer.viewer_command(port=number, serve=False), "--headless"]
     process = viewer.spawn([*command, "--window-size", "1600x900"])
     try:
@@ -79,11 +72,7 @@ def test_the_viewer_has_nothing_to_complain_about(
 
 
 def test_stopping_a_served_file_ends_its_server(hop: Recording, tmp_path: Path) -> None:
-    number = free_port()
-    served = viewer.open_viewer(
-        write_rrd(hop, tmp_path / "run.rrd"), serve=True, port=number, web_port=free_port()
-    )
+    served = viewer.open_viewer(write_rrd(hop, tmp_path / "run.rrd"), serve=True)
     assert served.url is not None
-    assert str(number) in served.url
     served.stop()
     assert served.wait() != 0

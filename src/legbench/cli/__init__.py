@@ -1,5 +1,6 @@
 """The command line: wiring only. A command's module is imported when it is called."""
 
+import errno
 import os
 import select
 import sys
@@ -23,6 +24,9 @@ COMMANDS = {
     "drives": "commission the servo drives, or emulate them",
 }
 """Command -> one line of help; the module is `legbench.cli.<command>` with `main(arguments)`."""
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+"""Errors of a standard output that takes nothing more; those of files name their file."""
 
 USAGE = """usage: legbench COMMAND [options]
 
@@ -48,15 +52,20 @@ def main(arguments: list[str] | None = None) -> int:
     """
     _occupy_standard_streams()
     try:
-        try:
-            return _run(arguments)
-        finally:
-            if sys.stdout is not None:  # as under a service manager that gives none
-                sys.stdout.flush()
+        status = _run(arguments)
+        if sys.stdout is not None:  # as under a service manager that gives none
+            sys.stdout.flush()
+        return status
     except BrokenPipeError:
         if not _reader_left():
             raise
         return 141
+    except OSError as error:
+        if error.errno not in FULL or error.filename is not None:
+            raise
+        _drop_output()
+        report_error(f"the output cannot be written: {error.strerror}; make room, or send it on")
+        return 1
 
 
 def _occupy_standard_streams() -> None:
@@ -73,12 +82,18 @@ def _occupy_standard_streams() -> None:
 def _reader_left() -> bool:
     """Whether the reader of our output has gone; what is still to be flushed is dropped then."""
     output = sys.stdout.fileno()
-    watch = select.poll()
-    watch.register(output, 0)
-    if not any(happened & select.POLLERR for _, happened in watch.poll(0)):
-        return False
-    os.dup2(os.open(os.devnull, os.O_WRONLY), output)
+    if "poll" in vars(select):  # elsewhere nothing but stdout is a pipe
+        watch = select.poll()
+        watch.register(output, 0)
+        if not any(happened & select.POLLERR for _, happened in watch.poll(0)):
+            return False
+    _drop_output()
     return True
+
+
+def _drop_output() -> None:
+    """Let /dev/null take what is still to be flushed."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _run(arguments: list[str] | None) -> int:

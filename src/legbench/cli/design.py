@@ -69,6 +69,10 @@ def main(arguments: list[str]) -> int:
     from legbench.synthesis.trace import Trace
 
     chosen = parse(DesignArguments, "design", arguments)
+    if chosen.plot is not None:
+        from legbench.viz.print.save import check_suffix
+
+        check_suffix(chosen.plot)
     requirements = requirements_of(chosen)
     usual = 20_000 if chosen.tolerances is None else ROBUST_EVALUATIONS
     settings = SearchSettings(

@@ -137,7 +137,7 @@ class Jog:
         from legbench.commissioning.jog import jog
 
         design = bench.leg()
-        path = bench.limits or bench.bus.parent / LIMITS_NAME
+        path = bench.limits or bench.choice.bus_file.parent / LIMITS_NAME
         limits = limits_for(path, design)
         tell_waived(None, limits)
         with bench.session(leads=True) as session:

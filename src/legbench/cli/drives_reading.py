@@ -15,6 +15,7 @@ from legbench.drives.setup.config import BusConfig
 from legbench.errors import ConfigError
 from legbench.plant.can_choice import CanChoice
 from legbench.plant.can_open import open_session
+from legbench.shipped import locate
 
 if TYPE_CHECKING:
     from legbench.drives.setup.wire import LoadEntry
@@ -48,7 +49,7 @@ class Bench:
 
     def config(self) -> BusConfig:
         """Drives of the bus file; raises ConfigError."""
-        return load_bus(self.bus)
+        return load_bus(self.choice.bus_file)
 
     def leg(self) -> LegDesign:
         """Design of the leg; raises DesignError."""
@@ -57,7 +58,7 @@ class Bench:
     def session(self, *, leads: bool, read_only: bool = False) -> AbstractContextManager[Session]:
         """Open the bus; whoever leads drives locks its channel; raises ConfigError, BusError."""
         if leads:
-            tell_waived(self.bus, None)
+            tell_waived(self.choice.bus_file, None)
         choice = replace(self.choice, read_only=read_only)
         return open_session(self.config(), choice, leads=leads)
 
@@ -145,6 +146,7 @@ class Budget:
         from legbench.drives.setup.wire import MAX_LOAD, bus_load, schedule
         from legbench.plants import LIMITS_NAME, joint_ranges, limits_for
 
+        bench = replace(bench, bus=locate(bench.bus))
         config = bench.config().at(bench.bitrate)
         limits = limits_for(bench.limits or bench.bus.parent / LIMITS_NAME, bench.leg())
         means = known_means(config, speed=limits.command_speed)

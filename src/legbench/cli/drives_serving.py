@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Literal
 from legbench.cli.drives_reading import Bench
 from legbench.cli.output import note, print_json, report_error
 from legbench.errors import ConfigError
+from legbench.shipped import locate
 
 if TYPE_CHECKING:
     from legbench.drives.emulated.body import Body
@@ -86,6 +87,8 @@ class Emulate:
 
     def run(self, bench: Bench) -> int:
         """Serve until ^C or SIGTERM, printing every change of a drive's state."""
+        _check_time("seconds", self.seconds)
+        self._check_way(bench)
         from legbench.commissioning.emulate import Server, serve
         from legbench.drives.emulated.bus_server import BusServer
         from legbench.drives.emulated.network import Network
@@ -94,8 +97,7 @@ class Emulate:
         from legbench.interrupts import stop_on_interrupt
         from legbench.plant.can_open import open_session
 
-        _check_time("seconds", self.seconds)
-        self._check_way(bench)
+        bench = replace(bench, bus=locate(bench.bus))
         config = _wearing(_at_bitrate(bench.config(), bench.bitrate), self.eds)
         start_pos, body = self._leg(bench)
         if self.only is not None:
@@ -146,6 +148,9 @@ class Emulate:
         return tuple(start.motor_pos.tolist()), body
 
     def _check_way(self, bench: Bench) -> None:
+        from legbench.drives.transport.system import require_linux
+
+        require_linux("serving an emulated leg to other processes")
         if self.serve == SLCAN and bench.interface is not None:
             raise ConfigError(
                 f"--serve slcan makes a terminal of its own, --interface {bench.interface} is "

@@ -10,6 +10,7 @@ from tyro.conf import Positional, UseAppendAction
 from legbench.cli.drives_reading import Bench
 from legbench.cli.output import note, print_json, report_error
 from legbench.plant.can_choice import LIMITS_NAME
+from legbench.shipped import locate
 
 if TYPE_CHECKING:
     from legbench.commissioning.learn import Learned
@@ -56,7 +57,7 @@ class Check:
         from legbench.commissioning.learn import check
         from legbench.drives.setup.exchange import check_budget
 
-        learned = check(bench.bus, self.eds)
+        learned = check(locate(bench.bus), self.eds)
         _print(learned, as_json=bench.json, out=None)
         check_budget(bench.config().at(bench.bitrate))
         return _ended(learned)

@@ -10,7 +10,7 @@ from legbench.modes.cycles import Cycle
 from legbench.modes.fixed_point import UNITS, FixedPoint
 from legbench.modes.hop import NAMES, Apex
 from legbench.modes.hop_family import HopFamily
-from legbench.modes.hop_setting import SPANS
+from legbench.modes.settings import SPANS
 
 LINES = 12
 """Rows of a table, about [-]."""

@@ -9,6 +9,7 @@ from legbench.design import load_design
 from legbench.design.setup import Setup, SetupKind
 from legbench.errors import RecordingError
 from legbench.mjcf import BuildOptions, Linkage, LinkageKind, build_spec, to_xml, xml_hash
+from legbench.mjcf.plain import plain_xml
 from legbench.writing import reason, write_whole
 
 
@@ -24,6 +25,9 @@ class ModelArguments:
     """Length of the boom that guides the trunk in ffs [m]; by default a plane."""
     linkage: LinkageKind = LinkageKind.BARS
     """Linkage of the segments: physical parallel bars, or the constraint that they make."""
+    plain: bool = False
+    """Whether to leave out what MJX and MuJoCo Warp refuse: the contact sensor, the energy flag and
+    autoreset, none of which changes the motion."""
     out: Path | None = None
     """MJCF file to write; by default it goes to stdout."""
     view: bool = False
@@ -39,7 +43,8 @@ def main(arguments: list[str]) -> int:
         setup=Setup(kind=chosen.setup, boom_radius=chosen.boom_radius),
         linkage=Linkage(kind=chosen.linkage),
     )
-    xml = to_xml(build_spec(load_design(chosen.design), options))
+    spec = build_spec(load_design(chosen.design), options)
+    xml = plain_xml(spec) if chosen.plain else to_xml(spec)
     if chosen.out is not None:
         _write(chosen.out, xml)
         note(f"wrote {chosen.out}")

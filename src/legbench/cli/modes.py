@@ -14,7 +14,6 @@ from legbench.design import load_design
 from legbench.errors import ConfigError
 from legbench.modes.linear import linear_modes
 from legbench.modes.scene import Holding, Scene, make_scene
-from legbench.modes.strict import check, radial_line, radial_reach
 
 if TYPE_CHECKING:
     from legbench.cli.modes_found import ModesFound
@@ -104,6 +103,7 @@ def _check(flags: ModesArguments) -> None:
 def _found(flags: ModesArguments, scene: Scene) -> "ModesFound":
     """Everything that was asked for, in the order in which it is cheap to fail."""
     from legbench.cli.modes_found import ModesFound, damped_of, families_of, responses_of
+    from legbench.modes.strict import check, radial_line, radial_reach
 
     linear = linear_modes(scene)
     reach = min(flags.reach, radial_reach(scene))

@@ -1,10 +1,20 @@
 """Flags made from dataclasses, one way for every command."""
 
-from typing import TypeVar
+import io
+import os
+from contextlib import redirect_stderr
+from typing import Final, TypeVar
 
 import tyro
 
+from legbench.cli.output import report_error
+from legbench.errors import ConfigError
+
 Arguments = TypeVar("Arguments")
+WRONG_USAGE: Final = 2
+"""Exit status of a command line that means nothing."""
+FRAME, RULE = " \u2502\u256d\u256e\u2570\u256f|+", "\u2500-"
+"""Characters of the boxes in which tyro puts its errors, and of the rules within them."""
 STYLE = (
     tyro.conf.OmitArgPrefixes,
     tyro.conf.OmitSubcommandPrefixes,
@@ -20,8 +30,45 @@ def parse(
     """Read a command's flags into its dataclass; `--help` comes from the docstrings.
 
     Raises:
+        ConfigError: a word is empty, or no text.
         SystemExit: help was asked for (0), or the flags make no sense (2).
     """
-    return tyro.cli(
-        kind, prog=f"legbench {command}", description=description, args=arguments, config=STYLE
-    )
+    for before, word in zip(["", *arguments], arguments, strict=False):
+        if not word or word.endswith("="):
+            name = word.removesuffix("=") or before or "a word of the command line"
+            raise ConfigError(f"{name} is empty; give it a value, or leave it out")
+        if not word.isprintable() and any(0xDC80 <= ord(letter) <= 0xDCFF for letter in word):
+            raise ConfigError(
+                f"{os.fsencode(word)!r} is no UTF-8 text; rename the file or folder, since run "
+                "folders and their descriptions are in UTF-8"
+            )
+    told = io.StringIO()
+    try:
+        with redirect_stderr(told):
+            return tyro.cli(
+                kind,
+                prog=f"legbench {command}",
+                description=description,
+                args=arguments,
+                config=STYLE,
+            )
+    except SystemExit as end:
+        if end.code == WRONG_USAGE:
+            report_error(f"{_in_a_line(told.getvalue())}; see legbench {command} --help")
+        raise
+
+
+def _in_a_line(box: str) -> str:
+    """What a box of words says before its first rule, in one line.
+
+    The box is drawn by lines, by plain ASCII, or by rules alone.
+    """
+    said: list[str] = []
+    for framed in box.splitlines()[1:]:  # the first line is the title
+        line = framed.strip(FRAME)
+        if not line.strip(RULE) or line.startswith("Got errors"):
+            if said:
+                break
+            continue
+        said.append(line)
+    return " ".join(" ".join(said).split()).rstrip(".:")

@@ -1,5 +1,7 @@
 """`legbench run`: a controller drives a leg, the run is recorded and rated."""
 
+import threading
+import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,6 +14,10 @@ from legbench.experiment.data import Experiment
 if TYPE_CHECKING:
     from legbench.experiment.running import Finished
     from legbench.viz.live.launch import LiveView
+
+
+LOOK_PERIOD = 0.2
+"""Period of the looks whether a page is served [s]."""
 
 
 def plays_alone(experiment: Experiment) -> bool:
@@ -34,7 +40,7 @@ def period_of(experiment: Experiment) -> float:
     from legbench.plants import CanChoice
 
     plant = experiment.plant
-    return load_bus(plant.bus).period if isinstance(plant, CanChoice) else PERIOD
+    return load_bus(plant.bus_file).period if isinstance(plant, CanChoice) else PERIOD
 
 
 @dataclass(slots=True)
@@ -53,8 +59,19 @@ class Watching:
         except MissingExtraError as error:
             note(f"legbench: {error}")
             return
-        if self.view.url is not None:
-            note(f"watch at {self.view.url}; `legbench replay {run} --serve` shows it again")
+        if self.serve:
+            # The run does not wait for the page, which takes a second to be there.
+            threading.Thread(target=self._tell, args=(self.view, run), daemon=True).start()
+
+    @staticmethod
+    def _tell(view: "LiveView", run: Path) -> None:
+        """Say where the page is, as soon as it is there."""
+        while view.alive:
+            if view.served:
+                note(f"watch at {view.url}; `legbench replay {run} --serve` shows it again")
+                return
+            time.sleep(LOOK_PERIOD)
+        note(f"legbench: the page is not served; {run}/live.log says why, the run goes on unseen")
 
     def stop(self) -> None:
         """Let the view show the last rows, and end."""
@@ -117,7 +134,8 @@ def _report(finished: "Finished", *, as_json: bool) -> int:
     if summary.limited_cycles:
         note(
             f"legbench: the limits changed the command in {limited(summary)}: the leg ran "
-            "something else than it was asked to; the event 'limited' in events.jsonl says more"
+            "something else than it was asked to, by command_speed or motor_range of the limits; "
+            "the event 'limited' in events.jsonl tells which"
         )
     if summary.numerics == Soundness.UNSOUND:
         note(

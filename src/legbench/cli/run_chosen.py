@@ -125,10 +125,19 @@ def first_tables(words: Scan) -> Tables:
         tables.put("design", tables.here(Path(design)))
     for text in words.settings:
         tables.put(*parse_setting(text))
+    if _edits_design(words.settings):
+        # Another leg is not to be taken for the one of that name.
+        tables.put("design.name", f"{tables.at('design.name')}-edited")
     for flag, key in SCANNED.items():
         if flag in words.values:
             tables.put(key, tables.here_guest(words.values[flag]))
     return tables
+
+
+def _edits_design(settings: Sequence[str]) -> bool:
+    """Whether entries of the design are replaced, and not its name."""
+    keys = [setting.partition("=")[0].strip() for setting in settings]
+    return any(key.startswith("design.") for key in keys) and "design.name" not in keys
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

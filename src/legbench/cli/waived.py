@@ -19,8 +19,8 @@ def tell_waived_of(choice: PlantSettings) -> None:
     """Print a line for each protection that the files of a plant waive; raises ConfigError."""
     if isinstance(choice, CanChoice):
         # The bus file was named, the limits beside it are only guessed: it is missed first.
-        config = load_bus(choice.bus)
-        _tell(config, choice.limits or load_limits(choice.bus.parent / LIMITS_NAME))
+        config = load_bus(choice.bus_file)
+        _tell(config, choice.limits or load_limits(choice.bus_file.parent / LIMITS_NAME))
         return
     limits = getattr(choice, "limits", None)
     _tell(None, limits if isinstance(limits, SafetyLimits) else None)

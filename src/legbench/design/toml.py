@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 from legbench.design.leg import LegDesign, Limits, Segment
 from legbench.errors import DesignError
 from legbench.reading import UnreadableError, read_toml
+from legbench.shipped import locate, shipped_designs
 from legbench.writing import save_whole
 
 Built = TypeVar("Built")
@@ -152,17 +153,15 @@ def design_from_mapping(content: Mapping[str, Any]) -> LegDesign:
 
 
 def load_design(path: Path | str) -> LegDesign:
-    """Read a design file.
+    """Read a design file, or one that comes with the package, such as `prototype`.
 
     Raises:
         DesignError: the file is missing, is not TOML, or describes no leg; the message starts
             with the path.
     """
-    hint = (
-        "no such design file; the paper's are models/optimal.toml, models/table2.toml and "
-        "models/prototype.toml"
-    )
-    return load_tables(Path(path), design_from_mapping, hint)
+    names = ", ".join(shipped_designs())
+    hint = f"no such design file; give its path, or the name of one that is here: {names}"
+    return load_tables(locate(Path(path)), design_from_mapping, hint)
 
 
 def load_tables(path: Path, build: Callable[[Mapping[str, Any]], Built], hint: str) -> Built:

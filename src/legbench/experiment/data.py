@@ -80,7 +80,13 @@ class Experiment:
             )
         if not 0 <= self.seed <= LARGEST_SEED:
             raise ConfigError(f"seed is {self.seed}; it must be 0 to {LARGEST_SEED}")
-        self.imperfections.leg_of(self.design)
+        built = self.imperfections.leg_of(self.design)
+        boom, reach = self.setup.boom_radius, sum(built.lengths)
+        if boom is not None and boom < reach:
+            raise ConfigError(
+                f"setup.boom_radius is {boom:g} m; a boom that is shorter than the stretched leg, "
+                f"{reach:.3g} m, cannot carry its trunk; take a longer one, or none for a plane"
+            )
         self.options.built(self.imperfections)
         CONTROLLERS.check(type(self.controller))
         PLANTS.check(type(self.plant))

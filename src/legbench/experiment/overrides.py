@@ -8,6 +8,7 @@ from typing import Any
 
 from legbench.errors import ConfigError
 from legbench.experiment.tables import read_toml
+from legbench.shipped import locate
 
 _WORD = re.compile(r"[A-Za-z_][\w./:+-]*")
 
@@ -50,7 +51,7 @@ def overlaid(tables: Mapping[str, Any], key: str, value: Any, folder: Path) -> d
         return {key: entry for key, entry in found.items() if entry is not None}
     below = found.get(name, {})
     if isinstance(below, str):
-        below = read_toml(folder / below)
+        below = read_toml(locate(Path(below), folder))
     if not isinstance(below, Mapping):
         raise ConfigError(f"--set: '{name}' is {below!r}, no table; '{key}' leads nowhere")
     return found | {name: overlaid(below, rest, value, folder)}

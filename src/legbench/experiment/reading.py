@@ -10,6 +10,7 @@ from typing import Any, Final, Literal, Union, get_args, get_origin, get_type_hi
 
 from legbench.errors import ConfigError, LegbenchError
 from legbench.guests import Registry
+from legbench.shipped import locate
 
 REGISTRY: Final = "registry"
 """Metadata of a field that holds the settings of a guest: the `Registry` that finds its class."""
@@ -190,7 +191,7 @@ class Reader:
     def _special(self, hint: type, special: Special, raw: object, at: str) -> Any:
         try:
             if isinstance(raw, str):
-                return special.load(self.folder / raw)
+                return special.load(locate(Path(raw), self.folder))
             if special.decode is None:
                 return self.table(hint, raw, at)
             if not isinstance(raw, Mapping):

@@ -1,6 +1,5 @@
 """Tables of an experiment, from a file, a run or flags."""
 
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final, TypeVar
@@ -14,6 +13,8 @@ from legbench.experiment.reading import Reader, Special, placed
 from legbench.experiment.writing import Writer
 from legbench.guests import load_text
 from legbench.limits.safety import SafetyLimits
+from legbench.reading import UnreadableError
+from legbench.reading import read_toml as read_any_toml
 
 Read = TypeVar("Read")
 FORMAT: Final = 2
@@ -118,11 +119,8 @@ def write_tables(experiment: Any, folder: Path | None = None, *, where: bool = T
 def read_toml(path: Path) -> dict[str, Any]:
     """The tables of a TOML file; raises ConfigError."""
     try:
-        with path.open("rb") as file:
-            return tomllib.load(file)
+        return read_any_toml(path)
     except FileNotFoundError:
         raise ConfigError(f"{path}: no such experiment file") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: cannot be read: {error}") from None
-    except ValueError as error:  # TOMLDecodeError, or a whole number of thousands of digits
-        raise ConfigError(f"{path}: not valid TOML: {error}") from None
+    except UnreadableError as error:
+        raise ConfigError(f"{path}: {error}") from None

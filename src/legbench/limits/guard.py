@@ -129,7 +129,7 @@ class Guard:
                 raise PlantFault(
                     "command step",
                     f"the command of motor {motor} jumps by {abs(value - wished):.3f} rad in one "
-                    f"cycle, the limit is {limit:g} rad; smooth it",
+                    f"cycle, the limit is {limit:g} rad; smooth it, or raise command_step",
                 )
 
     def reachable(self, wish: Sequence[float]) -> tuple[float, ...]:
@@ -202,14 +202,14 @@ class Guard:
                 raise PlantFault(
                     "spring torque",
                     f"spring {axis} carries {value:.3f} N m, the limit is "
-                    f"{limits.spring_torque:g} N m",
+                    f"{limits.spring_torque:g} N m; push less, or raise spring_torque",
                 )
         for axis, value in enumerate(temperature, start=1):
             if value is not None and value > limits.temperature:
                 raise PlantFault(
                     "temperature",
                     f"drive {axis} is at {value:.1f} deg C, the limit is "
-                    f"{limits.temperature:g} deg C; let it cool down",
+                    f"{limits.temperature:g} deg C, temperature of the limits; let it cool down",
                 )
         if expected_pos is not None:
             led = motor_pos if led_pos is None else led_pos
@@ -222,14 +222,15 @@ class Guard:
             if not low <= value <= high and self._shown[axis - 1]:
                 raise PlantFault(
                     "joint range",
-                    f"joint {axis} is at {value:.3f} rad, the limits are [{low:g}, {high:g}] rad",
+                    f"joint {axis} is at {value:.3f} rad, the limits are [{low:g}, {high:g}] rad, "
+                    f"joint_range of axis {axis}",
                 )
         low, high = self._limits.joint_knee_range
         if (low, high) != UNLIMITED and all(self._shown) and not low <= knee_of(joint_pos) <= high:
             raise PlantFault(
                 "joint range",
                 f"q2 - q1 is at {knee_of(joint_pos):.3f} rad, the limits are [{low:g}, {high:g}] "
-                "rad: the knee has gone through its stop",
+                "rad, joint_knee_range: the knee has gone through its stop",
             )
 
     def _check_encoders(

@@ -3,7 +3,7 @@
 import numpy as np
 
 from legbench.metrics.analysis import Analysis
-from legbench.metrics.roles import STATES, resting
+from legbench.metrics.roles import FLIGHT, STATES, resting
 from legbench.signals import MEASURED
 
 
@@ -40,13 +40,20 @@ def warnings_of(run: Analysis) -> list[str]:
         )
     elif not (rated.stance or rated.flight or rated.periods):
         what = (
-            "no stance or flight lies complete within the run"
+            _why_no_hop(run)
             if described.jumps
             else "z2 did not turn back and forth once after the first control action, or by less"
             f" than the {described.counting.smallest:.3g} rad that count"
         )
         found.append(f"nothing was rated: {what}")
     return found
+
+
+def _why_no_hop(run: Analysis) -> str:
+    """Say why a jumping leg has neither a complete stance nor a complete flight."""
+    if np.any(run.states[run.first_action :] == FLIGHT):
+        return "no stance or flight lies complete within the run; give it a longer duration"
+    return "the leg never leaves the ground; push harder (a larger dz2)"
 
 
 def _tells_stance(run: Analysis) -> bool:

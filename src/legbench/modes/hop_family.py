@@ -23,7 +23,8 @@ from legbench.modes.cycles import Cycle, described, stacked
 from legbench.modes.drive import JumpLaw
 from legbench.modes.fixed_point import UNITS
 from legbench.modes.hop import Apex, return_map
-from legbench.modes.hop_setting import SPANS, Setting, tools_at, value_of
+from legbench.modes.hop_setting import tools_at, value_of
+from legbench.modes.settings import SPANS, Setting
 from legbench.signals import Floats
 
 CLOSED = 1e-8

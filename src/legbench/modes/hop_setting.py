@@ -1,7 +1,6 @@
-"""Settings of controller and leg over which a periodic hop is followed."""
+"""Compiled leg and control law at one value of a setting."""
 
 from dataclasses import replace
-from enum import StrEnum
 
 from legbench.analytic import LegModel
 from legbench.analytic.taylor import TaylorLeg
@@ -9,23 +8,7 @@ from legbench.control import JumpConfig
 from legbench.design import LegDesign
 from legbench.errors import ConfigError
 from legbench.modes.drive import JumpLaw
-
-
-class Setting(StrEnum):
-    """Setting over which a hop is followed."""
-
-    Z2 = "z2"
-    """Middle of the set points [rad]."""
-    DZ2 = "dz2"
-    """Amplitude of the push [rad]."""
-    DAMPING = "damping"
-    """Factor on both dampers [-]; 1 is the design."""
-    MISMATCH = "mismatch"
-    """Difference of the springs over their mean, `(k1 - k2) / k` [-]."""
-
-
-SPANS = {Setting.Z2: 0.1, Setting.DZ2: 0.1, Setting.DAMPING: 1.0, Setting.MISMATCH: 0.1}
-"""Units by which changes of each setting are scaled, in the unit of the setting."""
+from legbench.modes.settings import Setting
 
 
 def tools_at(

@@ -14,6 +14,7 @@ from legbench.encoders import EncoderErrors
 from legbench.errors import ConfigError
 from legbench.imperfections import Imperfections
 from legbench.mjcf import BuildOptions, bare_model, rest_qpos
+from legbench.mjcf.messages import silence
 from legbench.plant.abstract import AbstractPlant
 from legbench.plant.backlash import Backlash
 from legbench.plant.observe import (
@@ -65,6 +66,7 @@ class BatchPlant(AbstractPlant):
         imperfections: Sequence[Imperfections] | None = None,
         seeds: Sequence[int] | None = None,
     ) -> None:
+        silence()
         count = len(designs)
         flaws = [PERFECT] * count if imperfections is None else list(imperfections)
         chosen = [0] * count if seeds is None else list(seeds)

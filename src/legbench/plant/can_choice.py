@@ -10,6 +10,7 @@ from legbench.guests import WHERE, load_text
 from legbench.limits.safety import SafetyLimits
 from legbench.plant.landing import End
 from legbench.plant.opening import Leg, OpenPlant
+from legbench.shipped import locate
 
 if TYPE_CHECKING:
     from legbench.drives.setup.config import BusConfig
@@ -46,6 +47,15 @@ class CanChoice:
     is still, for 30 s at most; stop is a quick stop at the last row, in mid-flight, too."""
     faults: tuple[Fault, ...] = ()
     """Faults to inject into the emulated leg in this process, on its virtual time."""
+
+    @property
+    def bus_file(self) -> Path:
+        """Bus file that is read.
+
+        Where the one that is named is not there, emulated drives take the package's own; real ones
+        are never driven by a file that their laboratory has not written.
+        """
+        return locate(self.bus) if self.interface == EMULATED else self.bus
 
     def is_virtual(self, config: "BusConfig") -> bool:
         """Whether it is the emulated leg in this process, in virtual time."""

@@ -100,7 +100,7 @@ def _checked(choice: CanChoice, leg: Leg) -> tuple[BusConfig, SafetyLimits]:
             "servo settings describe a simulated servo; on the can plant the drives decide: leave "
             "slew_rate, bandwidth, delay_cycles and encoder_counts out"
         )
-    config = load_bus(choice.bus)
+    config = load_bus(choice.bus_file)
     if not (leg.imperfections.perfect or choice.is_virtual(config)):
         raise ConfigError(
             "imperfections describe an emulated leg; the leg on the bench has its own: leave them "
@@ -117,7 +117,7 @@ def _checked(choice: CanChoice, leg: Leg) -> tuple[BusConfig, SafetyLimits]:
         check_needs(config, leg.needs)
     check_budget(config.at(choice.bitrate))
     if choice.limits is None:
-        limits = limits_for(choice.bus.parent / LIMITS_NAME, leg.design)
+        limits = limits_for(choice.bus_file.parent / LIMITS_NAME, leg.design)
     else:
         limits = limits_within(choice.limits, leg.design)
     check_together(config, limits, stops=joint_ranges(leg.design), leads=not choice.read_only)

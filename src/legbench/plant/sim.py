@@ -12,6 +12,7 @@ from legbench.encoders import EncoderErrors
 from legbench.errors import PlantFault
 from legbench.imperfections import Imperfections
 from legbench.mjcf import BuildOptions, model_text, rest_qpos
+from legbench.mjcf.messages import silence
 from legbench.plant.abstract import AbstractPlant
 from legbench.plant.backlash import Backlash
 from legbench.plant.observe import LiveArrays, Observer, branch_fault, branch_message
@@ -43,6 +44,7 @@ class SimPlant(AbstractPlant):
         imperfections: Imperfections = PERFECT,
         seed: int = 0,
     ) -> None:
+        silence()
         self.period = PERIOD
         built = imperfections.leg_of(design)
         self.xml = model_text(built, options.built(imperfections))

@@ -1,7 +1,6 @@
 """Files of a run: appending whole records, locking."""
 
 import errno
-import fcntl
 import os
 import time
 from contextlib import suppress
@@ -9,6 +8,11 @@ from pathlib import Path
 from typing import final
 
 from legbench.errors import RecordingError
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None
 
 
 @final
@@ -51,14 +55,14 @@ class Appender:
 
 def append_to(path: Path) -> Appender:
     """Create `path`, which must not exist, for appending; raises OSError."""
-    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND | getattr(os, "O_BINARY", 0)
     return Appender(os.open(path, flags, 0o644))
 
 
 def lock(fd: int, run: Path, *, patience: float = 0.0) -> None:
     """Hold an advisory lock on `fd` until it is closed, by whatever end of the process.
 
-    A file system without locks is taken as it is.
+    A system or a file system without locks is taken as it is.
 
     Args:
         fd: of a file of the run.
@@ -84,6 +88,8 @@ def lock(fd: int, run: Path, *, patience: float = 0.0) -> None:
 
 def _locked(fd: int) -> bool:
     """Take the lock if nobody holds it; raises OSError where there are no locks."""
+    if fcntl is None:
+        return True
     try:
         fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:

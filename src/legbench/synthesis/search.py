@@ -1,16 +1,16 @@
-"""Search by CMA-ES over the seven ratios (section IV); the only module that imports pycma."""
+"""Search by CMA-ES over the seven ratios (section IV)."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Protocol
 
-import cma
 import numpy as np
 
 from legbench.design.dependent import INFEASIBLE
 from legbench.design.requirements import Bounds
 from legbench.errors import ConfigError
 from legbench.signals import Floats
+from legbench.synthesis._cma import cma
 from legbench.synthesis.trace import Trace
 
 SPREAD = 0.3

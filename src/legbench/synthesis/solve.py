@@ -130,6 +130,12 @@ def solve(
     finally:
         trace.close()
     if not found.feasible:
+        if not found.complete:
+            raise DesignError(
+                f"none of the {len(trace)} legs that were tried meets requirements "
+                f"'{requirements.name}', and the search was not over: give it more --evaluations, "
+                "some 20000"
+            )
         raise DesignError(explain(requirements, found.free))
     settled = plain and found.complete
     check = evolve(requirements.bounds, total, settings.seed) if settled and cross_check else None

@@ -23,6 +23,7 @@ from legbench.drives.setup.bus_file import load_bus
 from legbench.drives.transport.messages import frame_of, message_of, refuse_fd
 from legbench.drives.transport.virtual_bus import VirtualBus
 from legbench.errors import ConfigError
+from legbench.shipped import locate
 
 IDLE_NS = 1_000_000_000
 """Time that passes at once while `recv` waits without a time-out [ns]."""
@@ -72,7 +73,7 @@ class LockstepBus(VirtualBus):
         refuse_fd(fd)
         if network is None:
             try:
-                network = emulate(load_bus(Path(channel)))
+                network = emulate(load_bus(locate(Path(channel))))
             except ConfigError as error:
                 raise can.CanInitializationError(str(error)) from error
         self.network = network

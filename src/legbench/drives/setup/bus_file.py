@@ -30,6 +30,7 @@ from legbench.drives.setup.units import AxisUnits
 from legbench.errors import ConfigError
 from legbench.limits.safety import SafetyLimits
 from legbench.reading import UnreadableError, read_toml
+from legbench.shipped import shipped_root
 
 _OBJECT = re.compile(r"([0-9A-Fa-f]{4}):([0-9A-Fa-f]{2}) ([a-z]+[0-9]*)")
 _IDENTITY = tuple(field.name for field in fields(Identity))
@@ -67,7 +68,10 @@ def _load(path: Path, make: Callable[[Mapping[str, Any]], Built]) -> Built:
     try:
         return make(read_toml(path))
     except FileNotFoundError:
-        raise ConfigError(f"{path}: no such file; hardware/ holds the bench's") from None
+        raise ConfigError(
+            f"{path}: no such file; files to begin with are in {shipped_root() / 'hardware'}: copy "
+            "them and put in what your leg has"
+        ) from None
     except (ConfigError, UnreadableError) as error:
         raise ConfigError(f"{path}: {error}") from None
 

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import final
 
 from legbench.drives.errors import BusError
+from legbench.drives.transport.system import require_linux
 
 BY_FILE = ("legbench_unix", "serial", "slcan")
 """Interfaces whose channels are files, also where a name has no slash in it."""
@@ -96,11 +97,13 @@ class ChannelLock:
                 raise
 
     def _take(self) -> int:
+        if self._private:
+            return os.open(os.devnull, os.O_RDONLY)
+        require_linux("locking a channel against a second master")
         taken = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
-            if not self._private:
-                taken.bind(self.address)
-                taken.listen(ASKED_AT_MOST)
+            taken.bind(self.address)
+            taken.listen(ASKED_AT_MOST)
         except OSError as error:
             taken.close()
             if error.errno != errno.EADDRINUSE:

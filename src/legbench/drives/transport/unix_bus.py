@@ -17,6 +17,7 @@ import can
 from can.typechecking import CanFilters
 
 from legbench.drives.transport.messages import frame_of, message_of, refuse_fd
+from legbench.drives.transport.system import require_linux
 from legbench.drives.transport.unix_packet import (
     NOTE,
     PACKET,
@@ -79,6 +80,7 @@ class UnixBus(can.BusABC):
         super().__init__(channel=channel, can_filters=can_filters)
 
     def _connect(self) -> None:
+        require_linux("a bus between processes")
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._readable = (self._socket.fileno(),)
         self._controller = Controller.ACTIVE

@@ -22,9 +22,12 @@ class LiveView:
         url: address of the page to open in a browser; None for a window.
     """
 
-    def __init__(self, process: "subprocess.Popen[bytes]", url: str | None) -> None:
+    def __init__(
+        self, process: "subprocess.Popen[bytes]", url: str | None, web_port: int | None = None
+    ) -> None:
         self._process = process
         self.url = url
+        self._web_port = web_port
 
     @property
     def pid(self) -> int:
@@ -35,6 +38,11 @@ class LiveView:
     def alive(self) -> bool:
         """Whether the program still follows the run."""
         return self._process.poll() is None
+
+    @property
+    def served(self) -> bool:
+        """Whether the page is there."""
+        return self._web_port is not None and viewer.listening(self._web_port)
 
     def stop(self) -> None:
         """Have the last rows shown, and no more; returns at once whatever state the view is in.
@@ -58,7 +66,8 @@ def start_live(
     Args:
         run_folder: folder of the run; its manifest is there.
         serve: show it in a browser on this machine rather than in a window.
-        port: port of the viewer; one that already listens is used.
+        port: port of the window; one that already listens there is used. A page is served at ports
+            that nobody has.
         save: write an `.rrd` file instead of opening a viewer.
 
     Raises:
@@ -66,8 +75,11 @@ def start_live(
             goes on without.
     """
     if save is None:
-        way_out = "the run goes on unseen; look at it afterwards, or serve it to a browser"
+        way_out = "the run goes on unseen; look at it afterwards, or take --serve for a browser"
         viewer.require_viewer(serve=serve, way_out=way_out)
+    web_port = viewer.WEB_PORT
+    if serve:
+        port, web_port = viewer.free_port(), viewer.free_port()
     command = [
         sys.executable,
         "-m",
@@ -75,8 +87,13 @@ def start_live(
         str(run_folder),
         "--port",
         str(port),
+        "--web-port",
+        str(web_port),
     ]
     command += ["--parent", str(os.getpid())]
     command += ["--serve"] if serve else []
     command += [] if save is None else ["--save", str(save)]
-    return LiveView(viewer.spawn(command), viewer.web_url(port) if serve else None)
+    process = viewer.spawn(command)
+    if not serve:
+        return LiveView(process, None)
+    return LiveView(process, viewer.web_url(port, web_port), web_port)

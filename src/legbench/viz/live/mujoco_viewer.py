@@ -1,10 +1,16 @@
 """MuJoCo's own viewer, to look at a model and pull at it."""
 
 import mujoco
-import mujoco.viewer
 
 from legbench.errors import ConfigError, MissingExtraError
 from legbench.viz.display import has_display
+
+try:
+    import mujoco.viewer
+except ImportError as error:
+    raise MissingExtraError(
+        "glfw is not installed; MuJoCo's viewer needs it: pip install 'legbench[render]'"
+    ) from error
 
 
 def view_model(xml: str) -> None:

@@ -4,6 +4,7 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Sequence
 from contextlib import suppress
 from importlib.util import find_spec
@@ -17,6 +18,10 @@ from legbench.viz.display import has_display
 LOOPBACK = "127.0.0.1"
 """Address that the viewer listens on; its own default is every network interface."""
 PORT, WEB_PORT = 9876, 9090
+START_TIME = 20.0
+"""Longest time until a viewer must accept connections [s]."""
+LOOK_PERIOD = 0.05
+"""Period of the looks whether it does [s]."""
 MEMORY = ("--memory-limit", "2GB", "--server-memory-limit", "512MB")
 """Memory limits of the viewer, whose default is three quarters of the whole machine's memory."""
 
@@ -36,6 +41,34 @@ def listening(port: int) -> bool:
     with socket.socket() as probe:
         probe.settimeout(0.2)
         return probe.connect_ex((LOOPBACK, port)) == 0
+
+
+def free_port() -> int:
+    """Port of this machine that nobody has; the system gives two programs two different ones.
+
+    The usual ports would be taken by the second of two runs that look at the same moment.
+    """
+    with socket.socket() as probe:
+        probe.bind((LOOPBACK, 0))
+        return int(probe.getsockname()[1])
+
+
+def wait_until_served(
+    process: "subprocess.Popen[bytes]", port: int, command: Sequence[str]
+) -> None:
+    """Wait until a viewer that was started accepts connections.
+
+    Raises:
+        MissingExtraError: it has ended, or takes too long.
+    """
+    deadline = time.monotonic() + START_TIME
+    while not listening(port):
+        if process.poll() is not None or time.monotonic() > deadline:
+            process.terminate()
+            raise MissingExtraError(
+                f"the rerun viewer did not start; try `{' '.join(command)}` by hand"
+            )
+        time.sleep(LOOK_PERIOD)
 
 
 def viewer_command(
@@ -112,18 +145,22 @@ class Viewer:
         forget(self._process)
 
 
-def open_viewer(
-    rrd: Path, *, serve: bool = False, port: int = PORT, web_port: int = WEB_PORT
-) -> Viewer:
+def open_viewer(rrd: Path, *, serve: bool = False) -> Viewer:
     """Show an `.rrd` file in a window, or serve it to a browser on this machine.
 
+    The page is there when this returns, at ports that nobody else had.
+
     Raises:
-        MissingExtraError: rerun is not installed, or there is no display for a window.
+        MissingExtraError: rerun is not installed, there is no display for a window, or the server
+            does not start.
     """
-    way_out = f"open {rrd} with `rerun {rrd}` on a machine that has one, or serve it to a browser"
+    way_out = f"open {rrd} with `rerun {rrd}` on a machine that has one, or show it with --serve"
     require_viewer(serve=serve, way_out=way_out)
-    process = spawn(viewer_command([rrd], port=port, serve=serve, web_port=web_port))
+    port, web_port = (free_port(), free_port()) if serve else (PORT, WEB_PORT)
+    command = viewer_command([rrd], port=port, serve=serve, web_port=web_port)
+    process = spawn(command)
     if serve:
+        wait_until_served(process, web_port, command)
         return Viewer(process, web_url(port, web_port))
     forget(process)
     return Viewer(process, None)

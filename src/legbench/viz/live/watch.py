@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, final
 
-from legbench.errors import LegbenchError, MissingExtraError
+from legbench.errors import LegbenchError
 from legbench.viz.live import viewer
 from legbench.viz.live._rerun import rr
 from legbench.viz.live.follow import Pace, follow
@@ -27,8 +27,6 @@ LOOK_PERIOD = 0.05
 """Period of the looks at the run [s]: the writer hands over 50 rows at a time."""
 PATIENCE = 30.0
 """Time after which a viewer that takes no data is given up [s]."""
-START_TIME = 20.0
-"""Longest time until a viewer must accept connections [s]."""
 NICENESS = 10
 """Niceness of this program, lower in priority than the control loop."""
 LOG = "live.log"
@@ -43,6 +41,8 @@ class Options:
     """Folder of the run."""
     port: int = viewer.PORT
     """Port of the viewer."""
+    web_port: int = viewer.WEB_PORT
+    """Port of the page."""
     serve: bool = False
     """Show the run in a browser on this machine rather than in a window."""
     parent: int | None = None
@@ -103,7 +103,7 @@ def watch(options: Options, ending: EndRequest, nowhere: IO[str]) -> None:
     if options.save is not None:
         stream.save(options.save)
     else:
-        server = _open_viewer(options, ending)
+        server = _open_viewer(options)
         stream.connect_grpc(viewer.proxy_url(options.port))
     arm()
     follow(options.run, stream, Pace(wait=wait, over=ending))
@@ -116,19 +116,15 @@ def watch(options: Options, ending: EndRequest, nowhere: IO[str]) -> None:
         server.terminate()
 
 
-def _open_viewer(options: Options, ending: EndRequest) -> "subprocess.Popen[bytes] | None":
-    """A viewer that accepts connections; None where one was there already."""
-    if viewer.listening(options.port):
+def _open_viewer(options: Options) -> "subprocess.Popen[bytes] | None":
+    """A viewer that accepts connections; None for a window that was there already."""
+    if not options.serve and viewer.listening(options.port):
         return None
-    command = viewer.viewer_command(port=options.port, serve=options.serve)
+    command = viewer.viewer_command(
+        port=options.port, serve=options.serve, web_port=options.web_port
+    )
     process = viewer.spawn(command)
-    deadline = time.monotonic() + START_TIME
-    while not viewer.listening(options.port):
-        if process.poll() is not None or time.monotonic() > deadline or ending():
-            raise MissingExtraError(
-                "the rerun viewer did not start; try `" + " ".join(command) + "` by hand"
-            )
-        time.sleep(LOOK_PERIOD)
+    viewer.wait_until_served(process, options.port, command)
     if not options.serve:
         viewer.forget(process)
     return process
@@ -147,6 +143,7 @@ def _parse(arguments: Sequence[str] | None) -> Options:
     parser = argparse.ArgumentParser(prog="python -m legbench.viz.live.watch", description=__doc__)
     parser.add_argument("run", type=Path)
     parser.add_argument("--port", type=int, default=viewer.PORT)
+    parser.add_argument("--web-port", type=int, default=viewer.WEB_PORT)
     parser.add_argument("--serve", action="store_true")
     parser.add_argument("--parent", type=int)
     parser.add_argument("--save", type=Path)

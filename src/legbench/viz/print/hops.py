@@ -7,7 +7,7 @@ import numpy as np
 
 from legbench.modes.basin import Fate, Question
 from legbench.modes.hop_family import HopFamily, Member
-from legbench.modes.hop_setting import Setting
+from legbench.modes.settings import Setting
 from legbench.signals import Floats, Ints
 from legbench.viz.print._matplotlib import (
     BoundaryNorm,

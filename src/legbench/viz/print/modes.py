@@ -115,19 +115,22 @@ def _joint_space(axes: Axes, scene: Scene, families: Sequence[Family]) -> None:
         axes.plot(*family.shooting.carrier.path(start, times)[:, :2].T, lw=1.2, color=colour)
         ends.append(generator)
     points = np.vstack(ends)
-    low, high = points.min(axis=0) - 0.15, points.max(axis=0) + 0.15
-    q1, q2 = (np.linspace(a, b, 120) for a, b in zip(low, high, strict=True))
+    reach = float(np.max(np.abs(points - rest)))
+    highest = max(found.energy for family in families for found in family.orbits)
+    q1, q2 = (middle + np.linspace(-2.0 * reach, 2.0 * reach, 240) for middle in rest)
     grid = np.stack(np.meshgrid(q1, q2), axis=-1)
-    energies = [found.energy for family in families for found in family.orbits]
+    potential = scene.potential(grid)
     axes.contour(
         q1,
         q2,
-        scene.potential(grid),
-        levels=np.linspace(0.0, max(energies), 6)[1:],
+        potential,
+        levels=np.linspace(0.0, highest, 6)[1:],
         colors="#cccccc",
         linewidths=0.7,
     )
-    reach = float(np.max(np.abs(points - rest)))
+    # All of the outermost curve is shown, as far as it closes around the rest.
+    points = np.vstack([points, grid[potential <= highest]])
+    low, high = points.min(axis=0) - 0.05, points.max(axis=0) + 0.05
     for sign in (-1.0, 1.0):
         line = rest + reach * np.array([[sign, -1.0], [-sign, 1.0]])
         axes.plot(*line.T, lw=0.7, ls=":", color=GREY)

@@ -11,6 +11,19 @@ DPI = 200
 """Resolution of a .png, and of rasterised parts in vector files [1/inch]."""
 
 
+def check_suffix(path: Path) -> str:
+    """Kind of file that a figure is to be written as, such as `.png`.
+
+    Raises:
+        ConfigError: no figure can be written as this.
+    """
+    kind = path.suffix.lower()
+    if kind not in SUFFIXES:
+        known = ", ".join(SUFFIXES)
+        raise ConfigError(f"a figure cannot be written as {path.name!r}; choose from {known}")
+    return kind
+
+
 def save_figure(figure: PlainFigure, path: Path, dpi: int = DPI) -> Path:
     """Write a figure as .png, .svg or .pdf, the same bytes every time; make its folder if need be.
 
@@ -18,10 +31,7 @@ def save_figure(figure: PlainFigure, path: Path, dpi: int = DPI) -> Path:
         ConfigError: any other suffix.
         RecordingError: nothing can be written there.
     """
-    kind = path.suffix.lower()
-    if kind not in SUFFIXES:
-        known = ", ".join(SUFFIXES)
-        raise ConfigError(f"a figure cannot be written as {path.name!r}; choose from {known}")
+    kind = check_suffix(path)
     undated = {".png": {"Software": None}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
     with draft_of(path) as draft, styled():
         figure.savefig(draft, format=kind[1:], dpi=dpi, metadata=undated[kind])

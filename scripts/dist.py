@@ -1,0 +1,111 @@
+"""Build wheel and sdist, install the wheel in an empty environment, and use it in an empty folder.
+
+The wheel is made from the sdist, so that both are whole. Nothing but the core is installed: a
+command that needs an extra must name it in one line. Warnings are errors.
+"""
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+import venv
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+CANNOT = "Traceback (most recent call last)"
+"""Text that no command may print."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Job:
+    """Words of a command line, the status that is right, and a text that must be printed."""
+
+    words: Sequence[str]
+    status: int = 0
+    prints: str = ""
+
+
+JOBS = (
+    Job(words=("run", "jump", "--duration", "1"), prints="P^r"),
+    Job(words=("run", "bang-bang", "--design", "prototype", "--duration", "0.5", "--json")),
+    Job(words=("run", "jump", "--duration", "0.3", "--plant", "can", "--interface", "legbench")),
+    Job(words=("replay", "{run}"), prints="P^r"),
+    Job(words=("recover", "{run}")),
+    Job(words=("model", "--design", "table2", "--out", "leg.xml")),
+    Job(words=("check", "prototype"), status=1, prints="VIOLATED"),
+    Job(words=("drives", "budget"), prints="SYNC"),
+    Job(words=("drives", "learn", "{eds}", "--out", "my.toml"), status=1, prints="canopen"),
+    Job(words=("modes", "prototype"), status=1, prints="legbench[modes]"),
+    Job(words=("hop", "optimal"), status=1, prints="legbench[modes]"),
+    Job(words=("render", "{run}", "--out", "leg.mp4"), status=1, prints="legbench[render]"),
+    Job(words=("model", "--view"), status=1, prints="legbench[render]"),
+    Job(words=("replay", "{run}", "--figure", "phase.png"), status=1, prints="legbench[viz]"),
+    Job(words=("run", "jump", "--design", "nobody"), status=1, prints="optimal"),
+    Job(words=("run", "jump", "--plant", "can"), status=1, prints="no such file"),
+)
+
+
+def main() -> int:
+    """Build, install, use; returns 1 if a command does not do what it should."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=ROOT / "dist", help="folder of the archives")
+    out: Path = parser.parse_args().out
+    for old in out.glob("legbench-*"):
+        old.unlink()
+    run([sys.executable, "-m", "build", "--outdir", str(out), str(ROOT)])
+    with tempfile.TemporaryDirectory() as place:
+        python = installed(next(out.glob("*.whl")), Path(place) / "env")
+        empty = Path(place) / "empty"
+        empty.mkdir()
+        wrong = list(faults(python, empty))
+    for line in wrong:
+        print(line)
+    print(f"{out}: {', '.join(sorted(path.name for path in out.iterdir()))}")
+    return 1 if wrong else 0
+
+
+def run(words: Sequence[str]) -> None:
+    """Run a program; what it printed is shown if it fails."""
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    if done.returncode:
+        sys.exit(f"{' '.join(words)}\n{done.stdout}{done.stderr}")
+
+
+def installed(wheel: Path, place: Path) -> Path:
+    """Python of a new environment that has the wheel and what it needs."""
+    venv.create(place, with_pip=True)
+    python = place / "bin" / "python"
+    quiet = ("--quiet", "--disable-pip-version-check")
+    pinned = ("--constraint", str(ROOT / "constraints.txt"))
+    run([str(python), "-m", "pip", "install", *quiet, *pinned, str(wheel)])
+    return python
+
+
+def faults(python: Path, folder: Path) -> Iterator[str]:
+    """Say which commands do not do what they should in an empty folder."""
+    listing = "from legbench.cli import COMMANDS; print(*COMMANDS)"
+    names = legbench(python, folder, ["-c", listing]).stdout.split()
+    helps = [Job(words=(name, "--help"), prints="usage") for name in names]
+    for job in (Job(words=("--help",), prints="usage"), *helps, *JOBS):
+        runs = sorted(folder.glob("runs/*"))
+        eds = str(ROOT / "hardware" / "legbench-drive.eds")
+        words = [word.format(run=runs[0] if runs else "", eds=eds) for word in job.words]
+        done = legbench(python, folder, ["-W", "error", "-m", "legbench", *words])
+        printed = done.stdout + done.stderr
+        if done.returncode != job.status or job.prints not in printed or CANNOT in printed:
+            yield f"legbench {' '.join(words)}: status {done.returncode}\n{printed}"
+
+
+def legbench(python: Path, folder: Path, words: Sequence[str]) -> subprocess.CompletedProcess[str]:
+    """Run the installed Python in a folder, without the settings of this one."""
+    kept = {name: os.environ[name] for name in ("PATH", "HOME", "LANG") if name in os.environ}
+    return subprocess.run(
+        [str(python), *words], cwd=folder, env=kept, capture_output=True, text=True, check=False
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())
