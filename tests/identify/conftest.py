@@ -14,4 +14,4 @@ def steps() -> tuple[Trial, ...]:
 @pytest.fixture(scope="session")
 def steps_of_bars() -> tuple[Trial, ...]:
     """The same of a leg whose bars have mass."""
-    return trials(experiments(linkage=Linkage(), duration=0.7))
+    return trials(experiments(linkage=Linkage(), duration=0.4))

@@ -31,7 +31,7 @@ Harm = Callable[[Trial], Trial]
             "sign",
             "motor encoder 2 with the wrong sign",
         ),
-        (lambda t: frozen(t, 0, 300), "frozen", "link encoder 1 stands still from 0.300 to 0.999"),
+        (lambda t: frozen(t, 0, 300), "frozen", "link encoder 1 stands still from 0.300 to 0.599"),
     ],
 )
 def test_encoders_that_are_wired_wrongly_or_stand_still_are_named_before_any_fit(

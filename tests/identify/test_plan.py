@@ -47,7 +47,7 @@ def test_a_chirp_shrinks_the_error_of_the_coupling_and_another_step_hardly_does(
 def test_predicted_errors_are_those_of_the_fit_after_the_run(steps: tuple[Trial, ...]) -> None:
     """Planning a run like the third after the first two predicts the errors of all three."""
     three = identify(nine(steps))
-    like = replace(experiments()[2], duration=1.0)
+    like = replace(experiments()[2], duration=0.6)
     two = question(steps[:2], PROTOTYPE, free=parse_free(["nine"]))
     (plan,) = ranked(two, three, among=[("ffs", like)])
     for each in three.estimates:

@@ -32,7 +32,7 @@ def experiments(
     kinds: Sequence[SetupKind] = FIXED,
     controller: ControllerSettings = STEP,
     linkage: Linkage = REDUCED,
-    duration: float = 1.0,
+    duration: float = 0.6,
     **flaws: tuple[float, ...],
 ) -> list[Experiment]:
     """One run in each of some setups, with noise and counts on the encoders."""

@@ -10,7 +10,7 @@ from legbench.identify.fitting import fit
 from legbench.identify.parameters import INDEX, PARAMETERS
 from legbench.identify.problem import Misfit, Problem
 
-TRIED: Final = 8
+TRIED: Final = 6
 """Largest number of parameters that are freed in turn [-]."""
 NAMED: Final = 0.8
 """Share of the best explanation's gain from which another is named beside it [-]."""
