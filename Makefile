@@ -33,8 +33,8 @@ check: $(STAMP) typings/mujoco/__init__.pyi dist ## lint, format, types, layers,
 	$(BIN)/pyright
 	$(BIN)/lint-imports
 
-test: check ## check, then the tests
-	$(BIN)/pytest
+test: check ## check, then the tests, a file a processor at a time
+	$(BIN)/pytest --numprocesses auto --dist loadfile
 
 test-engine: $(STAMP) ## the tests against Pinocchio, which is installed for them
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[pinocchio]'
@@ -47,7 +47,9 @@ bench: $(STAMP) ## performance targets as ratios against a baseline in the same 
 	$(BIN)/python scripts/bench.py
 	$(BIN)/python scripts/bench_design.py
 	$(BIN)/python scripts/bench_modes.py
+	$(BIN)/python scripts/bench_explain.py
 	$(BIN)/python scripts/bench_drives.py
+	$(BIN)/python scripts/bench_campaign.py
 
 mutants: $(STAMP) ## which of 40 small faults a file the tests notice; hours, or FILES='src/...'
 	$(BIN)/python scripts/mutants/main.py $(FILES)

@@ -42,6 +42,7 @@ JOBS = (
     Job(words=("hop", "optimal"), status=1, prints="legbench[modes]"),
     Job(words=("render", "{run}", "--out", "leg.mp4"), status=1, prints="legbench[render]"),
     Job(words=("model", "--view"), status=1, prints="legbench[render]"),
+    Job(words=("report", "{run}"), status=1, prints="legbench[report]"),
     Job(words=("replay", "{run}", "--figure", "phase.png"), status=1, prints="legbench[viz]"),
     Job(words=("run", "jump", "--design", "nobody"), status=1, prints="optimal"),
     Job(words=("run", "jump", "--plant", "can"), status=1, prints="no such file"),

@@ -51,7 +51,7 @@ def test_no_file_knows_the_machine_that_it_was_written_on() -> None:
 
 KEEP_STOPPING = ("stop.py", "sdo_stop.py", "port.py", "link_end.py", "can.py", "session.py")
 """On the way to rest one failure must not prevent the next step, whatever a driver raises."""
-GUESTS = ("loop.py", "onlooker.py")
+GUESTS = ("loop.py", "onlooker.py", "each_leg.py")
 """Controllers, plants and onlookers of others may raise anything; it is told as their failure."""
 
 

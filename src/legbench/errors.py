@@ -42,3 +42,7 @@ class PlantFault(LegbenchError, RuntimeError):
 
     def __reduce__(self) -> tuple[type["PlantFault"], tuple[str, str]]:
         return type(self), (self.cause, str(self))
+
+
+class CampaignError(LegbenchError, RuntimeError):
+    """Error of a campaign that cannot begin or come to its end; what is done by then is kept."""

@@ -129,7 +129,7 @@ def _cycle(
             check_command(command, observation)
         except Exception as error:  # Whatever it is, the drives stop first.
             plant.close()
-            fault = _controller_failed(controller, error, observation)
+            fault = controller_failed(controller, error, observation.time)
             break
         took = now() - asked
         if sink is not None:
@@ -184,17 +184,21 @@ def _reset(
         controller.reset(observation)
     except Exception as error:
         plant.close()
-        return _controller_failed(controller, error, observation)
+        return controller_failed(controller, error, observation.time)
     return None
 
 
-def _controller_failed(
-    controller: AbstractController, error: Exception, seen: Observation
-) -> PlantFault:
-    """Return the fault that shows a controller's own lines; where it was told, its `step`."""
+def controller_failed(controller: AbstractController, error: Exception, time: float) -> PlantFault:
+    """Return the fault that shows a controller's own lines; where it was told, its `step`.
+
+    Args:
+        controller: what has failed.
+        error: what it has raised, or what is wrong with its command.
+        time: plant time at which it was asked [s].
+    """
     told = isinstance(error, CommandError | PlantFault)
     lines = defined_at(type(controller.law).step) if told else own_lines(error)
-    return failed("controller", f"at t = {seen.time:.3f} s", error, lines, told=told)
+    return failed("controller", f"at t = {time:.3f} s", error, lines, told=told)
 
 
 def _plant_failed(

@@ -14,6 +14,8 @@ from legbench.errors import ConfigError, PlantFault
 pytest.importorskip("heyoka")
 
 from legbench.analytic.lanes import Friction, Lanes
+from legbench.analytic.losses import Losses
+from legbench.analytic.many import ManyLegs, motion
 from legbench.analytic.parameters import COUPLING, DAMPING, INERTIA, MOMENT, STIFFNESS
 
 PROTOTYPE = load_design(Path(__file__).parents[2] / "models" / "prototype.toml")
@@ -133,6 +135,28 @@ def test_friction_takes_energy() -> None:
     lanes.start(STARTS[:2])
     path = lanes.path(np.linspace(0.0, 1.0, 101), np.array([[-0.7, 0.7]] * 2))
     assert np.ptp(path[1, 50:, 1]) < 0.8 * np.ptp(path[0, 50:, 1])
+
+
+def test_a_guide_and_play_act_as_on_the_leg_alone() -> None:
+    losses = Losses(guide=(0.3, 0.8))
+    models = [LegModel.of(PROTOTYPE), LegModel.of(PROTOTYPE, losses=losses)]
+    motor, q, count = (-0.42, 0.4), (-0.95, 0.9), 300
+    state = standing(models[1], q, pinned=True)
+    alone, _ = HybridLeg(models[1], FINE).advance(state, 0.001 * count, motor)
+    lanes = Lanes(models, Regime.PINNED, guide=[(0.0, 0.0), losses.guide])
+    lanes.start(np.array([(*q, 0.0, 0.0)] * 2))
+    found = lanes.go(0.001 * count, np.array([motor] * 2))
+    assert np.allclose(found[1], alone.q + alone.v, rtol=0.0, atol=1e-9)
+    assert np.abs(found[0] - found[1]).max() > 0.01
+
+    slack = replace(losses, slack=(0.02, 0.01), friction=(0.003, 0.001))
+    model = LegModel.of(PROTOTYPE, losses=slack)
+    many = ManyLegs.of([models[0], model], standing=True, step=0.0005)
+    *_, last = motion(many, np.array([q] * 2), np.array([motor] * 2), 0.0005, 2 * count)
+    alone, _ = HybridLeg(model, FINE).advance(standing(model, q, pinned=True), 0.3, motor)
+    assert np.allclose(last[0][1], alone.q, rtol=0.0, atol=2e-5)
+    bare, _ = HybridLeg(models[0], FINE).advance(standing(models[0], q, pinned=True), 0.3, motor)
+    assert np.allclose(last[0][0], bare.q, rtol=0.0, atol=1e-7)
 
 
 def test_a_leg_beyond_its_joints_is_named() -> None:

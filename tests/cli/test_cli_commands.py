@@ -283,7 +283,7 @@ def test_an_interrupt_outside_of_a_run_is_no_traceback(
     def interrupted(path: Path) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("legbench.cli.replay.load", interrupted)
+    monkeypatch.setattr("legbench.cli.replay_source.load", interrupted)
     done = called(capfd, "replay", run_folder)
     assert (done.status, done.err) == (130, "legbench: interrupted\n")
 

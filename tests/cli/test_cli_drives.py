@@ -227,6 +227,18 @@ def test_actions_refuse_what_makes_no_sense(
     drives(*arguments).refused(*words)
 
 
+@pytest.mark.parametrize("how", [("--channel", "leg.sock"), ("--serve", "slcan")])
+def test_emulate_serves_one_wire_and_refuses_two_channels(
+    how: tuple[str, str], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    bus = changed(tmp_path, ('name = "motor2"', 'channel = "can1"\nname = "motor2"'))
+    ask = ("drives", "emulate", "--bus", bus, "--bare", "--seconds", "0.05")
+    at = (how[0], str(tmp_path / how[1])) if how[0] == "--channel" else how
+    done = called(capfd, *ask, *at)
+    done.refused("2 channels, can0, can1", "--only NAME", "--interface legbench")
+    assert called(capfd, *ask, *at, "--only", "motor2").status == 0
+
+
 def test_jitter_in_virtual_time_is_punctual(drives: Drives, tmp_path: Path) -> None:
     plot = tmp_path / "timing.svg"
     done = drives("jitter", "--cycles", "200", "--plot", plot, "--json")

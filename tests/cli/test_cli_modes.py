@@ -165,6 +165,22 @@ def test_hop_makes_the_folder_that_it_writes_to(
     done.refused("cannot write", "name a folder that you can write")
 
 
+@pytest.mark.parametrize("command", ["hop", "modes"])
+def test_an_interrupt_leaves_no_empty_folder(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("legbench.cli.hop_driven.answer", interrupt)
+    monkeypatch.setattr("legbench.cli.modes._found", interrupt)
+    kept = tmp_path / "there"
+    kept.mkdir()
+    for out in (tmp_path / "new" / "one", kept):
+        assert main([command, str(PROTOTYPE), "--out", str(out)]) == 130
+    assert [path.name for path in tmp_path.iterdir()] == ["there"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

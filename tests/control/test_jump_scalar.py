@@ -8,7 +8,7 @@ from legbench.design import LegDesign
 from legbench.design.statics import Support
 from legbench.signals import Observation
 
-STEPS = 120_000
+STEPS = 60_000
 
 
 def observed(time: float, motor_pos: np.ndarray, torque: np.ndarray) -> Observation:

@@ -37,9 +37,7 @@ CAUSES = {
     ("emulation", "controller", "drive", "onset", "servo"),
     [
         (Emulation.CAN, "jump", 1, 0.537, ServoConfig(bandwidth=30.0)),
-        (Emulation.CAN, "bang-bang", 0, 0.411, ServoConfig(encoder_counts=4096)),
-        (Emulation.SIM, "jump", 0, 0.873, ServoConfig(bandwidth=15.0, encoder_counts=4096)),
-        (Emulation.SIM, "bang-bang", 1, 0.622, ServoConfig()),
+        (Emulation.SIM, "bang-bang", 0, 0.622, ServoConfig(bandwidth=15.0, encoder_counts=4096)),
         (Emulation.ANALYTIC, "jump", 1, 0.704, ServoConfig(delay_cycles=2)),
     ],
 )

@@ -67,15 +67,22 @@ def test_answers_of_four_bytes_or_without_a_size_are_read(answers: SdoAnswers) -
     assert led(behaving(sdo_answers=answers)) is None
 
 
-@pytest.mark.parametrize("code", [Abort.NO_OBJECT, Abort.GENERAL, Abort.UNSUPPORTED_ACCESS])
+CODES = (Abort.NO_OBJECT, Abort.GENERAL, Abort.UNSUPPORTED_ACCESS)
+NOT_NEEDED: tuple[Any, ...] = (
+    0x603F, (0x1018, 3), (0x1018, 4), 0x1005, 0x1006, 0x1016, 0x1017, 0x1029, 0x605A, 0x605B,
+    0x605C, 0x605D, 0x605E, 0x607E, 0x60B0, 0x60B1, 0x60B2, 0x60C2, (0x1400, 5),
+)  # fmt: skip
+
+
 @pytest.mark.parametrize(
-    "lacks",
+    ("lacks", "code"),
     [
-        0x603F, (0x1018, 3), (0x1018, 4), 0x1005, 0x1006, 0x1016, 0x1017, 0x1029, 0x605A, 0x605B,
-        0x605C, 0x605D, 0x605E, 0x607E, 0x60B0, 0x60B1, 0x60B2, 0x60C2, (0x1400, 5),
+        (lacks, CODES[(place + turn) % len(CODES)])
+        for place, lacks in enumerate(NOT_NEEDED)
+        for turn in (0, 1)
     ],
     ids=str,
-)  # fmt: skip
+)
 def test_drives_do_without_objects_that_nothing_depends_on(lacks: Any, code: Abort) -> None:
     drive = behaving(lacks=frozenset([lacks]), lacking=code, defaults=INTERPOLATES)
     assert led(drive) is None

@@ -63,12 +63,14 @@ def varied_integrator(tolerance: float = TOLERANCE) -> Any:
     return copy.deepcopy(_varied(tolerance))
 
 
-def smooth_integrator(tolerance: float, *, varied: bool, friction: bool) -> Any:
+def smooth_integrator(
+    tolerance: float, *, varied: bool, friction: bool, guide: bool = False
+) -> Any:
     """New integrator of a batch of legs, without stops and events.
 
     `varied` adds the derivatives by the nine parameters of a leg, and by its friction if any.
     """
-    return copy.deepcopy(_smooth(tolerance, hy.recommended_simd_size(), varied, friction))
+    return copy.deepcopy(_smooth(tolerance, hy.recommended_simd_size(), varied, friction, guide))
 
 
 def sensitive_integrator(tolerance: float, lanes: int, *, friction: bool) -> Any:
@@ -117,8 +119,8 @@ def _varied(tolerance: float) -> Any:
 
 
 @cache
-def _smooth(tolerance: float, lanes: int, varied: bool, friction: bool) -> Any:
-    system = smooth_system(friction=friction)
+def _smooth(tolerance: float, lanes: int, varied: bool, friction: bool, guide: bool) -> Any:
+    system = smooth_system(friction=friction, guide=guide)
     seeds = [hy.par[place] for place in smooth_seeds(friction=friction)] if varied else []
 
     def build() -> Any:

@@ -48,6 +48,20 @@ def damped(torque: Pair, damping: Pair, v: Pair) -> Pair:
     return torque[0] - damping[0] * v[0], torque[1] - damping[1] * v[1]
 
 
+def guide_torque(ops: Ops, reach: float, guide: Pair, q: Pair, v: Pair) -> Pair:
+    """Torques of a guide that brakes the trunk over a pinned foot, on q1 and q2 [N m].
+
+    The trunk moves by `-reach (dir(q1) + dir(q2))`; a force `-c v` on it is the torque
+    `-J^T c J qdot`, with the damping `c` of the guide forward and upward [N s/m].
+    """
+    foot_vel = sweep_rate(ops, q, v, (reach, reach))
+    forward, upward = guide[0] * foot_vel[0], guide[1] * foot_vel[1]
+    return (
+        -reach * (ops.cos(q[0]) * forward + ops.sin(q[0]) * upward),
+        -reach * (ops.cos(q[1]) * forward + ops.sin(q[1]) * upward),
+    )
+
+
 def pair_bias(ops: Ops, terms: PairTerms, q: Pair, v: Pair) -> Pair:
     """`C(q, qdot) qdot + g(q)` of Appendix I [N m]."""
     swirl = ops.sin(q[0] - q[1])

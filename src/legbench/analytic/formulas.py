@@ -7,6 +7,7 @@ from legbench.analytic._heyoka import heyoka as hy
 from legbench.analytic.equations import (
     Pair,
     damped,
+    guide_torque,
     pair_acceleration,
     pair_share,
     spring_torque,
@@ -23,6 +24,7 @@ from legbench.analytic.parameters import (
     FRICTION,
     GAIN,
     GRAVITY,
+    GUIDE,
     HEIGHT,
     INERTIA,
     LEVEL,
@@ -30,6 +32,7 @@ from legbench.analytic.parameters import (
     MOTOR,
     PROBE,
     PUSHES,
+    REACH,
     SHARPNESS,
     SPEED,
     STIFFNESS,
@@ -49,10 +52,11 @@ def pair_at(place: int) -> Pair:
     return hy.par[place], hy.par[place + 1]
 
 
-def smooth_system(*, friction: bool) -> list[tuple[Any, Any]]:
+def smooth_system(*, friction: bool, guide: bool = False) -> list[tuple[Any, Any]]:
     """The equations of motion of two angles, without stops.
 
-    Friction is Coulomb's, `-f_i tanh(s v_i)`, smooth for the sake of the series.
+    Friction is Coulomb's, `-f_i tanh(s v_i)`, smooth for the sake of the series; a guide brakes
+    the trunk over a pinned foot.
     """
     q, v = STATE[:2], STATE[2:]
     torque = _torque(q, v)
@@ -62,6 +66,9 @@ def smooth_system(*, friction: bool) -> list[tuple[Any, Any]]:
             torque[0] - rubbing[0] * hy.tanh(sharpness * v[0]),
             torque[1] - rubbing[1] * hy.tanh(sharpness * v[1]),
         )
+    if guide:
+        guided = guide_torque(SYMBOLS, hy.par[REACH], pair_at(GUIDE), q, v)
+        torque = torque[0] + guided[0], torque[1] + guided[1]
     a = pair_acceleration(SYMBOLS, _terms(), q, v, torque)
     return [(STATE[0], v[0]), (STATE[1], v[1]), (STATE[2], a[0]), (STATE[3], a[1])]
 

@@ -13,6 +13,7 @@ nor joint stops. `outside` says which legs were seen beyond a limit.
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, final
 
 import numpy as np
@@ -24,14 +25,14 @@ from legbench.analytic.compiled import (
     smooth_seeds,
 )
 from legbench.analytic.model import LegModel
-from legbench.analytic.parameters import FRICTION, MOTOR, SHARPNESS, SMOOTH
+from legbench.analytic.parameters import FRICTION, GUIDE, MOTOR, REACH, SHARPNESS, SMOOTH
 from legbench.analytic.state import Regime
 from legbench.errors import ConfigError, PlantFault
 from legbench.signals import Floats
 
 STATES = 4
 """Number of states of a leg, two angles and their rates [-]."""
-LAST = SHARPNESS + 1
+LAST = REACH + 1
 """Number of parameters of a leg in a batch [-]."""
 
 
@@ -59,6 +60,8 @@ class Friction:
 class Lanes:
     """Batch of held legs that move in step, without joint stops and events.
 
+    A guide brakes the trunk of each leg over its pinned foot, forward and upward [N s/m].
+
     Attributes:
         time: present time of all legs [s].
         outside: legs that were seen beyond a joint limit (n,).
@@ -73,6 +76,7 @@ class Lanes:
         regime: Regime,
         *,
         friction: Sequence[Friction] | None = None,
+        guide: Sequence[tuple[float, float]] | None = None,
         derivatives: bool = False,
         tolerance: float = TOLERANCE,
         workers: int = 1,
@@ -87,20 +91,24 @@ class Lanes:
         self.time, self._count, self._workers = 0.0, len(models), workers
         self._models = tuple(models)
         self._seeds = len(smooth_seeds(friction=friction is not None)) if derivatives else 0
-        first = smooth_integrator(tolerance, varied=derivatives, friction=friction is not None)
+        new = partial(
+            smooth_integrator,
+            tolerance,
+            varied=derivatives,
+            friction=friction is not None,
+            guide=guide is not None,
+        )
+        first = new()
         self._width = int(first.batch_size)
         blocks = -(-self._count // self._width)
-        self._blocks: list[Any] = [
-            first,
-            *(
-                smooth_integrator(tolerance, varied=derivatives, friction=friction is not None)
-                for _ in range(blocks - 1)
-            ),
-        ]
+        self._blocks: list[Any] = [first, *(new() for _ in range(blocks - 1))]
         self._pars = np.array([_parameters(model, regime) for model in models])
         for index, rub in enumerate(friction or ()):
             self._pars[index, FRICTION : FRICTION + 2] = rub.torque
             self._pars[index, SHARPNESS] = 1.0 / rub.width
+        if guide is not None:
+            self._pars[:, GUIDE : GUIDE + 2] = guide
+            self._pars[:, REACH] = [model.floating.reach for model in models]
         self.outside = np.zeros(self._count, dtype=np.bool_)
         self.start(np.zeros((self._count, STATES)))
 

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from legbench.analytic.equations import SCALAR, Pair, sweep_rate
+from legbench.analytic.equations import SCALAR, Pair, guide_torque, sweep_rate
 from legbench.imperfections import Imperfections
 
 CREEP: Final = 1e-3
@@ -42,20 +42,14 @@ class Losses:
         )
 
     def drag(self, reach: float, q: Pair, v: Pair) -> Pair:
-        """Torques of friction and guide on q1 and q2 [N m].
-
-        The trunk moves against the pinned foot by `-reach (dir(q1) + dir(q2))`; a force `-c v` on
-        it is the torque `-J^T c J qdot`.
-        """
-        back = [
+        """Torques of friction and guide on q1 and q2 [N m]."""
+        first, second = (
             -size * math.tanh(rate / CREEP) for size, rate in zip(self.friction, v, strict=True)
-        ]
+        )
         if any(self.guide):
-            forward, upward = self.guide_force(reach, q, v)
-            for place, angle in enumerate(q):
-                lever = -reach * math.cos(angle), -reach * math.sin(angle)
-                back[place] += lever[0] * forward + lever[1] * upward
-        return back[0], back[1]
+            guided = guide_torque(SCALAR, reach, self.guide, q, v)
+            first, second = first + guided[0], second + guided[1]
+        return first, second
 
     def guide_force(self, reach: float, q: Pair, v: Pair) -> Pair:
         """Force of the guide on the trunk of a leg whose foot is pinned (forward, up) [N]."""

@@ -19,6 +19,9 @@ SMOOTH = 11
 FRICTION, SHARPNESS = 11, 13
 """First indices of what a batch of legs (`analytic.lanes`) has in addition: Coulomb friction of
 both joints [N m], and the inverse width of its smoothing over the rate [s/rad]."""
+GUIDE, REACH = 14, 16
+"""First indices of what a batch of legs has for a damped guide: its damping forward and upward
+[N s/m], and the distance of the foot tip along either direction [m]."""
 PUSHES = 11
 """First index of the stops, knee then hip: whether the stop pushes [0 or 1], its limit [rad]."""
 PROBE = 15

@@ -19,7 +19,10 @@ COMMANDS = {
     "design": "find a leg that meets requirements and modal matching",
     "check": "check a leg against the conditions of modal matching",
     "modes": "linear and nonlinear modes of a leg",
+    "explain": "find which imperfections explain measured ratings",
     "hop": "apex return map, periodic hops and basin of a leg",
+    "campaign": "run a grid of experiments, and make one table of it",
+    "report": "a campaign beside the paper, on one page and in figures",
     "identify": "parameters of a leg from recorded runs",
     "drives": "commission the servo drives, or emulate them",
 }

@@ -47,7 +47,7 @@ class DesignArguments:
     """Whether to search by differential evolution as well, and compare."""
     tolerances: str | None = None
     """`default` or a tolerance file: candidates also pay for the P^r that scatter costs them, and
-    the yield of the result is measured. Takes minutes."""
+    the yield of the result is measured."""
     legs: int = 1000
     """Number of legs on which the yield is measured."""
     measured: Path | None = None

@@ -102,6 +102,7 @@ class Emulate:
         start_pos, body = self._leg(bench)
         if self.only is not None:
             config, start_pos = only(config, self.only), (0.0,)
+        self._check_channels(bench, config)
         end = time.monotonic() + self.seconds
         where = None if bench.channel is None else Path(bench.channel)
 
@@ -133,6 +134,17 @@ class Emulate:
                 stop=lambda: stop.is_set or time.monotonic() > end,
             )
         return 0
+
+    def _check_channels(self, bench: Bench, config: "BusConfig") -> None:
+        """Refuse drives on several channels where one wire is served; raises ConfigError."""
+        one_wire = self.serve == SLCAN or bench.interface in (None, UNIX)
+        if one_wire and len(config.channels) > 1:
+            names = ", ".join(map(str, config.channels))
+            raise ConfigError(
+                f"the bus file's drives hang on {len(config.channels)} channels, {names}; a socket "
+                "file or a terminal is one wire: serve each drive by itself, with --only NAME and "
+                "a --channel of its own, or emulate them in the run, with --interface legbench"
+            )
 
     def _leg(self, bench: Bench) -> "tuple[tuple[float, ...], Body]":
         """Motor positions at power-on [rad], and what hangs on the shafts."""

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import tyro
 
-from legbench.cli.output import make_folder, note, print_json, write_json
+from legbench.cli.output import note, print_json, results_in, write_json
 from legbench.cli.parse import parse
 from legbench.control import JumpConfig
 from legbench.design import load_design
@@ -61,22 +61,21 @@ def main(arguments: list[str]) -> int:
 
     check(flags)
     design = load_design(flags.design)
-    if flags.out is not None:
-        make_folder(flags.out)
-    if flags.passive:
-        from legbench.cli.hop_passive import answer
+    with results_in(flags.out):
+        if flags.passive:
+            from legbench.cli.hop_passive import answer
 
-        content, lines = answer(design, flags.rest)
-    else:
-        from legbench.cli.hop_driven import answer as driven
+            content, lines = answer(design, flags.rest)
+        else:
+            from legbench.cli.hop_driven import answer as driven
 
-        content, lines = driven(flags, design)
-    if flags.json:
-        print_json(content)
-    else:
-        print("\n".join(lines))
-    if flags.out is not None:
-        write_json(flags.out / "hop.json", content)
-        note(f"wrote {flags.out / 'hop.json'}")
+            content, lines = driven(flags, design)
+        if flags.json:
+            print_json(content)
+        else:
+            print("\n".join(lines))
+        if flags.out is not None:
+            write_json(flags.out / "hop.json", content)
+            note(f"wrote {flags.out / 'hop.json'}")
     # Who asks for a map and gets none is told so by the status, too.
     return int(flags.basin > 0 and "basin" not in content)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from legbench.cli.output import make_folder, note, print_json, progress, write_json
+from legbench.cli.output import note, print_json, progress, results_in, write_json
 from legbench.cli.parse import parse
 from legbench.design import load_design
 from legbench.errors import ConfigError
@@ -70,8 +70,12 @@ def main(arguments: list[str]) -> int:
     flags = parse(ModesArguments, "modes", arguments)
     _check(flags)
     scene = make_scene(load_design(flags.design), flags.setup, flags.z2)
-    if flags.out is not None:
-        make_folder(flags.out)
+    with results_in(flags.out):
+        return _answer(flags, scene)
+
+
+def _answer(flags: ModesArguments, scene: Scene) -> int:
+    """Compute what was asked for, print it and write it."""
     found = _found(flags, scene)
     from legbench.cli.modes_content import content_of
     from legbench.cli.modes_tables import tables

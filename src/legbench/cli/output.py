@@ -1,10 +1,11 @@
 """Output of the commands: results on stdout, everything else on stderr."""
 
+import errno
 import os
 import select
 import sys
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -46,27 +47,56 @@ def write_json(path: Path, content: Mapping[str, Any]) -> None:
     save_whole(path, json.dumps(null_for_nan(content), indent=1, allow_nan=False) + "\n")
 
 
-def make_folder(path: Path) -> None:
-    """Make the folder that results are to be written to, before they are computed.
+@contextmanager
+def results_in(path: Path | None) -> Iterator[None]:
+    """Make the folder that results are to be written to before they are computed.
+
+    Of what was made for it, nothing stays behind that is empty at the end, after ^C for example.
+
+    Args:
+        path: the folder; none where nothing is to be written.
 
     Raises:
         ConfigError: it cannot be made.
     """
+    made: list[Path] = []
+    try:
+        if path is not None:
+            _make(path, made)
+        yield
+    finally:
+        with suppress(OSError):  # A folder that holds something stays, and those above it.
+            for folder in reversed(made):
+                folder.rmdir()
+
+
+def _make(path: Path, made: list[Path]) -> None:
+    """Make a folder and those above it that are missing, each noted in `made` once it is there."""
     from legbench.writing import reason
 
     try:
-        path.mkdir(parents=True, exist_ok=True)
+        for folder in (*reversed(path.parents), path):
+            if not folder.is_dir():
+                folder.mkdir()
+                made.append(folder)
+        if not os.access(path, os.W_OK | os.X_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
     except OSError as error:
         raise ConfigError(
             f"cannot write {path}: {reason(error)}; name a folder that you can write"
         ) from error
 
 
-def progress(done: int, total: int) -> None:
+def progress(done: int, total: int, left: float | None = None) -> None:
     """Draw a line that overwrites itself, on a terminal that takes it at once.
 
     A stalled terminal (^S, a lost connection) must not hold up who reports, and one that is gone
     is no terminal.
+
+    Args:
+        done: how much is done.
+        total: how much there is to do.
+        left: time that the rest will take, where that is known [s].
     """
     if not _draws():
         return
@@ -74,7 +104,16 @@ def progress(done: int, total: int) -> None:
     filled = width * done // max(total, 1)
     bar = "#" * filled + "-" * (width - filled)
     end = "\n" if done >= total else ""
-    _to_stderr(f"\r[{bar}] {100 * done // max(total, 1):3d} %{end}")
+    # Blanks overwrite what a longer line before has left.
+    rest = f", {duration_text(left)} left" if left is not None and done < total else ""
+    _to_stderr(f"\r[{bar}] {100 * done // max(total, 1):3d} %{rest:<18}{end}")
+
+
+def duration_text(seconds: float) -> str:
+    """Return a time in hours, minutes and seconds, as 1:02:03 or 2:03 [s]."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
 
 
 def _draws() -> bool:

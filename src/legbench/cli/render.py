@@ -1,6 +1,6 @@
 """`legbench render`: a video or a picture of a recorded run."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
@@ -8,6 +8,7 @@ from tyro.conf import Positional
 
 from legbench.cli.output import print_json, progress
 from legbench.cli.parse import parse
+from legbench.cli.playback_arguments import PlaybackArguments
 from legbench.recording.reader import load
 
 
@@ -21,6 +22,7 @@ class RenderArguments:
     """File to write: .mp4, .gif, or .png for stills of one jump."""
     time: float | None = None
     """Time of the one instant to draw instead, .png only [s]."""
+    playback: PlaybackArguments = field(default_factory=PlaybackArguments)
     json: bool = False
     """Print one JSON object on stdout: the file."""
 
@@ -28,10 +30,11 @@ class RenderArguments:
 def main(arguments: list[str]) -> int:
     """Run `legbench render`."""
     chosen = parse(RenderArguments, "render", arguments)
+    playback = chosen.playback.playback
     recording = load(chosen.run)
     from legbench.viz.film.render import render
 
-    written = render(recording, chosen.out, time=chosen.time, progress=progress)
+    written = render(recording, chosen.out, time=chosen.time, progress=progress, playback=playback)
     if chosen.json:
         print_json({"out": str(written)})
     else:

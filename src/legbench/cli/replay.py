@@ -1,71 +1,56 @@
-"""`legbench replay`: a recorded run, rated again and shown."""
+"""`legbench replay`: a recorded run, rated again, shown, and made to happen again."""
 
 from contextlib import suppress
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Annotated
-
-from tyro.conf import Positional, UseAppendAction
 
 from legbench.cli.output import note, print_json
 from legbench.cli.parse import parse
+from legbench.cli.replay_again import Again, print_again, replayed
+from legbench.cli.replay_arguments import ReplayArguments
+from legbench.cli.replay_source import loaded, source_of
 from legbench.cli.table import print_comparison, print_summary
 from legbench.metrics import Analysis, Comparison, compare, summarise
-from legbench.recording.reader import Recording, load
+from legbench.recording.reader import Recording
 
 SHOWN = 4
 """Largest number of entries in which two experiments differ that a note lists."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ReplayArguments:
-    """Rate a recorded run again, from its file alone; show it."""
-
-    run: Annotated[Path, Positional]
-    """Run folder; a torn one is read as far as it goes."""
-    against: UseAppendAction[tuple[Path, ...]] = ()
-    """Another run to compare with and to draw over this one; may be repeated."""
-    view: bool = False
-    """Whether to open the run in rerun."""
-    serve: bool = False
-    """Whether to show the run in a browser on this machine, until ^C."""
-    rrd: Path | None = None
-    """Write a rerun file that anyone can open."""
-    figure: Path | None = None
-    """Write the phase plots of Fig. 4 or 6: .png, .svg or .pdf."""
-    json: bool = False
-    """Print one JSON object on stdout."""
-
-
 def main(arguments: list[str]) -> int:
-    """Run `legbench replay`; its exit status is 0 also for a run that a fault has ended."""
+    """Run `legbench replay`.
+
+    Returns:
+        0, also for a run that a fault has ended; 1 when the recorded controller gives other
+        commands than were recorded.
+    """
     chosen = parse(ReplayArguments, "replay", arguments)
-    recording, *others = [_loaded(path) for path in (chosen.run, *chosen.against)]
+    chosen.check()
+    recording = source_of(chosen)
+    others = [loaded(path) for path in chosen.against]
+    again = replayed(recording, chosen)
+    if again is not None and again.moved is not None:
+        others.append(again.moved)
     run, *against = [Analysis(each) for each in (recording, *others)]
     summary = summarise(run)
-    comparisons = [_compared(run, other) for other in against]
+    comparisons = [_compared(run, other) for other in against[: len(chosen.against)]]
     if chosen.figure is not None:
-        from legbench.viz.print.figures import phase_figure
-        from legbench.viz.print.save import save_figure
-
-        note(f"wrote {save_figure(phase_figure(run, against), chosen.figure)}")
+        _draw(chosen, run, against, again)
     if chosen.json:
-        added = {"against": [each.to_json() for each in comparisons]} if others else {}
+        added = {"against": [each.to_json() for each in comparisons]} if comparisons else {}
+        added |= {} if again is None else {"replay": again.to_json()}
         print_json(summary.to_json() | added)
     else:
         print_summary(summary)
         for comparison in comparisons:
             print_comparison(comparison)
+        if again is not None:
+            print_again(again)
     if chosen.rrd is not None or chosen.view or chosen.serve:
         show(recording, others, chosen)
-    return 0
+    if chosen.mujoco:
+        from legbench.viz.live.mujoco_viewer import play_run
 
-
-def _loaded(path: Path) -> Recording:
-    recording = load(path)
-    if recording.torn is not None:
-        note(f"legbench: {path} is torn ({recording.torn}); read as far as it goes")
-    return recording
+        play_run(recording, chosen.playback.playback)
+    return 0 if again is None else again.status
 
 
 def _compared(run: Analysis, other: Analysis) -> Comparison:
@@ -78,12 +63,34 @@ def _compared(run: Analysis, other: Analysis) -> Comparison:
     return comparison
 
 
+def _draw(
+    chosen: ReplayArguments, run: Analysis, against: list[Analysis], again: Again | None
+) -> None:
+    """Write the figure: of a replay its signals over time, else the planes of the runs."""
+    from legbench.viz.print.save import save_figure
+
+    if chosen.figure is None:
+        return
+    if again is None:
+        from legbench.viz.print.figures import phase_figure
+
+        figure = phase_figure(run, against)
+    else:
+        from legbench.viz.print.replays import replay_figure
+
+        figure = replay_figure(again.signals, f"{run.path.name}: {again.title}")
+    note(f"wrote {save_figure(figure, chosen.figure)}")
+
+
 def show(recording: Recording, others: list[Recording], chosen: ReplayArguments) -> None:
     """Write the rerun file, and open it where that was asked for."""
     from legbench.viz.live.rrd import write_rrd
     from legbench.viz.live.viewer import open_viewer
 
-    rrd = write_rrd(recording, chosen.rrd or recording.path / "view.rrd", others)
+    path = recording.path
+    beside = path / "view.rrd" if path.is_dir() else path.with_suffix(".rrd")
+    playback = chosen.playback.playback
+    rrd = write_rrd(recording, chosen.rrd or beside, others, playback)
     note(f"wrote {rrd}")
     if not (chosen.view or chosen.serve):
         return

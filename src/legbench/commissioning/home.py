@@ -29,6 +29,7 @@ from legbench.drives.protocol.nmt import NmtCommand, NmtState, heartbeat_frame, 
 from legbench.drives.protocol.objects import name_of
 from legbench.drives.setup.config import NodeConfig
 from legbench.drives.setup.master_watch import check_master_watch
+from legbench.drives.setup.quirks import ModeShown
 from legbench.drives.setup.taken import check_taken
 from legbench.errors import ConfigError
 from legbench.interrupts import shielded
@@ -105,8 +106,9 @@ def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20
     up.poll_frames()
     with master:
         master.start()
-        master.enter_homing()
+        master.choose_homing()
         master.enable()
+        master.await_homing()
         master.command(START_HOMING)
         master.await_end(timeout)
     up.detector.disarm()
@@ -202,14 +204,29 @@ class _Master(DriveLeader):
         self._port.send_frame(self._beat)
         self._port.send_frame(nmt_frame(NmtCommand.START, self._node.node_id))
 
-    def enter_homing(self) -> None:
-        """Wait for the mode: 6061h lags behind 6060h."""
+    def choose_homing(self) -> None:
+        """Write the mode (6060h), and wait for it where it is shown without power."""
         self._sdo.put(0x6060, 0, I8, Mode.HOMING)
-        for _ in range(PATIENCE):
+        if self._node.quirks.mode_shown is ModeShown.CONFIGURED:
+            self.await_homing()
+
+    def await_homing(self) -> None:
+        """Wait until 6061h shows the mode, which lags behind 6060h.
+
+        Raises:
+            DriveError: it is not shown within the time that the bus file gives the drive.
+        """
+        patience_ms = self._node.quirks.mode_patience_ms
+        until_ns = self._timebase.now_ns() + 1_000_000 * patience_ms
+        while self._sdo.get_int(0x6061, 0, I8) != Mode.HOMING:
+            if self._timebase.now_ns() >= until_ns:
+                raise DriveError(
+                    f"drive '{self._node.name}' does not enter homing mode (6061h) within "
+                    f"{patience_ms} ms; if it is slow, raise mode_patience_ms in [node.quirks]; if "
+                    "it shows its mode only once it is enabled, give mode_shown = "
+                    f'"{ModeShown.ENABLED}"'
+                )
             self._wait()
-            if self._sdo.get_int(0x6061, 0, I8) == Mode.HOMING:
-                return
-        raise DriveError(f"drive '{self._node.name}' does not enter homing mode (6061h)")
 
     def enable(self) -> None:
         """Advance the power state by one transition per observed statusword."""

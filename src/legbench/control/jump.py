@@ -5,13 +5,13 @@ floats, a batch in arrays; both obey the same table, and their commands are equa
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, final
 
 import numpy as np
 
-from legbench.control.abstract import AbstractController
+from legbench.control.abstract import NO_ERRORS, AbstractController
 from legbench.control.jump_rules import JumpPhase, PhaseExit, phase_exits, phase_infos
 from legbench.control.per_leg import each_config, setting
 from legbench.control.setpoint import LegTargets, check_delay
@@ -97,6 +97,11 @@ class Jump(AbstractController):
         """Motor positions of the leg that stands at z2 + dz2 [rad]."""
         return self._folded
 
+    @property
+    def leg_errors(self) -> Mapping[int, Exception]:
+        """Legs of a batch that do not stand at rest, by number."""
+        return self._law.errors
+
     def reset(self, observation: Observation) -> None:
         """Begin anew with the load of the standing leg as the unit of load."""
         self._law.reset(observation)
@@ -126,6 +131,8 @@ def _check(config: JumpConfig) -> None:
 @final
 class _OneLeg:
     """Law of one leg in plain floats."""
+
+    errors: ClassVar[Mapping[int, Exception]] = NO_ERRORS
 
     def __init__(
         self, config: JumpConfig, targets: LegTargets, folded: Floats, stretched: Floats
@@ -206,12 +213,15 @@ class _Batch:
         self._load_of = _by_phase(ends, lambda leave: leave.load)
         self._dwell_of = _by_phase(ends, lambda leave: leave.dwell)
         self._standing: Floats = np.ones(folded.shape[:-1])
+        self.errors: dict[int, Exception] = {}
         self._begin()
 
     def reset(self, observation: Observation) -> None:
-        self._standing = -self._targets.radial(observation.spring_torque)
-        if not np.all(self._standing > 0.0):
-            raise ConfigError(STANDING_ONLY)
+        standing = -self._targets.radial(observation.spring_torque)
+        stands = standing > 0.0
+        lying = np.flatnonzero(~stands).tolist()
+        self.errors = {leg: ConfigError(STANDING_ONLY) for leg in lying}
+        self._standing = np.where(stands, standing, 1.0)
         self._begin()
 
     def _begin(self) -> None:

@@ -2,19 +2,19 @@
 
 import time
 from collections.abc import Hashable, Sequence
-from dataclasses import replace
 from typing import final
 
 import numpy as np
 
 from legbench.control import AbstractController, LegTargets, make_controllers
-from legbench.errors import ConfigError
+from legbench.errors import ConfigError, PlantFault
+from legbench.experiment.alike import alike, runs_in_batch
 from legbench.experiment.data import Experiment
 from legbench.experiment.manifest import manifest_of
 from legbench.experiment.start import targets_of
-from legbench.loop import PROGRESS_EVERY, Progress
+from legbench.loop import PROGRESS_EVERY, Progress, controller_failed
 from legbench.plant.backlash import rest_of
-from legbench.plant.batch import BatchPlant
+from legbench.plant.batch import FAILED, BatchPlant
 from legbench.plant.start import PERIOD, Start
 from legbench.plants import SimChoice
 from legbench.recording.columns import Layout
@@ -45,7 +45,7 @@ def run_batch(
         ConfigError: another plant, limits, or settings that a leg refuses.
     """
     for place, each in enumerate(experiments):
-        if not isinstance(each.plant, SimChoice) or each.plant.limits is not None:
+        if not runs_in_batch(each):
             raise ConfigError(
                 f"experiment {place} of the batch is on plant '{each.plant.kind}'"
                 f"{' under limits' if isinstance(each.plant, SimChoice) else ''}; a batch runs on "
@@ -53,7 +53,7 @@ def run_batch(
             )
     groups: dict[Hashable, list[int]] = {}
     for place, each in enumerate(experiments):
-        groups.setdefault(_alike(each), []).append(place)
+        groups.setdefault(alike(each), []).append(place)
     made = [LegGroup([experiments[place] for place in group]) for group in groups.values()]
     total, done = sum(group.cycles for group in made), 0
     found: dict[int, Recording] = {}
@@ -62,17 +62,6 @@ def run_batch(
         done += group.cycles
         found |= zip(places, group.recordings(), strict=True)
     return [found[place] for place in range(len(experiments))]
-
-
-def _alike(experiment: Experiment) -> Hashable:
-    """What legs that are stepped together have in common: parts of the model, readings, columns."""
-    conventions = experiment.conventions
-    signals = experiment.controller.describe().signals
-    options, built = experiment.options, experiment.imperfections.leg_of(experiment.design)
-    # Alone each leg has the step that suits it, so that only legs of one step are company.
-    fitted = options.numerics.fitted([built], options.linkage)
-    alike = replace(options, numerics=fitted)
-    return alike, conventions.modal, conventions.setpoint, signals
 
 
 def start_together(experiments: Sequence[Experiment]) -> tuple[AbstractController, Start]:
@@ -117,6 +106,7 @@ class LegGroup:
             for leg, each in enumerate(experiments)
         ]
         self._plant: BatchPlant | None = None
+        self._lost: dict[int, tuple[int, PlantFault]] = {}
 
     def run(self, threads: int | None, progress: Progress | None, done: int, total: int) -> None:
         """Run them all, `done` of `total` cycles being over before."""
@@ -125,18 +115,24 @@ class LegGroup:
         rows = LegRows(len(self._experiments), RowLayout(layout))
         seen = plant.reset()
         self._controller.reset(seen)
+        self._lose(seen.time, 0)
         before, cycle_us, first = time.perf_counter(), 0.0, 0
         for cycle in range(self.cycles):
             command = self._controller.step(seen)
+            self._lose(seen.time, cycle)
+            if len(self._lost) == len(self._runs):
+                break
             rows.put(command, seen, cycle_us)
             seen = plant.step(command)
-            if rows.count == BATCH_ROWS or cycle + 1 == self.cycles:
+            if rows.count == BATCH_ROWS:
                 self._hand_out(rows, first)
                 first = cycle + 1
-            if progress is not None and ((cycle + 1) % PROGRESS_EVERY == 0 or first == self.cycles):
+            ended = cycle + 1 == self.cycles
+            if progress is not None and ((cycle + 1) % PROGRESS_EVERY == 0 or ended):
                 progress(done + cycle + 1, total)
             now = time.perf_counter()
             cycle_us, before = 1e6 * (now - before), now
+        self._hand_out(rows, first)
 
     def open(self, threads: int | None = None) -> BatchPlant:
         """Make the plant of all legs."""
@@ -158,27 +154,37 @@ class LegGroup:
     def _start_of(self, leg: int) -> Start:
         return Start(joint_pos=self._start.joint_pos[leg], motor_pos=self._start.motor_pos[leg])
 
-    def _last(self, leg: int) -> tuple[int, bool]:
-        """Number of rows of a leg so far as they are known, and whether a fault ends them."""
-        wanted = int(self._wanted[leg])
-        fault = -1 if self._plant is None else int(self._plant.fault_cycles[leg])
-        return (fault, True) if 0 <= fault <= wanted else (wanted, False)
+    def _lose(self, time: float, rows: int) -> None:
+        """Remember the legs that their controller cannot go on with, after so many rows."""
+        for leg, error in self._controller.leg_errors.items():
+            if leg not in self._lost:
+                fault = controller_failed(self._controller.law_of(leg), error, time)
+                self._lost[leg] = rows, fault
+
+    def _end_of(self, leg: int) -> tuple[int, float, PlantFault | None]:
+        """Rows of a leg so far as they are known, the time of its end [s], and what ended it."""
+        wanted, plant = int(self._wanted[leg]), self._plant
+        cycle = -1 if plant is None else int(plant.fault_cycles[leg])
+        rows, fault = self._lost.get(leg, (wanted + 1, None))
+        if plant is not None and 0 <= cycle <= min(wanted, rows):
+            # What the plant made of the last command is not seen any more.
+            found = PlantFault(plant.causes[leg] or FAILED, plant.messages[leg] or "")
+            return cycle, (cycle - 1) * PERIOD, found
+        # A controller that fails after the last row has nothing left to command.
+        return (rows, rows * PERIOD, fault) if rows < wanted else (wanted, wanted * PERIOD, None)
 
     def _hand_out(self, rows: LegRows, first: int) -> None:
         """Give each leg its rows from the cycle `first` on, up to its end."""
         for leg, run in enumerate(self._runs):
-            count = min(self._last(leg)[0] - first, rows.count)
+            count = min(self._end_of(leg)[0] - first, rows.count)
             if count > 0:
                 run.extend(rows.columns(leg, count))
         rows.count = 0
 
     def _ended(self, leg: int, run: MemoryRun) -> Recording:
-        count, faulted = self._last(leg)
-        plant = self._plant
-        cause = plant.causes[leg] if faulted and plant is not None else None
-        status = FAULT if faulted else COMPLETE
-        message = {} if cause is None or plant is None else {"message": plant.messages[leg]}
-        reached = (count - 1 if faulted else count) * PERIOD
-        run.event(reached, "end", status=status, cause=cause, **message)
+        _, time, fault = self._end_of(leg)
+        status, cause = (COMPLETE, None) if fault is None else (FAULT, fault.cause)
+        message = {} if fault is None else {"message": str(fault)}
+        run.event(time, "end", status=status, cause=cause, **message)
         run.close(status, cause)
         return run.recording()

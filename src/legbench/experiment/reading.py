@@ -73,7 +73,7 @@ class Reader:
             for name, entry in known.items()
             if name in raw
         }
-        for name in known.keys() - raw.keys():
+        for name in (name for name in known if name not in raw):
             if known[name].default is MISSING and known[name].default_factory is MISSING:
                 self.refuse(joined(at, name), "is missing")
                 values[name] = BAD

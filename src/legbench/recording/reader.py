@@ -200,8 +200,10 @@ def run_folder(path: Path) -> Path:
     run = path.parent if path.name in (RUN, ARCHIVE, STREAM) else path
     if any((run / name).is_file() for name in (RUN, ARCHIVE, STREAM)):
         return run
-    if not run.is_dir():
+    if not run.exists():
         raise RecordingError(f"{path} does not exist")
+    if not run.is_dir():
+        raise RecordingError(f"{path} is a file, no run folder: a run has a {RUN}")
     inside = sorted(manifest.parent.name for manifest in run.glob(f"*/{RUN}"))
     hint = f"; it holds the runs {', '.join(inside[-5:])}" if inside else ""
     raise RecordingError(f"{run} is no run folder: it has no {RUN}{hint}")

@@ -54,6 +54,7 @@ class WrongLaw:
             observation.joint_pos[0] = 9.0
         return {
             "nothing": None,
+            "nan": Command(motor_pos=np.full(2, np.nan), phase=good.phase),
             "shape": Command(motor_pos=np.zeros(3), phase=good.phase),
             "text": Command(motor_pos="north", phase=good.phase),  # pyright: ignore
             "list": Command(motor_pos=self.start_motor_pos.tolist(), phase=0),  # pyright: ignore

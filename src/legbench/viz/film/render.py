@@ -15,6 +15,7 @@ from legbench.viz.film._imageio import Image as Picture
 from legbench.viz.film._imageio import PyAVPlugin, iio
 from legbench.viz.film.frames import Film, Size
 from legbench.viz.film.offscreen import Image
+from legbench.viz.playback import WHOLE, Playback
 
 SUFFIXES = (".mp4", ".gif", ".png")
 VIDEO, ANIMATION = Size(width=800, height=600), Size(width=480, height=360)
@@ -36,17 +37,20 @@ def render(
     *,
     time: float | None = None,
     progress: Progress | None = None,
+    playback: Playback = WHOLE,
 ) -> Path:
-    """Draw a run: .mp4 and .gif in real time, .png as stills of one jump or period.
+    """Draw a run: .mp4 and .gif as a film, .png as stills of one jump, of one period, or of a part.
 
     Args:
         recording: the run, whose folder holds its model.
         path: file to write; an older one is replaced when the new one is whole.
         time: instant to draw, for a .png of a single one [s].
         progress: called after each frame.
+        playback: part of the run that is drawn, and its speed; a .gif always begins again.
 
     Raises:
-        ConfigError: another suffix, or a `time` that is outside the run or not for a .png.
+        ConfigError: another suffix, a `time` that is outside the run or not for a .png, or a
+            playback that the run or the kind of file does not have.
         RecordingError: the run has no rows, or nothing can be written there.
         MissingExtraError: the machine has no OpenGL that works.
     """
@@ -56,23 +60,28 @@ def render(
         raise ConfigError(f"a run cannot be rendered as {path.name!r}; choose from {known}")
     if time is not None and kind != ".png":
         raise ConfigError(f"time = {time:g} s draws one frame; write it to a .png, not a {kind}")
+    _check_playback(kind, playback, time)
     film = Film(recording)
     with draft_of(path) as draft:
         if kind == ".png":
-            _write_stills(draft, film, recording, time, progress)
+            rows = _still_rows(recording, playback) if time is None else _row_at(recording, time)
+            _write_stills(draft, film, rows, progress, single=time is not None)
         else:
             fps, size = (VIDEO_FPS, VIDEO) if kind == ".mp4" else (ANIMATION_FPS, ANIMATION)
-            rows = _frames(recording, fps)
+            rows = playback.frames(recording.time, fps)
             write = _write_video if kind == ".mp4" else _write_animation
             write(draft, _told(film.shoot(rows, size), len(rows), progress))
     return path
 
 
-def _frames(recording: Recording, fps: int) -> Ints:
-    """Rows (n,) that a video in real time shows."""
-    time = recording.time
-    instants = np.arange(time[0], time[-1] + 0.5 / fps, 1.0 / fps)
-    return np.minimum(np.searchsorted(time, instants), len(time) - 1)
+def _check_playback(kind: str, playback: Playback, time: float | None) -> None:
+    """Refuse what a kind of file cannot do; raises ConfigError."""
+    if playback.loop and kind != ".gif":
+        raise ConfigError(f"a {kind} does not begin again by itself: write a .gif, or leave loop")
+    if playback.speed != WHOLE.speed and kind == ".png":
+        raise ConfigError(f"speed is {playback.speed:g}; a .png stands still: write .mp4 or .gif")
+    if time is not None and not playback.whole:
+        raise ConfigError(f"time = {time:g} s is one instant; leave from and to out")
 
 
 def _told(images: Iterable[Image], count: int, progress: Progress | None) -> Iterator[Image]:
@@ -106,12 +115,12 @@ def _write_animation(path: Path, images: Iterator[Image]) -> None:
 def _write_stills(
     path: Path,
     film: Film,
-    recording: Recording,
-    time: float | None,
+    rows: Ints,
     progress: Progress | None,
+    *,
+    single: bool,
 ) -> None:
-    rows = _still_rows(recording) if time is None else _row_at(recording, time)
-    size = STILL if time is None else FRAME
+    size = FRAME if single else STILL
     images = list(_told(film.shoot(rows, size, follow=False), len(rows), progress))
     white = np.full((size.height, GAP, 3), 255, dtype=np.uint8)
     strip = np.concatenate([part for image in images for part in (white, image)][1:], axis=1)
@@ -125,13 +134,22 @@ def _row_at(recording: Recording, time: float) -> Ints:
     return np.atleast_1d(np.searchsorted(recording.time, time))
 
 
-def _still_rows(recording: Recording) -> Ints:
-    """Rows of the stills, evenly spread over the last jump, or the last period without jumps."""
+def _still_rows(recording: Recording, playback: Playback) -> Ints:
+    """Rows of the stills, evenly spread over a part of the run that was asked for.
+
+    Otherwise they show the last jump, or the last period without jumps.
+    """
+    begin, end = playback.span(recording.time) if not playback.whole else _last_cycle(recording)
+    instants = np.linspace(begin, end, STILLS)
+    return np.minimum(np.searchsorted(recording.time, instants), len(recording.time) - 1)
+
+
+def _last_cycle(recording: Recording) -> tuple[float, float]:
+    """Begin and end of the last jump, or of the last period without jumps [s]."""
     run = Analysis(recording)
     jumps, periods, begin, end = run.gait.jumps, run.periods, run.time[0], run.time[-1]
     if len(jumps):
         begin, end = jumps.start[-1], jumps.end[-1]
     elif len(periods):
         begin, end = periods.start[-1], periods.end[-1]
-    instants = np.linspace(begin, end, STILLS)
-    return np.minimum(np.searchsorted(recording.time, instants), len(recording.time) - 1)
+    return float(begin), float(end)

@@ -10,13 +10,19 @@ from legbench.viz.live.plots import plot_specs
 from legbench.viz.live.scene import scene_view
 from legbench.viz.live.states import states_view
 from legbench.viz.live.xyplot import plot_view
+from legbench.viz.playback import WHOLE, Playback
 
 WINDOW = 4.0
 """Time that series show while a run is going on [s]."""
 
 
 def blueprint(
-    facts: Facts, *, room: tuple[float, float], live: bool = False, others: Sequence[str] = ()
+    facts: Facts,
+    *,
+    room: tuple[float, float],
+    live: bool = False,
+    others: Sequence[str] = (),
+    playback: Playback = WHOLE,
 ) -> rrb.Blueprint:
     """The layout: leg and facts, the four planes, the signals over time.
 
@@ -25,6 +31,8 @@ def blueprint(
         room: lowest and highest point that the pictures of the leg show [m].
         live: follow the newest rows and let the series slide.
         others: keys of the other runs that are shown in the same views.
+        playback: how a finished run is played; one that is to be played otherwise than usual
+            begins to play when it is opened.
     """
     plots = {name: plot_view(spec, others) for name, spec in plot_specs(facts).items()}
     pictures = [leg_view(room), scene_view(room)]
@@ -38,15 +46,26 @@ def blueprint(
         rrb.Horizontal(plots["polar"], plots["joint"]),
         rrb.Horizontal(plots["periods"], plots["phases"]),
     )
-    panels = rrb.TimePanel(
-        state="collapsed", timeline="t", play_state="following" if live else None
-    )
     right = _series(facts.run.layout.own, live)
     return rrb.Blueprint(
         rrb.Horizontal(left, middle, right, column_shares=[2, 5, 3.2]),
-        panels,
+        _time_panel(live, playback),
         collapse_panels=True,
         auto_views=False,
+    )
+
+
+def _time_panel(live: bool, playback: Playback) -> rrb.TimePanel:
+    """The time: it follows a run that goes on, and plays one as it was asked to be played."""
+    if live or playback == WHOLE:
+        play_state = "following" if live else None
+        return rrb.TimePanel(state="collapsed", timeline="t", play_state=play_state)
+    return rrb.TimePanel(
+        state="collapsed",
+        timeline="t",
+        playback_speed=playback.speed,
+        play_state="playing",
+        loop_mode="all" if playback.loop else "off",
     )
 
 

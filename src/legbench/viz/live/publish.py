@@ -19,6 +19,7 @@ from legbench.viz.live.rating_series import RatingSeries
 from legbench.viz.live.scene import ModelScene
 from legbench.viz.live.series import Series
 from legbench.viz.live.states import States
+from legbench.viz.playback import WHOLE, Playback
 from legbench.viz.trace import Tracer
 
 APPLICATION = "legbench"
@@ -36,11 +37,13 @@ class Publisher:
         *,
         live: bool = False,
         others: Sequence[Other] = (),
+        playback: Playback = WHOLE,
     ) -> None:
         self._stream = stream
         self._facts = facts
         self._live = live
         self._others = tuple(others)
+        self._playback = playback
         self._tracer = Tracer(facts)
         self._laid_out = False
         self._plots, self._rating = Plots(stream, facts), RatingSeries(stream, facts)
@@ -63,6 +66,11 @@ class Publisher:
         document = rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
         self._stream.log("/run", document, static=True)
 
+    def pass_over(self, rows: Recorded) -> None:
+        """Leave rows out that come before those that are shown; their periods count."""
+        if len(rows.time):
+            self._tracer.extend(rows)
+
     def push(self, rows: Recorded) -> None:
         """Add the rows that follow those pushed before."""
         if len(rows.time) == 0:
@@ -72,7 +80,9 @@ class Publisher:
             hip = hip_of(rows, self._facts)
             room = leg_room(self._facts, hip, live=self._live)
             keys = [other.key for other in self._others]
-            layout = blueprint(self._facts, room=room, live=self._live, others=keys)
+            layout = blueprint(
+                self._facts, room=room, live=self._live, others=keys, playback=self._playback
+            )
             self._stream.send_blueprint(layout)
             self._laid_out = True
         for section in self._sections:

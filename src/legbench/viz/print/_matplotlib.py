@@ -8,6 +8,7 @@ from legbench.errors import MissingExtraError
 
 try:
     import matplotlib as mpl
+    from matplotlib import rc_context
     from matplotlib.axes import Axes
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.cm import ScalarMappable
@@ -15,6 +16,7 @@ try:
     from matplotlib.colors import BoundaryNorm, ListedColormap
     from matplotlib.figure import Figure as PlainFigure
     from matplotlib.lines import Line2D
+    from matplotlib.patches import Rectangle
 except ImportError as error:
     raise MissingExtraError(
         "matplotlib is not installed; figures need it: pip install 'legbench[viz]'"
@@ -29,7 +31,9 @@ __all__ = [
     "LineCollection",
     "ListedColormap",
     "PlainFigure",
+    "Rectangle",
     "ScalarMappable",
+    "rc_context",
     "styled",
 ]
 

@@ -2,24 +2,15 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from legbench.metrics.analysis import analysed
 from legbench.metrics.source import Recorded
-from legbench.signals import Floats
 from legbench.viz import style
-from legbench.viz.colouring import Colouring, colouring_of
+from legbench.viz.colouring import colouring_of
 from legbench.viz.drafts import require_rows
-from legbench.viz.facts import Facts, facts_of
+from legbench.viz.facts import facts_of
 from legbench.viz.names import names_of
-from legbench.viz.print._matplotlib import (
-    Axes,
-    Figure,
-    FigureCanvasAgg,
-    LineCollection,
-    styled,
-)
-from legbench.viz.print.legend import FAINT_COLOUR, explain
+from legbench.viz.print._matplotlib import Figure, FigureCanvasAgg, styled
+from legbench.viz.print.legend import explain
 from legbench.viz.print.overlay import (
     draw_differences,
     draw_other,
@@ -27,15 +18,10 @@ from legbench.viz.print.overlay import (
 )
 from legbench.viz.print.own_signals import draw_own_signals, own_signals_of
 from legbench.viz.print.panels import panels_of, size_of
+from legbench.viz.print.planes import PLANES, draw_modes, draw_plane, widen
 
 WIDTH, WIDE = 1.3, 2.4
 """Widths of the coloured lines alone, and under the lines of another run [pt]."""
-PLANES = (
-    (style.POLAR, style.X1, style.X2),
-    (style.JOINT, style.Q1, style.Q2),
-    (style.MODAL, style.Z2, style.DZ2),
-)
-"""Title and axes of the three panels."""
 
 
 def phase_figure(recording: Recorded, against: Sequence[Recorded] = ()) -> Figure:
@@ -70,65 +56,15 @@ def phase_figure(recording: Recorded, against: Sequence[Recorded] = ()) -> Figur
             panel.set_ylabel(y.math)
             panel.locator_params(axis="x", nbins=4)
             panel.locator_params(axis="y", nbins=5)
-            _draw(panel, plane, colouring, WIDE if against else WIDTH)
+            draw_plane(panel, plane, colouring, WIDE if against else WIDTH)
         for place, other in enumerate(others):
             draw_other(panels, other, facts.run.convention, place)
         if others:
             draw_differences(rows.differences, run, others)
         draw_own_signals(rows.own, len(panels) + len(rows.differences), run, others)
-        _at_least(panels[0], style.POLAR_LEAST)
-        _draw_modes(panels[1], facts, run["joint_pos"])
+        widen(panels[0], style.POLAR_LEAST)
+        draw_modes(panels[1], facts, run["joint_pos"])
         explain(figure, panels, colouring, names_of([run, *others]) if others else [])
         title = " — ".join(filter(None, [facts.headline, colouring.ratings]))
         figure.suptitle(title, fontsize=10.5)
     return figure
-
-
-def _draw(panel: Axes, points: Floats, colouring: Colouring, width: float) -> None:
-    """The whole run faintly, the highlighted stretches over it.
-
-    Lines are pixels in vector files, which else would weigh megabytes.
-    """
-    panel.plot(*points.T, color=FAINT_COLOUR, linewidth=0.5, zorder=1, rasterized=True)
-    lines = LineCollection(
-        [points[stretch.first : stretch.stop + 1] for stretch in colouring.stretches],
-        colors=[stretch.colour for stretch in colouring.stretches],
-        linewidths=width,
-        capstyle="round",
-        zorder=3,
-        rasterized=True,
-    )
-    panel.add_collection(lines)
-    panel.margins(0.06)
-
-
-def _at_least(panel: Axes, span: float) -> None:
-    """Show a range of x no shorter than this."""
-    low, high = panel.get_xlim()
-    if high - low < span:
-        centre = 0.5 * (low + high)
-        panel.set_xlim(centre - 0.5 * span, centre + 0.5 * span)
-
-
-def _draw_modes(panel: Axes, facts: Facts, joint: Floats) -> None:
-    """w1 and w2 through the rest posture, as long as the motion is wide; equal axes."""
-    panel.set_aspect("equal", adjustable="datalim")
-    low, high = joint.min(axis=0), joint.max(axis=0)
-    centre = 0.5 * (low + high) if facts.rest is None else np.array(facts.rest)
-    reach = 0.62 * float((high - low).max())
-    for name, colour, arm in (
-        ("$w_1$", style.MODE_1, np.array([1.0, 1.0])),
-        ("$w_2$", style.MODE_2, np.array([1.0, -1.0])),
-    ):
-        ends = np.stack([centre - reach * arm, centre + reach * arm])
-        panel.plot(
-            *ends.T, color=style.unit(colour), linewidth=1.1, linestyle=(0, (5, 2)), zorder=2
-        )
-        panel.annotate(
-            name,
-            (float(ends[1, 0]), float(ends[1, 1])),
-            xytext=(2, 0),
-            textcoords="offset points",
-            color=style.unit(colour),
-            va="center",
-        )

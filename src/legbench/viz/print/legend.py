@@ -15,8 +15,8 @@ from legbench.viz.print._matplotlib import (
     ScalarMappable,
 )
 from legbench.viz.print.overlay import look_of
+from legbench.viz.print.planes import FAINT
 
-FAINT_COLOUR = (0.80, 0.80, 0.82)
 HANDLE, ROW = 8, 150
 """Widths of a legend's line and of its widest row [characters]."""
 
@@ -31,12 +31,12 @@ def explain(
     elif colouring.stretches:
         known = (("stance", style.STANCE), ("flight", style.FLIGHT))
         lines = [Line2D([], [], color=style.unit(colour), label=name) for name, colour in known]
-        lines.append(Line2D([], [], color=FAINT_COLOUR, label="earlier"))
+        lines.append(Line2D([], [], color=FAINT, label="earlier"))
     if names:
         own = Line2D([], [], linestyle="none", label=f"{names[0]}:")
         if not lines:
             shown = colouring.stretches
-            colour = shown[len(shown) // 2].colour if shown else FAINT_COLOUR
+            colour = shown[len(shown) // 2].colour if shown else FAINT
             own = Line2D([], [], color=colour, label=names[0])
         lines = [own, *lines, *_others(names[1:])]
     if lines:

@@ -5,6 +5,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from legbench.modes.branches import Branch
 from legbench.modes.family import Family
@@ -101,6 +102,28 @@ def _explain(axes: Axes, families: Sequence[Family], branched: bool) -> None:
     )
 
 
+def _curves_of_energy(
+    axes: Axes, scene: Scene, families: Sequence[Family], reach: float
+) -> NDArray[np.float64]:
+    """Draw curves of equal energy, and return points of the outermost one's inside (n, 2) [rad].
+
+    All of it is shown, as far as it closes within twice the reach of the orbits around the rest.
+    """
+    highest = max(found.energy for family in families for found in family.orbits)
+    q1, q2 = (middle + np.linspace(-2.0 * reach, 2.0 * reach, 240) for middle in scene.rest)
+    grid = np.stack(np.meshgrid(q1, q2), axis=-1)
+    potential = scene.potential(grid)
+    axes.contour(
+        q1,
+        q2,
+        potential,
+        levels=np.linspace(0.0, highest, 6)[1:],
+        colors="#cccccc",
+        linewidths=0.7,
+    )
+    return grid[potential <= highest]
+
+
 def _joint_space(axes: Axes, scene: Scene, families: Sequence[Family]) -> None:
     rest, ends = np.asarray(scene.rest), [np.asarray([scene.rest])]
     for family in families:
@@ -116,20 +139,7 @@ def _joint_space(axes: Axes, scene: Scene, families: Sequence[Family]) -> None:
         ends.append(generator)
     points = np.vstack(ends)
     reach = float(np.max(np.abs(points - rest)))
-    highest = max(found.energy for family in families for found in family.orbits)
-    q1, q2 = (middle + np.linspace(-2.0 * reach, 2.0 * reach, 240) for middle in rest)
-    grid = np.stack(np.meshgrid(q1, q2), axis=-1)
-    potential = scene.potential(grid)
-    axes.contour(
-        q1,
-        q2,
-        potential,
-        levels=np.linspace(0.0, highest, 6)[1:],
-        colors="#cccccc",
-        linewidths=0.7,
-    )
-    # All of the outermost curve is shown, as far as it closes around the rest.
-    points = np.vstack([points, grid[potential <= highest]])
+    points = np.vstack([points, _curves_of_energy(axes, scene, families, reach)])
     low, high = points.min(axis=0) - 0.05, points.max(axis=0) + 0.05
     for sign in (-1.0, 1.0):
         line = rest + reach * np.array([[sign, -1.0], [-sign, 1.0]])

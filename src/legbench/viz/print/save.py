@@ -1,5 +1,6 @@
 """Saving of print figures as files."""
 
+from io import StringIO
 from pathlib import Path
 
 from legbench.errors import ConfigError
@@ -36,3 +37,11 @@ def save_figure(figure: PlainFigure, path: Path, dpi: int = DPI) -> Path:
     with draft_of(path) as draft, styled():
         figure.savefig(draft, format=kind[1:], dpi=dpi, metadata=undated[kind])
     return path
+
+
+def svg_text(figure: PlainFigure) -> str:
+    """A figure as the text of an SVG on no ground and without metadata; in the style around it."""
+    unsigned = {"Date": None, "Creator": None, "Format": None, "Type": None}
+    with StringIO() as stream:
+        figure.savefig(stream, format="svg", transparent=True, metadata=unsigned)
+        return stream.getvalue()
