@@ -9,6 +9,7 @@ from typing import ClassVar, Final, final
 
 import numpy as np
 
+from legbench.choices import choose
 from legbench.control.abstract import AbstractController
 from legbench.control.per_leg import check_delays, each_config, setting
 from legbench.control.setpoint import LegTargets
@@ -94,6 +95,9 @@ class ChirpConfig:
     """Duration of the sweep, after which the set point is held [s]."""
     delay: float = 0.1
     """Time at rest before the sweep [s]."""
+
+    def __post_init__(self) -> None:
+        choose(self, coordinate=ChirpCoordinate, wave=ChirpWave)
 
     def build(self, targets: LegTargets) -> AbstractController:
         """Make the controller for these legs; raises ConfigError where they refuse the settings."""
