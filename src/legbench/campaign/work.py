@@ -24,8 +24,8 @@ Stop = Callable[[], bool]
 class StoppedError(CampaignError):
     """Error of a work that was given up because somebody asked; nothing of it is kept."""
 
-    def __init__(self) -> None:
-        super().__init__("the work was given up as asked")
+    def __init__(self, message: str = "the work was given up as asked") -> None:
+        super().__init__(message)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,7 +73,8 @@ def do_work(work: Work, *, threads: int | None = 1, stop: Stop | None = None) ->
     run = _together if work.together else _alone
     for place, recording in enumerate(run(experiments, threads, asked)):
         if work.records is not None:
-            write_record(recording, work.records, work.hashes[place])
+            tables = work.experiments[place]
+            write_record(recording, work.records, work.hashes[place], tables)
         rows += measured_rows(recording, work.hashes[place])
     return shard_bytes(work.name, rows)
 

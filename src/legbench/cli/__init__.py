@@ -14,6 +14,9 @@ COMMANDS = {
     "run": "run a controller on a leg and record it",
     "replay": "rate and show a recorded run again",
     "recover": "repair a run that was cut off",
+    "compare": "put recorded runs side by side, aligned by event",
+    "runs": "list, filter and sort recorded runs",
+    "export": "write a recorded run as CSV, Parquet, MAT or MCAP",
     "model": "write or view the MuJoCo model of a design",
     "render": "make a video or a picture of a recorded run",
     "design": "find a leg that meets requirements and modal matching",
@@ -23,6 +26,7 @@ COMMANDS = {
     "hop": "apex return map, periodic hops and basin of a leg",
     "campaign": "run a grid of experiments, and make one table of it",
     "report": "a campaign beside the paper, on one page and in figures",
+    "identify": "parameters of a leg from recorded runs",
     "drives": "commission the servo drives, or emulate them",
 }
 """Command -> one line of help; the module is `legbench.cli.<command>` with `main(arguments)`."""

@@ -66,6 +66,19 @@ class Publisher:
         document = rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
         self._stream.log("/run", document, static=True)
 
+    def lay_out(self, rows: Recorded) -> None:
+        """Send the layout once, with views that have room for these rows."""
+        if self._laid_out:
+            return
+        hip = hip_of(rows, self._facts)
+        room = leg_room(self._facts, hip, live=self._live)
+        keys = [other.key for other in self._others]
+        layout = blueprint(
+            self._facts, room=room, live=self._live, others=keys, playback=self._playback
+        )
+        self._stream.send_blueprint(layout)
+        self._laid_out = True
+
     def pass_over(self, rows: Recorded) -> None:
         """Leave rows out that come before those that are shown; their periods count."""
         if len(rows.time):
@@ -76,15 +89,7 @@ class Publisher:
         if len(rows.time) == 0:
             return
         trace = self._tracer.extend(rows)
-        if not self._laid_out:
-            hip = hip_of(rows, self._facts)
-            room = leg_room(self._facts, hip, live=self._live)
-            keys = [other.key for other in self._others]
-            layout = blueprint(
-                self._facts, room=room, live=self._live, others=keys, playback=self._playback
-            )
-            self._stream.send_blueprint(layout)
-            self._laid_out = True
+        self.lay_out(rows)
         for section in self._sections:
             section.push(trace)
 
