@@ -195,5 +195,26 @@ drives check --eds | 2 | Missing value for argument '--eds'. Expected 1 values
 drives reset extra | 2 | Unrecognized options: extra
 drives store --bus | 2 | Missing value for argument '--bus'. Expected 1 values
 drives frobnicate | 2 | Unrecognized options: frobnicate
+compare | 2 | one run has nothing to be compared with
+compare RUN | 2 | one run has nothing to be compared with
+compare RUN RUN --align moon | 2 | invalid choice 'moon' for argument '--align'
+compare RUN RUN --align action | 1 | has 0 events of kind action
+compare RUN RUN --span nan | 2 | --span is nan s
+compare RUN RUN --span -1 | 2 | --span is -1 s
+compare RUN RUN --figure out.xyz | 1 | a figure cannot be written as 'out.xyz'
+runs nowhere | 1 | cannot list runs in nowhere
+runs RUNS --where nonsense | 1 | no run has a figure or setting 'nonsense'
+runs RUNS --where nosuch>3 | 1 | no run has a figure or setting 'nosuch'
+runs RUNS --sort nosuch | 1 | no run has a figure or setting 'nosuch'
+runs RUNS --columns nosuch | 1 | no run has a figure or setting 'nosuch'
+export RUN | 2 | no format was chosen
+export RUN --csv --mat | 2 | one file has one format
+identify | 1 | no run to learn from
+identify RUN | 1 | is in setup 'jump', where the foot lifts off
+identify RUN --free nonsense | 1 | no parameter is called 'nonsense'
+identify RUN --noise-deg nan | 1 | noise_deg is nan deg
+identify RUN --noise-deg -1 | 1 | noise_deg is -1 deg
+identify RUN --peer nobody | 2 | invalid choice 'nobody' for argument '--peer'
+identify RUN --held-out nowhere | 1 | nowhere does not exist
 """
 """A line an input: words, exit status, part of the message."""
