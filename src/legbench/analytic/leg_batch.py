@@ -57,7 +57,7 @@ class Friction:
 
 
 @final
-class Lanes:
+class LegBatch:
     """Batch of held legs that move in step, without joint stops and events.
 
     A guide brakes the trunk of each leg over its pinned foot, forward and upward [N s/m].
