@@ -10,9 +10,11 @@ from typing import final
 from legbench.metrics.source import Recorded
 from legbench.metrics.summary import Summary
 from legbench.viz.facts import Facts, as_markdown
+from legbench.viz.force_axis import force_axis, live_force_axis
 from legbench.viz.live._rerun import rr
 from legbench.viz.live.blueprint import blueprint
 from legbench.viz.live.ghost import Ghost, Other
+from legbench.viz.live.key import log_state_key
 from legbench.viz.live.leg2d import Leg2D, hip_of, leg_room
 from legbench.viz.live.plots import Plots
 from legbench.viz.live.rating_series import RatingSeries
@@ -55,6 +57,7 @@ class Publisher:
             Series(stream, facts),
             self._rating,
         )
+        log_state_key(stream, facts)
         self.describe(facts)
 
     def describe(self, facts: Facts, summary: Summary | None = None) -> None:
@@ -80,8 +83,20 @@ class Publisher:
             hip = hip_of(rows, self._facts)
             room = leg_room(self._facts, hip, live=self._live)
             keys = [other.key for other in self._others]
+            mass = self._facts.run.design.total_mass
+            force = (
+                live_force_axis(mass)
+                if self._live
+                else force_axis(trace.rows["contact_force"], trace.stance)
+            )
             layout = blueprint(
-                self._facts, room=room, live=self._live, others=keys, playback=self._playback
+                self._facts,
+                room=room,
+                span=(float(trace.time[0]), float(trace.time[-1])),
+                force=force,
+                live=self._live,
+                others=keys,
+                playback=self._playback,
             )
             self._stream.send_blueprint(layout)
             self._laid_out = True
