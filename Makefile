@@ -1,5 +1,5 @@
 .DEFAULT_GOAL := help
-.PHONY: help setup jump dist test test-engine test-socketcan check bench mutants models clean
+.PHONY: help setup jump dist test test-engine test-readers test-socketcan check bench mutants models clean
 
 # The first of these that is new enough; another one by make PYTHON=...
 PYTHON ?= $(shell for name in python3 python3.14 python3.13 python3.12 python3.11; do \
@@ -40,6 +40,14 @@ test-engine: $(STAMP) ## the tests against Pinocchio, which is installed for the
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[pinocchio]'
 	$(BIN)/pytest tests/analytic/test_against_pinocchio.py
 
+.venv-readers/.installed:
+	$(PYTHON) -m venv .venv-readers
+	.venv-readers/bin/python -m pip install --quiet --disable-pip-version-check pandas pyarrow polars duckdb fastparquet
+	@touch $@
+
+test-readers: $(STAMP) .venv-readers/.installed ## pandas, polars, DuckDB and fastparquet read what is exported
+	$(BIN)/python scripts/check_readers.py .venv-readers/bin/python
+
 test-socketcan: $(STAMP) ## a run over vcan in a QEMU guest at 1 kHz, in virtual time; about 15 minutes
 	$(BIN)/python scripts/socketcan/guest.py 'sh $(CURDIR)/scripts/socketcan/all.sh'
 
@@ -59,4 +67,4 @@ models: $(STAMP) ## rewrite the golden MJCF files of models/
 	  $(BIN)/legbench model --design "$$design" --out "$${design%.toml}.xml"; done
 
 clean: ## remove .venv and generated stubs, keep runs/
-	rm -rf .venv typings
+	rm -rf .venv .venv-readers typings

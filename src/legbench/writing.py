@@ -2,10 +2,11 @@
 
 import errno
 import os
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from legbench.errors import ConfigError
+from legbench.errors import ConfigError, RecordingError
 
 
 def reason(error: Exception) -> str:
@@ -59,3 +60,31 @@ def save_whole(path: Path, content: str) -> None:
         raise ConfigError(
             f"cannot write {path}: {reason(error)}; name a file that you can write"
         ) from None
+
+
+@contextmanager
+def draft_of(path: Path) -> Iterator[Path]:
+    """Yield a draft file with `path`'s suffix, which replaces `path` if no exception is raised.
+
+    The folder is made if need be.
+
+    Raises:
+        RecordingError: nothing can be written there.
+    """
+    draft = path.with_name(f".{path.stem}.draft{path.suffix}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # The draft is made anew: whatever lies there, such as a link, is not written through.
+        draft.unlink(missing_ok=True)
+        draft.touch(exist_ok=False)
+    except OSError as error:
+        raise RecordingError(f"cannot write {path}: {reason(error)}") from error
+    try:
+        yield draft
+        put_in_place(draft, path)
+    except RecordingError:
+        raise
+    except OSError as error:
+        raise RecordingError(f"cannot write {path}: {reason(error)}") from error
+    finally:
+        draft.unlink(missing_ok=True)

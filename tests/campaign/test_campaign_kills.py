@@ -102,6 +102,10 @@ def test_a_shard_whose_worker_dies_is_run_again_then_named(
     assert set(notes) == {"a worker died; shards that were running and are run again: 1"}
 
 
+NOBODY: Any = None
+"""State of a worker that nobody looks at."""
+
+
 class Workers:
     """Stands for Dask's client: some shards kill their worker, once or always."""
 
@@ -122,7 +126,7 @@ class Workers:
         future: Future[bytes] = Future()
         self.deaths[work.name] = self.deaths.get(work.name, 0) - 1
         if self.deaths[work.name] >= 0:
-            future.set_exception(KilledWorker(work.name, None, 0))
+            future.set_exception(KilledWorker(work.name, NOBODY, 0))
         else:
             future.set_result(work.name.encode())
         return future

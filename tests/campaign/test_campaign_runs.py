@@ -185,12 +185,25 @@ def test_recordings_are_run_folders(tmp_path: Path) -> None:
     assert found.torn is None
     for name in alone.columns.keys() - {"cycle_us", "late_us"}:
         assert found.columns[name].tobytes() == alone.columns[name].tobytes(), name
+    assert not found["cycle_us"].any()
     assert found.events == alone.events
     assert legbench.Experiment.from_run(found.path) == each.experiment
     # Recordings that are asked for later are made later.
     shutil.rmtree(found.path)
     run_campaign(plan, tmp_path / "out", SerialExecutor(1), shards_of(plan), records=True)
     assert found.path.is_dir()
+
+
+def test_controllers_of_one_s_own_are_found_wherever_they_are_run(tmp_path: Path) -> None:
+    sine = Path(__file__).parents[1] / "control" / "guests" / "sine.py"
+    kind = f'"{sine}:Sine"'
+    text = BASE.replace('"position-jump"', kind).replace("controller.settings.delay = 0.02\n", "")
+    plan = planned(tmp_path, text + "[grid]\ncontroller.settings.freq = [2.0, 3.0]\n")
+    run_campaign(plan, tmp_path / "out", SerialExecutor(1), shards_of(plan), records=True)
+    for each in plan.planned:
+        kept = tmp_path / "out" / "records" / each.hash
+        assert legbench.Experiment.from_run(kept) == each.experiment
+        assert legbench.load(kept)["swing"].any()
 
 
 def test_a_leg_that_faults_is_in_the_table_and_the_others_are_as_without_it(

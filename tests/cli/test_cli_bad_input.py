@@ -200,9 +200,9 @@ def test_a_disk_that_is_full_from_the_start(
 
 
 def test_a_run_that_is_not_there(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    for command in ("replay", "recover", "render"):
-        called(capfd, command, tmp_path / "none").refused(str(tmp_path / "none"))
-        called(capfd, command, tmp_path).refused(str(tmp_path))
+    for command in (("replay",), ("recover",), ("render",), ("export", "--csv")):
+        called(capfd, *command, tmp_path / "none").refused(str(tmp_path / "none"))
+        called(capfd, *command, tmp_path).refused(str(tmp_path))
     assert list(tmp_path.iterdir()) == []
 
 
@@ -215,8 +215,8 @@ def test_a_run_of_a_newer_format(
     manifest |= {"format": 99, "legbench": "9.9"}
     (run / "run.json").write_text(json.dumps(manifest))
     before = sorted((path.name, path.read_bytes()) for path in run.iterdir())
-    for command in ("replay", "recover", "render"):
-        called(capfd, command, run).refused("format 99", "newer legbench (9.9)", "upgrade")
+    for command in (("replay",), ("recover",), ("render",), ("export", "--csv")):
+        called(capfd, *command, run).refused("format 99", "newer legbench (9.9)", "upgrade")
     assert sorted((path.name, path.read_bytes()) for path in run.iterdir()) == before
 
 

@@ -1,14 +1,19 @@
+import subprocess
 import sys
-from importlib import import_module
 
 import pytest
 
-from legbench.errors import MissingExtraError
 
-
-def test_a_missing_jinja2_is_told_with_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:
-    door = "legbench.report._jinja2"
-    monkeypatch.delitem(sys.modules, door, raising=False)
-    monkeypatch.setitem(sys.modules, "jinja2", None)
-    with pytest.raises(MissingExtraError, match=r"pip install 'legbench\[report\]'"):
-        import_module(door)
+@pytest.mark.parametrize("absent", [["jinja2"], ["jinja2", "matplotlib"]])
+def test_missing_libraries_are_told_with_the_extra_that_has_all_of_them(absent: list[str]) -> None:
+    code = f"""
+import sys
+sys.modules.update(dict.fromkeys({absent}))
+from legbench.cli import main
+raise SystemExit(main(["report", "nowhere"]))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr.startswith("legbench: jinja2 is not installed; a report needs it: ")
+    assert "pip install 'legbench[report]'" in done.stderr
+    assert done.stderr.count("\n") == 1

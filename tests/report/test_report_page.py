@@ -196,3 +196,15 @@ def test_a_folder_without_a_table_is_one_line(
     assert told.err.startswith(f"legbench: {tmp_path / 'table.parquet'} is not there")
     assert told.err.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_page_that_cannot_be_written_is_refused_at_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = synthetic(tmp_path / "table")
+    (tmp_path / "file").write_text("")
+    monkeypatch.setattr("legbench.report.writing.write_report", None)
+    assert main(["report", str(folder), "--out", str(tmp_path / "file" / "report.html")]) == 1
+    told = capsys.readouterr()
+    assert told.err.startswith(f"legbench: cannot write {tmp_path / 'file'}")
+    assert told.err.count("\n") == 1

@@ -181,7 +181,7 @@ def test_what_the_control_process_imports_is_light() -> None:
 MISSING = {
     "rerun": ("live.rrd", "viz"),
     "matplotlib": ("print.figures", "viz"),
-    "imageio": ("film.render", "render"),
+    "av": ("film.render", "render"),
     "OpenGL": ("film.offscreen", "render"),
 }
 """Package that may not be installed -> the module that needs it, and the extra that brings it."""

@@ -71,11 +71,7 @@ def run_on_bench(
     """
     if not 0.0 <= pause < 3600.0:
         raise ConfigError(f"pause is {pause:g} s; it must be 0 to 3600 s")
-    for each in plan.planned:
-        _choice(each)
-    asked, say = stop or StopFlag(), note if note is not None else _silent
-    places = {each.hash: place for place, each in enumerate(plan.planned)}
-    shards = sorted(shards_of(plan, 1), key=lambda shard: places[shard.planned[0].hash])
+    asked, say, shards = stop or StopFlag(), note or _silent, _in_order(plan)
     with open_folder(folder, plan):
         missing = [shard for shard in shards if not is_done(folder, shard)]
         done, failure = len(shards) - len(missing), None
@@ -91,6 +87,14 @@ def run_on_bench(
                 took = (time.monotonic() - began) / (place + 1)
                 progress(done, len(shards), took * (len(missing) - place - 1))
         return finished_of(plan, folder, shards, shards, () if failure is None else (failure,))
+
+
+def _in_order(plan: Plan) -> list[Shard]:
+    """Shards of one experiment each in the order of the file; raises ConfigError."""
+    for each in plan.planned:
+        _choice(each)
+    places = {each.hash: place for place, each in enumerate(plan.planned)}
+    return sorted(shards_of(plan, 1), key=lambda shard: places[shard.planned[0].hash])
 
 
 def _silent(_line: str) -> None:
@@ -111,7 +115,7 @@ def _run_one(shard: Shard, folder: Path, stop: StopFlag, note: Note) -> str | No
     where = f"{planned.block}, cell {planned.cell}, trial {planned.trial}"
     choice = _choice(planned)
     try:
-        with open_session(load_bus(choice.bus), choice, leads=False) as session:
+        with open_session(load_bus(choice.bus_file), choice, leads=False) as session:
             troubles = drive_troubles(session)
         if troubles:
             return f"{where}: before the run {'; '.join(troubles)}; see to it and call again"

@@ -17,7 +17,7 @@ def moves_drives(experiment: Experiment) -> bool:
     if experiment.plant.kind != "can":
         return False
     choice: Any = experiment.plant
-    return not choice.is_virtual(load_bus(choice.bus))
+    return not choice.is_virtual(load_bus(choice.bus_file))
 
 
 def refuse_drives(plan: Plan) -> None:

@@ -1,16 +1,15 @@
 """Folder of a campaign: whose it is, who works in it, and which shards are there."""
 
-import fcntl
 import json
-import os
 import shutil
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, Final
 
 from legbench.campaign.again import CAMPAIGN, EXAMPLES, examples_of
 from legbench.campaign.data import Settings
+from legbench.campaign.locks import locked
 from legbench.campaign.plan import Plan
 from legbench.campaign.provenance import provenance
 from legbench.campaign.records import RECORDS
@@ -46,14 +45,14 @@ def open_folder(folder: Path, plan: Plan, part: Part | None = None) -> Iterator[
     """
     with _told(folder):
         (folder / SHARDS).mkdir(parents=True, exist_ok=True)
-    with _locked(folder / LOCK, folder, shared=part is not None):
+    with _alone(folder / LOCK, folder, shared=part is not None):
         if part is None:
             _clean(folder)
             _begin(folder, plan)
             yield
             return
         number, count = part
-        with _locked(folder / f"{LOCK}-{number}-of-{count}", folder, shared=False):
+        with _alone(folder / f"{LOCK}-{number}-of-{count}", folder, shared=False):
             with one_at_a_time(folder):
                 _begin(folder, plan)
             yield
@@ -62,8 +61,7 @@ def open_folder(folder: Path, plan: Plan, part: Part | None = None) -> Iterator[
 @contextmanager
 def one_at_a_time(folder: Path) -> Iterator[None]:
     """Keep callers with other parts from writing what all of them share at the same time."""
-    with (folder / f"{LOCK}-shared").open("ab") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
+    with locked(folder / f"{LOCK}-shared", wait=True):
         yield
 
 
@@ -86,20 +84,20 @@ def write_into(path: Path, content: bytes) -> None:
 
 
 @contextmanager
-def _locked(path: Path, folder: Path, *, shared: bool) -> Iterator[None]:
-    with _told(folder):
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
-    try:
+def _alone(path: Path, folder: Path, *, shared: bool) -> Iterator[None]:
+    """Hold a lock of the folder; raises CampaignError where somebody else holds it."""
+    with ExitStack() as stack:
         try:
-            fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
-        except BlockingIOError:
+            with _told(folder):
+                stack.enter_context(locked(path, shared=shared))
+        except CampaignError as error:
+            if not isinstance(error.__cause__, BlockingIOError):
+                raise
             raise CampaignError(
                 f"another campaign works in {folder}: wait for it, name another --out, or give "
                 "each of several callers its part with --shard"
             ) from None
         yield
-    finally:
-        os.close(descriptor)
 
 
 def _clean(folder: Path) -> None:

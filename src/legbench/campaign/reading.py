@@ -11,6 +11,7 @@ from legbench.experiment.files import load_experiment
 from legbench.experiment.reading import Reader, joined
 from legbench.experiment.tables import FORMAT, read_toml, write_tables
 from legbench.reading import UnreadableError, parse_toml, read_file
+from legbench.shipped import locate
 
 CAMPAIGN_FORMAT: Final = 1
 """Version of campaign files; it rises when an older reader would misunderstand one."""
@@ -26,7 +27,7 @@ def load_campaign(path: Path | str, changes: Settings | None = None) -> Campaign
     """Read a campaign file.
 
     Args:
-        path: the file.
+        path: the file; one that comes with the package is found from any folder.
         changes: settings that replace those of every cell, by dotted key, as from the command line.
 
     Raises:
@@ -34,7 +35,7 @@ def load_campaign(path: Path | str, changes: Settings | None = None) -> Campaign
             of it is told, each with its dotted key. What single cells make of their experiments is
             told by `plan_campaign`.
     """
-    path = Path(path)
+    path = locate(Path(path))
     try:
         source = read_file(path, LARGEST_FILE)
         tables = parse_toml(source)

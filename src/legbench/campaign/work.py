@@ -73,7 +73,8 @@ def do_work(work: Work, *, threads: int | None = 1, stop: Stop | None = None) ->
     run = _together if work.together else _alone
     for place, recording in enumerate(run(experiments, threads, asked)):
         if work.records is not None:
-            write_record(recording, work.records, work.hashes[place])
+            tables = work.experiments[place]
+            write_record(recording, work.records, work.hashes[place], tables)
         rows += measured_rows(recording, work.hashes[place])
     return shard_bytes(work.name, rows)
 

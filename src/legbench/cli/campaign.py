@@ -116,6 +116,7 @@ def _part(text: str | None) -> tuple[int, int] | None:
 def _changes(flags: CampaignArguments) -> dict[str, Any]:
     """Settings of every cell that flags replace; raises ConfigError."""
     from legbench.experiment.overrides import parse_setting
+    from legbench.plants import CanChoice
 
     changes = dict(parse_setting(text) for text in flags.set)
     if flags.plant is not None:
@@ -123,7 +124,9 @@ def _changes(flags: CampaignArguments) -> dict[str, Any]:
             raise ConfigError(
                 "a bench runs one experiment after another: leave --shard and --executor out"
             )
-        changes |= {"plant.kind": flags.plant, "plant.settings.bus": str(flags.bus.resolve())}
+        # Relative to here, not to the campaign's file; emulated drives may take the package's own.
+        bus = CanChoice(bus=flags.bus, interface=flags.interface).bus_file
+        changes |= {"plant.kind": flags.plant, "plant.settings.bus": str(bus.resolve())}
         for name in ("interface", "channel"):
             if getattr(flags, name) is not None:
                 changes[f"plant.settings.{name}"] = getattr(flags, name)

@@ -54,8 +54,14 @@ def parse(
             )
     except SystemExit as end:
         if end.code == WRONG_USAGE:
-            report_error(f"{_in_a_line(told.getvalue())}; see legbench {command} --help")
+            wrong_usage(command, _in_a_line(told.getvalue()))
         raise
+
+
+def wrong_usage(command: str, message: str) -> int:
+    """Say what makes no sense of a command's flags together; returns the exit status for it."""
+    report_error(f"{message}; see legbench {command} --help")
+    return WRONG_USAGE
 
 
 def _in_a_line(box: str) -> str:

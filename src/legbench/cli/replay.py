@@ -8,7 +8,7 @@ from legbench.cli.replay_again import Again, print_again, replayed
 from legbench.cli.replay_arguments import ReplayArguments
 from legbench.cli.replay_source import loaded, source_of
 from legbench.cli.table import print_comparison, print_summary
-from legbench.metrics import Analysis, Comparison, compare, summarise
+from legbench.metrics import Analysis, Comparison, Summary, compare, summarise
 from legbench.recording.reader import Recording
 
 SHOWN = 4
@@ -45,7 +45,9 @@ def main(arguments: list[str]) -> int:
         if again is not None:
             print_again(again)
     if chosen.rrd is not None or chosen.view or chosen.serve:
-        show(recording, others, chosen)
+        # Signals that were read for the figures make room for those that are shown.
+        del run, against
+        show(recording, others, chosen, summary)
     if chosen.mujoco:
         from legbench.viz.live.mujoco_viewer import play_run
 
@@ -82,7 +84,9 @@ def _draw(
     note(f"wrote {save_figure(figure, chosen.figure)}")
 
 
-def show(recording: Recording, others: list[Recording], chosen: ReplayArguments) -> None:
+def show(
+    recording: Recording, others: list[Recording], chosen: ReplayArguments, summary: Summary
+) -> None:
     """Write the rerun file, and open it where that was asked for."""
     from legbench.viz.live.rrd import write_rrd
     from legbench.viz.live.viewer import open_viewer
@@ -90,7 +94,7 @@ def show(recording: Recording, others: list[Recording], chosen: ReplayArguments)
     path = recording.path
     beside = path / "view.rrd" if path.is_dir() else path.with_suffix(".rrd")
     playback = chosen.playback.playback
-    rrd = write_rrd(recording, chosen.rrd or beside, others, playback)
+    rrd = write_rrd(recording, chosen.rrd or beside, others, playback, summary=summary)
     note(f"wrote {rrd}")
     if not (chosen.view or chosen.serve):
         return

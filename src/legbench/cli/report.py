@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from tyro.conf import Positional
 
-from legbench.cli.output import note, print_json, progress
+from legbench.cli.output import note, print_json, progress, results_in
 from legbench.cli.parse import parse
 
 MARKS = {True: "held", False: "not held", None: "not shown"}
@@ -39,7 +39,8 @@ def main(arguments: list[str]) -> int:
     folders = ((IDEAL, flags.campaign), (EXPLAINED, flags.explained), (BENCH, flags.bench))
     sources = [read_source(name, folder) for name, folder in folders if folder is not None]
     out = flags.campaign / "report.html" if flags.out is None else flags.out
-    written = write_report(sources, out, suffixes=flags.figures, progress=progress)
+    with results_in(out.parent):
+        written = write_report(sources, out, suffixes=flags.figures, progress=progress)
     if flags.json:
         print_json(written.content)
         return 0

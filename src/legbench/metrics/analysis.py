@@ -2,7 +2,7 @@
 
 from functools import cached_property
 from pathlib import Path
-from typing import Any, final
+from typing import Any, Final, final
 
 from numpy.typing import NDArray
 
@@ -19,10 +19,16 @@ from legbench.metrics.stance import states_of
 from legbench.recording.description import RunDescription
 from legbench.signals import Floats, Ints
 
+KEPT_BYTES: Final = 1 << 28
+"""Signals that are kept together at most [bytes]: all of a run of twenty minutes at 1 kHz; those
+of a longer one are read again when they have not been asked for in a while."""
+
 
 @final
 class Analysis:
     """A recorded run that is measured; itself `Recorded`, with signals that are read once.
+
+    What is kept of a long run is bounded by `KEPT_BYTES`.
 
     Attributes:
         description: what the run says of itself.
@@ -47,12 +53,20 @@ class Analysis:
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         """Rows of the signal `name`, read-only; raises as the recording does."""
-        found = self._signals.get(name)
+        found = self._signals.pop(name, None)
         if found is None:
             found = self._recording[name]
             found.flags.writeable = False
-            self._signals[name] = found
+            self._make_room(found.nbytes)
+        # Last in order is what was asked for last.
+        self._signals[name] = found
         return found
+
+    def _make_room(self, size: int) -> None:
+        """Forget the signals that have not been asked for the longest."""
+        kept = sum(each.nbytes for each in self._signals.values())
+        while self._signals and kept + size > KEPT_BYTES:
+            kept -= self._signals.pop(next(iter(self._signals))).nbytes
 
     @cached_property
     def first_action(self) -> int:
@@ -77,7 +91,8 @@ class Analysis:
     @cached_property
     def periods(self) -> Periods:
         """Oscillation periods that count in the rating."""
-        return find_periods(self.trajectory, self.first_action, self.description.counting)
+        # What a long run's coordinates take is given back: they are not asked for again.
+        return find_periods(trajectory(self), self.first_action, self.description.counting)
 
     @cached_property
     def ratings(self) -> RunRatings:

@@ -40,22 +40,25 @@ def energy_budget(recording: Recorded, gait: Gait, flows: Flows) -> EnergyBudget
     impact, stance = _stance_intervals(recording.time, gait)
     stop = stop_intervals(recording) & ~impact
     stance &= ~(impact | stop)
-    total = {
-        "gain": flows.gain,
-        "motor_work": flows.motor_work,
-        "damper_loss": flows.damper_loss,
-        "impact_loss": np.where(impact, -flows.unexplained, 0.0),
-        "stop_loss": np.where(stop, -flows.unexplained, 0.0),
-        "contact_loss": np.where(stance, -flows.unexplained, 0.0),
-        "other_loss": np.where(impact | stop | stance, 0.0, -flows.unexplained),
-    }
+    rest = ~(impact | stop | stance)
     low = np.searchsorted(recording.time, gait.jumps.start)
     high = np.searchsorted(recording.time, gait.jumps.end)
-    sums = {}
-    for name, flow in total.items():
-        running = np.concatenate([[0.0], np.cumsum(flow)])
-        sums[name] = running[high] - running[low]
-    return EnergyBudget(**sums)
+
+    def each_jump(flow: Floats, counts: Bools | None = None) -> Floats:
+        """Sum of a flow over each jump, or the loss in the intervals that count."""
+        lost = flow if counts is None else np.where(counts, -flow, 0.0)
+        running = np.concatenate([[0.0], np.cumsum(lost)])
+        return running[high] - running[low]
+
+    return EnergyBudget(
+        gain=each_jump(flows.gain),
+        motor_work=each_jump(flows.motor_work),
+        damper_loss=each_jump(flows.damper_loss),
+        impact_loss=each_jump(flows.unexplained, impact),
+        stop_loss=each_jump(flows.unexplained, stop),
+        contact_loss=each_jump(flows.unexplained, stance),
+        other_loss=each_jump(flows.unexplained, rest),
+    )
 
 
 def _stance_intervals(time: Floats, gait: Gait) -> tuple[Bools, Bools]:

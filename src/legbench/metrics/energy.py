@@ -9,6 +9,7 @@ from legbench.metrics.built import built_of
 from legbench.metrics.changes import changes
 from legbench.metrics.rows import runs_of
 from legbench.metrics.source import Recorded
+from legbench.metrics.window import WINDOW_ROWS, RowWindow, spans
 from legbench.signals import Bools, Floats
 
 STOP_MARGIN = 0.02
@@ -39,11 +40,28 @@ class Flows:
     """Unexplained rest: contact, impact, stops, and what the numerics make or lose."""
 
 
-def energy_flows(recording: Recorded) -> Flows:
+def energy_flows(recording: Recorded, rows: int = WINDOW_ROWS) -> Flows:
     """Split the change of energy over each interval into work, loss and the unexplained.
 
     The leg is the one that was built, with the imperfections that the run says it had.
+
+    Args:
+        recording: the run.
+        rows: number of rows to work on at once.
     """
+    last = len(recording.time) - 1
+    names, parts = tuple(Flows.__dataclass_fields__), []
+    for first, stop in spans(last, rows):
+        # An interval's integral asks for the rows around it: one before, two after.
+        low, high = max(first - 1, 0), min(stop + 2, last + 1)
+        part = _flows(RowWindow(recording, low, high))
+        inside = slice(first - low, first - low + stop - first)
+        parts.append([getattr(part, name)[inside] for name in names])
+    joined = map(np.concatenate, zip(*parts, strict=True))
+    return Flows(**dict(zip(names, joined, strict=True)))
+
+
+def _flows(recording: Recorded) -> Flows:
     built = built_of(recording)
     motor, joint = built.shaft, built.joint
     after_move = built.spring_energy(motor[1:], joint[:-1])

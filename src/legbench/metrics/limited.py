@@ -18,8 +18,9 @@ def limited_commands(recording: Recorded) -> dict[str, Any]:
     looks = recording.description.looks_only
     if looks or not len(wishes):
         return {"limited_cycles": 0, "limited_max": [0.0, 0.0]}
-    change = np.abs(wishes - applied)
-    return {
-        "limited_cycles": int(np.count_nonzero(np.any(change > 0.0, axis=-1))),
-        "limited_max": [float(value) for value in np.max(change, axis=0)],
-    }
+    limited, largest = np.zeros(len(wishes), dtype=np.bool_), []
+    for wish, let_through in zip(wishes.T, applied.T, strict=True):
+        change = np.abs(wish - let_through)
+        limited |= change > 0.0
+        largest.append(float(np.max(change)))
+    return {"limited_cycles": int(np.count_nonzero(limited)), "limited_max": largest}

@@ -1,5 +1,7 @@
 """The rating P^r of eq. (14): how much of a deflection lies along the radial mode."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from legbench.design.leg import LegDesign
@@ -8,6 +10,7 @@ from legbench.errors import DesignError
 from legbench.kinematics import MODE_RADIAL
 from legbench.metrics.changes import changes
 from legbench.metrics.source import Recorded, Reference
+from legbench.metrics.window import WINDOW_ROWS
 from legbench.signals import Floats, Ints
 
 RADIAL_SIZE = float(np.linalg.norm(MODE_RADIAL))
@@ -107,11 +110,28 @@ def rate_phases(
     recording: Recorded, support: Support, reference: Reference, first: Ints, stop: Ints
 ) -> list[float]:
     """P^r of each stretch of rows [first, stop) of a run, with what carries the leg in them."""
+    ratings: list[float] = []
+    for some in _together(stop - first):
+        ratings += _rate_together(recording, support, reference, first[some], stop[some])
+    return ratings
+
+
+def _together(lengths: Ints) -> Iterator[slice]:
+    """Places of consecutive phases of about `WINDOW_ROWS` rows together, one phase at least."""
+    ends = np.cumsum(lengths)
+    place = 0
+    while place < len(lengths):
+        before = ends[place] - lengths[place]
+        stop = max(place + 1, int(np.searchsorted(ends, before + WINDOW_ROWS, side="right")))
+        yield slice(place, stop)
+        place = stop
+
+
+def _rate_together(
+    recording: Recorded, support: Support, reference: Reference, first: Ints, stop: Ints
+) -> list[float]:
     design = recording.description.design
-    rows = [np.arange(low, high) for low, high in zip(first, stop, strict=True)]
-    if not rows:
-        return []
-    chosen = np.concatenate(rows)
+    chosen = np.concatenate([np.arange(low, high) for low, high in zip(first, stop, strict=True)])
     joint_pos, motor_pos = recording["joint_pos"][chosen], recording["motor_pos"][chosen]
     aligned = alignment(deflection(design, joint_pos, motor_pos, support, reference))
     return [_mean(part) for part in np.split(aligned, np.cumsum(stop - first)[:-1])]

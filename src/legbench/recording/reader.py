@@ -1,7 +1,7 @@
 """Reading a run: whatever state it was left in, as arrays by the name of the signal."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -11,6 +11,14 @@ import pyarrow as pa
 
 from legbench.errors import FormatError, LegbenchError, RecordingError
 from legbench.recording.archive import read_archive
+from legbench.recording.archive_columns import (
+    LONG_ROWS,
+    WINDOW_ROWS,
+    ArchiveColumns,
+    column_values,
+    column_windows,
+    spooled,
+)
 from legbench.recording.columns import ONE_LEG, Layout
 from legbench.recording.description import RunDescription, describe
 from legbench.recording.events import Event, read_events
@@ -43,7 +51,8 @@ class Recording:
     time: Floats
     """Plant time since reset (n,) [s]."""
     columns: Mapping[str, np.ndarray]
-    """Column on disk -> its values (n,), read-only; `contact` is -1 where unknown."""
+    """Column on disk -> its values (n,), read-only; `contact` is -1 where unknown. Those of a long
+    run are read from its file each time."""
     events: tuple[Event, ...]
     """What happened rarely, each with `time` [s] and `name`."""
     torn: str | None = None
@@ -105,6 +114,18 @@ class Recording:
         contact = self.columns.get("contact")
         return contact is not None and len(contact) > 0 and bool(np.all(contact >= 0))
 
+    def windows(self, rows: int = WINDOW_ROWS) -> "Iterator[Recording]":
+        """Yield consecutive parts of the run, at most `rows` rows each; the events are left out.
+
+        The columns of a part are in memory; those of the parts before need not be any more.
+        """
+        first = 0
+        for columns in column_windows(self.columns, rows):
+            stop = first + len(columns[TIME])
+            part = MappingProxyType(dict(columns))
+            yield replace(self, time=self.time[first:stop], columns=part, events=())
+            first = stop
+
     def to_arrow(self) -> pa.Table:
         """Return every column as an Arrow table: time as whole nanoseconds, unknown contact null.
 
@@ -163,10 +184,9 @@ def load(path: Path | str) -> Recording:
     """
     run = run_folder(Path(path))
     manifest = read_manifest(run)
-    table, torn = _samples(run, manifest)
+    columns, schema, torn = _samples(run, manifest)
     if manifest is None:
-        manifest = carried_manifest(table.schema, run)
-    columns = {name: _values(table[name]) for name in table.column_names}
+        manifest = carried_manifest(schema, run)
     if TIME not in columns:
         raise RecordingError(f"the samples of {run} have no column {TIME}")
     events, bad = read_events(run)
@@ -177,7 +197,7 @@ def load(path: Path | str) -> Recording:
         manifest=manifest,
         described=described(manifest, run),
         time=columns[TIME] / 1e9,
-        columns=MappingProxyType(columns),
+        columns=columns,
         events=tuple(events),
         torn=torn,
     )
@@ -209,27 +229,33 @@ def run_folder(path: Path) -> Path:
     raise RecordingError(f"{run} is no run folder: it has no {RUN}{hint}")
 
 
-def _samples(run: Path, manifest: Manifest | None) -> tuple[pa.Table, str | None]:
-    """Return the samples and what is missing of them, from the archive or else the stream."""
+def _samples(
+    run: Path, manifest: Manifest | None
+) -> tuple[Mapping[str, np.ndarray], pa.Schema, str | None]:
+    """Return columns and schema of a run and what is missing, from the archive or the stream."""
     if (run / ARCHIVE).is_file():
-        return read_archive(run), None
+        archive = ArchiveColumns(run / ARCHIVE)
+        if archive.rows > LONG_ROWS:
+            return archive, archive.schema, None
+        return _in_memory(read_archive(run)), archive.schema, None
     try:
         stream = WholeBatches(run / STREAM)
     except FileNotFoundError as error:
         raise RecordingError(f"{run} has no samples: no {ARCHIVE}, no {STREAM}") from error
     except OSError as error:
         raise RecordingError(f"{run / STREAM} cannot be read: {reason(error)}") from error
-    batches = list(stream)
     schema = stream.schema
     if schema is None:
         schema = schema_for(manifest if manifest is not None else carried_manifest(None, run))
-    return pa.Table.from_batches(batches, schema), stream.tear
+    if stream.size > LONG_ROWS * _row_bytes(schema):
+        columns = spooled(stream, manifest or carried_manifest(schema, run))
+        return columns, schema, stream.tear
+    return _in_memory(pa.Table.from_batches(list(stream), schema)), schema, stream.tear
 
 
-def _values(column: pa.ChunkedArray) -> np.ndarray:
-    """Return one column (n,), read-only; nulls of an integer are -1."""
-    values = column.to_numpy()
-    if column.null_count and pa.types.is_integer(column.type):
-        values = np.where(np.isnan(values), -1, values).astype(column.type.to_pandas_dtype())
-    values.flags.writeable = False
-    return values
+def _in_memory(table: pa.Table) -> Mapping[str, np.ndarray]:
+    return MappingProxyType({name: column_values(table[name]) for name in table.column_names})
+
+
+def _row_bytes(schema: pa.Schema) -> int:
+    return sum(field.type.bit_width for field in schema) // 8

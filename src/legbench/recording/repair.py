@@ -36,7 +36,7 @@ class RecoveryReport:
     rows_kept: int
     """Rows in `samples.parquet`."""
     bytes_dropped: int
-    """Bytes after the last whole batch, kept in `samples.arrows.torn`."""
+    """Bytes of damaged batches and after the last whole one, kept in `samples.arrows.torn`."""
     events_dropped: int
     """Unreadable event lines, kept in `events.jsonl.torn`."""
 
@@ -55,6 +55,7 @@ class _Finding:
     rows: int
     duration: float | None = None
     bytes_torn: int = 0
+    opening_damaged: bool = False
     tear: str | None = None
 
 
@@ -115,12 +116,12 @@ def _scan_stream(run: Path) -> _Finding:
     for batch in stream:
         column = batch.column(TIME)
         times = [*times[:1], column[0].as_py(), column[-1].as_py()]
-    torn = 0 if stream.tear is None else stream.size - stream.end
     return _Finding(
         schema=stream.schema,
         rows=stream.rows,
         duration=(times[-1] - times[0]) / 1e9 if times else 0.0,
-        bytes_torn=torn,
+        bytes_torn=stream.torn,
+        opening_damaged=stream.opening_damaged,
         tear=stream.tear,
     )
 
@@ -152,9 +153,9 @@ def _archive(run: Path, found: _Finding, manifest: Manifest) -> None:
 
 
 def _put_stream_away(run: Path, found: _Finding) -> None:
-    """Remove a stream that the archive replaces; keep one with torn bytes under another name."""
+    """Remove a stream that the archive replaces; keep a damaged one under another name."""
     stream = run / STREAM
-    if found.bytes_torn:
+    if found.bytes_torn or found.opening_damaged:
         stream.replace(run / (STREAM + TORN))
     else:
         stream.unlink(missing_ok=True)

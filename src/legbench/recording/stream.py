@@ -13,6 +13,7 @@ import pyarrow as pa
 from pyarrow import ipc
 
 from legbench.errors import RecordingError
+from legbench.recording.checksum import CHECKED, Checker, Sealer, blank_checksums
 from legbench.recording.description import layout_of
 from legbench.recording.layout import RUN, TIME
 from legbench.recording.manifest import Manifest, parse_manifest, to_json
@@ -24,16 +25,19 @@ MANIFEST_KEY: Final = b"legbench"
 
 
 def schema_for(manifest: Mapping[str, Any]) -> pa.Schema:
-    """Return the schema of the samples, with a copy of the manifest.
+    """Return the schema of the samples, with units of columns and a copy of the manifest.
 
     Raises:
         FormatError: the manifest declares signals that no run can have.
     """
-    fields = [pa.field(TIME, pa.int64(), nullable=False)]
-    for column in layout_of(manifest).columns:
+    layout = layout_of(manifest)
+    units = {name: {b"unit": unit.encode()} for name, unit in layout.units.items()}
+    fields = [pa.field(TIME, pa.int64(), nullable=False, metadata=units[TIME])]
+    for column in layout.columns:
         kind = pa.int8() if column.small else pa.float64()
-        fields.append(pa.field(column.name, kind, nullable=column.signal.name == "contact"))
-    return pa.schema(fields, metadata=carrying(manifest))
+        unknown, unit = column.signal.name == "contact", units[column.name]
+        fields.append(pa.field(column.name, kind, nullable=unknown, metadata=unit))
+    return pa.schema(fields, metadata=carrying(manifest) | CHECKED)
 
 
 def carrying(manifest: Mapping[str, Any]) -> dict[bytes, bytes]:
@@ -80,7 +84,8 @@ class BatchEncoder:
         valid = dict(zip(self._narrow, ~unknown, strict=True))
         arrays = [_zeros(kind, self._rows, valid.get(n)) for n, kind in enumerate(kinds)]
         batch = pa.RecordBatch.from_arrays(arrays, schema=schema)
-        self._message = bytearray(memoryview(batch.serialize()))
+        self._message = _message_of(batch)
+        self._sealer = Sealer(self._message)
         places = _places(self._message, schema)
         self._time = places[0]
         self._wide = [(places[n], n) for n, kind in enumerate(kinds) if kind == pa.float64()]
@@ -101,7 +106,17 @@ class BatchEncoder:
         for place, column in self._small:
             values = columns[column]
             place[:] = np.where(np.isnan(values), -1.0, values)
+        self._sealer.seal()
         return memoryview(self._message)
+
+
+def _message_of(batch: pa.RecordBatch) -> bytearray:
+    """Message of a batch as a stream has it, with room for its checksum in the metadata."""
+    opening = encode_schema(batch.schema)
+    sink = pa.BufferOutputStream()
+    with ipc.new_stream(sink, batch.schema) as writer:
+        writer.write_batch(batch, custom_metadata=blank_checksums(opening))
+    return bytearray(memoryview(sink.getvalue())[len(opening) : -len(END_MARK)])
 
 
 def _zeros(kind: pa.DataType, rows: int, valid: np.ndarray | None) -> pa.Array:
@@ -131,14 +146,16 @@ def _places(message: bytearray, schema: pa.Schema) -> list[np.ndarray]:
 class WholeBatches:
     """The batches of a stream up to its end mark, the first tear or the end of the file.
 
-    Iterate it once; then the attributes are final.
+    A batch that does not match its checksum is left out; those after it are read. Iterate once;
+    then the attributes are final.
 
     Attributes:
         schema: of the stream, None where even its message is torn.
         rows: in the batches so far.
-        end: offset after the last whole message [bytes].
+        end: offset after the last message that could be read [bytes].
         size: of the file [bytes].
-        tear: what is wrong with the rest, None where the stream ends with its end mark.
+        damaged: in batches that were left out [bytes].
+        tear: what is wrong, None where all is whole and the stream ends with its end mark.
     """
 
     def __init__(self, path: Path) -> None:
@@ -147,32 +164,71 @@ class WholeBatches:
         self._file = pa.OSFile(str(path))
         self.size: int = self._file.size()
         self.schema: pa.Schema | None = None
-        self.rows = self.end = 0
+        self.rows = self.end = self.damaged = 0
         self.tear: str | None = None
-        try:
-            self._reader = ipc.open_stream(self._file)
-        except (OSError, pa.ArrowException):
+        self._ended = False
+        schema = self._read_schema()
+        if schema is None:
             self.tear = f"{path.name} is torn before its first row"
             return
-        self.schema = self._reader.schema
+        self.schema = schema
         self.end = self._file.tell()
+        self._file.seek(0)
+        self._checker = Checker(self._file.read(self.end), schema)
+
+    def _read_schema(self) -> pa.Schema | None:
+        """Schema of the stream, None where its message is torn or its names have rotted."""
+        try:
+            schema = ipc.read_schema(self._file)
+            # Names are decoded when they are asked for.
+            return schema if schema.names else None
+        except (OSError, pa.ArrowException, UnicodeDecodeError):
+            return None
+
+    @property
+    def torn(self) -> int:
+        """Bytes that hold no row and are not the end mark; 0 for a stream without tear."""
+        return self.damaged + (0 if self._ended else self.size - self.end)
+
+    @property
+    def opening_damaged(self) -> bool:
+        """Whether names of columns and the copy of the manifest may be wrong."""
+        return self.schema is not None and self._checker.opening_damaged
 
     def __iter__(self) -> Iterator[pa.RecordBatch]:
         """Yield every whole batch."""
         if self.schema is None:
             return
+        batches = damaged = 0
         while True:
             try:
-                batch = self._reader.read_next_batch()
-            except (StopIteration, OSError, pa.ArrowException):
+                message = ipc.read_message(self._file)
+                whole = self._checker.whole(message)
+                batch = ipc.read_record_batch(message, self.schema) if whole else None
+            except (EOFError, OSError, pa.ArrowException):
                 break
+            before, self.end = self.end, self._file.tell()
+            batches += 1
+            if batch is None:
+                damaged += 1
+                self.damaged += self.end - before
+                continue
             self.rows += batch.num_rows
-            self.end = self._file.tell()
             yield batch
+        self.tear = "; ".join(filter(None, self._tears(damaged, batches))) or None
+
+    def _tears(self, damaged: int, batches: int) -> Iterator[str]:
+        """Say what is wrong, once everything has been read."""
+        name = self._path.name
+        if self._checker.opening_damaged:
+            yield f"the opening of {name} is damaged: names and copy of {RUN} may be wrong"
+        if damaged:
+            yield f"{name} has rotten bytes in {damaged} of its {batches} batches, left out"
         with self._path.open("rb") as file:
             file.seek(self.end)
             rest = file.read(len(END_MARK) + 1)
-        if rest != END_MARK:
-            self.tear = f"{self._path.name} has no end mark after {self.rows} rows" + (
+        self._ended = rest == END_MARK
+        if not self._ended:
+            yield f"{name} has no end mark after {self.rows} rows" + (
                 f", but {self.size - self.end} bytes of an unfinished batch" if rest else ""
             )

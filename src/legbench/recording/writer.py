@@ -240,8 +240,12 @@ class RunWriter:
         stream = self.path / STREAM
         archived = False
         try:
-            rows = write_archive(self.path, WholeBatches(stream), self._manifest)
+            batches = WholeBatches(stream)
+            rows = write_archive(self.path, batches, self._manifest)
             archived = rows == self._disk.kept.rows
+            if not archived:
+                told = f"{rows} of {self._disk.kept.rows} rows could be read back"
+                self._manifest["archive_error"] = f"{told}: {batches.tear}"
         except OSError as error:
             self._manifest["archive_error"] = reason(error)
         try:

@@ -8,9 +8,9 @@ from typing import Any, Final
 from legbench.errors import ConfigError
 from legbench.loop import Progress
 from legbench.paper import published
-from legbench.report.drawn import blocks_of, print_figures
 from legbench.report.named import Named, named_experiments
 from legbench.report.page import Judged, headlines, judge, page_html
+from legbench.report.paper_figures import blocks_of, print_figures
 from legbench.report.sources import Source
 from legbench.viz.print.save import save_figure
 from legbench.writing import save_whole

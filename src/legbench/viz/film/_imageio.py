@@ -1,16 +1,13 @@
-"""Reading and writing of video and image files: the only module that imports imageio."""
+"""Reading and writing of video and image files: the only module that imports PyAV and Pillow."""
 
 from legbench.errors import MissingExtraError
 
 try:
-    import av as _av  # noqa: F401
-    import imageio.v3 as iio
-    from imageio.plugins.pyav import PyAVPlugin
+    import av
     from PIL import Image, ImageDraw, ImageFont
 except ImportError as error:
     raise MissingExtraError(
-        "imageio, PyAV or Pillow is not installed; rendering needs them: "
-        "pip install 'legbench[render]'"
+        "PyAV or Pillow is not installed; rendering needs them: pip install 'legbench[render]'"
     ) from error
 
-__all__ = ["Image", "ImageDraw", "ImageFont", "PyAVPlugin", "iio"]
+__all__ = ["Image", "ImageDraw", "ImageFont", "av"]

@@ -18,6 +18,8 @@ from legbench.viz.pose import Puppet
 from legbench.viz.run_model import model_of
 
 CAMERA = "side"
+SAMPLES = 4
+"""Samples of a pixel where edges are smooth."""
 CALM = 0.5
 """Time over which the hip is averaged for the camera to follow smoothly [s]."""
 
@@ -61,13 +63,24 @@ class Film:
         """Pixels that a metre beside the leg takes in images of a size [1/m]."""
         return size.height / (2.0 * self._distance * np.tan(self._half_angle))
 
-    def shoot(self, rows: Ints, size: Size, *, follow: bool = True) -> Iterator[Image]:
+    def shoot(
+        self, rows: Ints, size: Size, *, follow: bool = True, smooth: bool = True
+    ) -> Iterator[Image]:
         """Images of the rows, one after the other; the camera moves along, or stays amid them.
+
+        Args:
+            rows: rows to show.
+            size: size of each image.
+            follow: whether the camera follows the hip.
+            smooth: draw edges smoothly, for which the time of three plain images is needed.
 
         Raises:
             MissingExtraError: the machine has no OpenGL that works.
         """
         model, data = self._puppet.model, self._puppet.data
+        # A buffer larger than the image would be cleared and resolved as a whole.
+        model.vis.global_.offwidth, model.vis.global_.offheight = size.width, size.height
+        model.vis.quality.offsamples = SAMPLES if smooth else 0
         path = self._start + self._ahead(rows, follow)[:, None] * [1.0, 0.0, 0.0]
         scene = mujoco.MjvScene(model, maxgeom=200)
         option, perturb, camera = mujoco.MjvOption(), mujoco.MjvPerturb(), mujoco.MjvCamera()

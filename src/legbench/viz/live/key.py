@@ -32,7 +32,7 @@ def stance_key() -> tuple[Entry, ...]:
 
 
 def phase_key(facts: Facts, *, at_rest: bool = True) -> tuple[Entry, ...]:
-    """Key of the controller's states in the order in which it declares them, without rests or with."""
+    """Key of the controller's states as it declares them; those at rest may be left out."""
     colours = style.phase_colours(facts.run.phases)
     return tuple(
         (phase.name, colours[phase.code])

@@ -15,6 +15,9 @@ from legbench.viz.trace import Thinner, TracedRows
 
 FREQ = 200.0
 """Rate of the trajectories' points, about a hundred a period [Hz]."""
+MOST_POINTS = 1 << 17
+"""Points of the whole run behind the trails, of which every second one is dropped when there are
+more: eleven minutes of them, 2 MB a plane."""
 
 
 def plot_specs(facts: Facts) -> dict[str, PlotSpec]:
@@ -65,6 +68,40 @@ def _phases(facts: Facts) -> str:
 
 
 @final
+class ThinnedPoints:
+    """Points of a whole run in one plane, fewer of each part the longer the run is.
+
+    Attributes:
+        last: the last point that was added (1, 2).
+    """
+
+    def __init__(self, most: int = MOST_POINTS) -> None:
+        self._most, self._parts = most, list[Floats]()
+        self._added = self._kept = 0
+        self._step = 1
+        self.last: Floats = np.zeros((0, 2))
+
+    def __bool__(self) -> bool:
+        return self._added > 0
+
+    def add(self, points: Floats) -> None:
+        """Add points (n, 2) that follow those added before."""
+        kept = points[-self._added % self._step :: self._step].copy()
+        self._parts.append(kept)
+        self._added += len(points)
+        self._kept += len(kept)
+        self.last = points[-1:].copy()
+        while self._kept > self._most:
+            self._parts = [self.points[::2]]
+            self._kept, self._step = len(self._parts[0]), 2 * self._step
+
+    @property
+    def points(self) -> Floats:
+        """Points that are kept (m, 2), evenly spread."""
+        return np.concatenate(self._parts)
+
+
+@final
 class Plots:
     """Publishes trajectories in the four planes."""
 
@@ -72,7 +109,7 @@ class Plots:
         self._jumps, self._phases = facts.run.jumps, facts.run.phases
         self._plots = {name: XYPlot(stream, spec) for name, spec in plot_specs(facts).items()}
         self._thinner = Thinner(FREQ)
-        self._seen: dict[str, list[Floats]] = {name: [] for name in self._plots}
+        self._seen = {name: ThinnedPoints() for name in self._plots}
         self._others: dict[str, list[Floats]] = {name: [] for name in self._plots}
 
     def push(self, trace: TracedRows) -> None:
@@ -84,9 +121,8 @@ class Plots:
         phases = self._phase_colours(trace)[kept]
         for name, plot in self._plots.items():
             points = _points(trace, name)[kept]
-            seen = self._seen[name]
-            before = seen[-1][-1:] if seen else points[:1]
-            seen.append(points)
+            before = self._seen[name].last if self._seen[name] else points[:1]
+            self._seen[name].add(points)
             plot.cover(points)
             by_phase = name == "phases" or (self._jumps and name != "periods")
             plot.push(
@@ -108,7 +144,7 @@ class Plots:
         for name, plot in self._plots.items():
             if seen := self._seen[name]:
                 others = self._others[name]
-                plot.ghost(np.concatenate(seen), np.concatenate(others) if others else None)
+                plot.ghost(seen.points, np.concatenate(others) if others else None)
 
     def _phase_colours(self, trace: TracedRows) -> style.Colours:
         if self._jumps:

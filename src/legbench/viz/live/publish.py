@@ -10,7 +10,7 @@ from typing import final
 from legbench.metrics.source import Recorded
 from legbench.metrics.summary import Summary
 from legbench.viz.facts import Facts, as_markdown
-from legbench.viz.force_axis import force_axis, live_force_axis
+from legbench.viz.force_axis import ForceAxis, force_axis, live_force_axis
 from legbench.viz.live._rerun import rr
 from legbench.viz.live.blueprint import blueprint
 from legbench.viz.live.ghost import Ghost, Other
@@ -22,7 +22,7 @@ from legbench.viz.live.scene import ModelScene
 from legbench.viz.live.series import Series
 from legbench.viz.live.states import States
 from legbench.viz.playback import WHOLE, Playback
-from legbench.viz.trace import Tracer
+from legbench.viz.trace import Tracer, stance_of
 
 APPLICATION = "legbench"
 """Application id under which the viewer keeps the layout that a user has arranged."""
@@ -69,6 +69,32 @@ class Publisher:
         document = rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
         self._stream.log("/run", document, static=True)
 
+    def lay_out(self, rows: Recorded) -> None:
+        """Send the layout once, with views that have room for these rows."""
+        if self._laid_out:
+            return
+        hip = hip_of(rows, self._facts)
+        room = leg_room(self._facts, hip, live=self._live)
+        keys = [other.key for other in self._others]
+        layout = blueprint(
+            self._facts,
+            room=room,
+            span=(float(rows.time[0]), float(rows.time[-1])),
+            force=self._force_axis(rows),
+            live=self._live,
+            others=keys,
+            playback=self._playback,
+        )
+        self._stream.send_blueprint(layout)
+        self._laid_out = True
+
+    def _force_axis(self, rows: Recorded) -> ForceAxis | None:
+        """Axis of the contact force, for these rows or for those of a run that goes on."""
+        run = self._facts.run
+        if self._live:
+            return live_force_axis(run.design.total_mass)
+        return force_axis(rows["contact_force"], stance_of(rows, run.setup.kind))
+
     def pass_over(self, rows: Recorded) -> None:
         """Leave rows out that come before those that are shown; their periods count."""
         if len(rows.time):
@@ -79,27 +105,7 @@ class Publisher:
         if len(rows.time) == 0:
             return
         trace = self._tracer.extend(rows)
-        if not self._laid_out:
-            hip = hip_of(rows, self._facts)
-            room = leg_room(self._facts, hip, live=self._live)
-            keys = [other.key for other in self._others]
-            mass = self._facts.run.design.total_mass
-            force = (
-                live_force_axis(mass)
-                if self._live
-                else force_axis(trace.rows["contact_force"], trace.stance)
-            )
-            layout = blueprint(
-                self._facts,
-                room=room,
-                span=(float(trace.time[0]), float(trace.time[-1])),
-                force=force,
-                live=self._live,
-                others=keys,
-                playback=self._playback,
-            )
-            self._stream.send_blueprint(layout)
-            self._laid_out = True
+        self.lay_out(rows)
         for section in self._sections:
             section.push(trace)
 

@@ -8,6 +8,7 @@ import numpy as np
 import pyarrow as pa
 from pyarrow import ipc
 
+from legbench.recording.checksum import Checker
 from legbench.recording.description import RunDescription
 from legbench.recording.layout import TIME
 from legbench.recording.reader import Recording
@@ -32,10 +33,14 @@ class Tail:
         self._file = path.open("rb")
         self._pending = b""
         self._schema: pa.Schema | None = None
+        self._checker: Checker | None = None
         self.ended = False
 
     def read(self) -> list[pa.RecordBatch]:
-        """The batches that have become whole; bytes of an unfinished one are kept for later."""
+        """The batches that have become whole; bytes of an unfinished one are kept for later.
+
+        A batch that does not match its checksum is left out.
+        """
         self._pending += self._file.read()
         reader = pa.BufferReader(self._pending)
         batches: list[pa.RecordBatch] = []
@@ -48,9 +53,10 @@ class Tail:
                 message = ipc.read_message(reader)
             except (EOFError, OSError, pa.ArrowInvalid):
                 break
-            if self._schema is None:
+            if self._schema is None or self._checker is None:
                 self._schema = ipc.read_schema(message)
-            else:
+                self._checker = Checker(self._pending[: reader.tell()], self._schema)
+            elif self._checker.whole(message):
                 batches.append(ipc.read_record_batch(message, self._schema))
         self._pending = self._pending[place:]
         return batches

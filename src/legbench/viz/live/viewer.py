@@ -22,8 +22,12 @@ START_TIME = 20.0
 """Longest time until a viewer must accept connections [s]."""
 LOOK_PERIOD = 0.05
 """Period of the looks whether it does [s]."""
-MEMORY = ("--memory-limit", "2GB", "--server-memory-limit", "512MB")
-"""Memory limits of the viewer, whose default is three quarters of the whole machine's memory."""
+MEMORY = ("--memory-limit", "2GB", "--server-memory-limit", "256MB")
+"""Memory limits of the viewer, whose default is three quarters of the whole machine's memory.
+
+A server that reaches its limit forgets the oldest rows, which the page has by then; one that is
+opened later begins after them. It counts what messages hold, not what they cost: in small ones, as
+of a run that is watched, it needs some 2.5 times as much."""
 
 
 def proxy_url(port: int = PORT) -> str:

@@ -12,6 +12,7 @@ from legbench.signals import Floats
 from legbench.viz import style
 from legbench.viz.colouring import colouring_of
 from legbench.viz.print._matplotlib import Axes
+from legbench.viz.print.thinning import draw_line, peaks, plane_stride, stride
 
 Dashes = tuple[float, tuple[float, ...]]
 
@@ -48,10 +49,12 @@ def look_of(place: int) -> Look:
     return LOOKS[place % len(LOOKS)]
 
 
-def planes_of(recording: Recorded, convention: ModalConvention) -> tuple[Floats, Floats, Floats]:
-    """Points of the three planes, polar, joint and modal (n, 2) each."""
-    joint, shank = recording["joint_pos"], recording.description.design.shank.length
-    rate = joint_to_modal(recording["joint_vel"], convention)[:, 1]
+def planes_of(
+    recording: Recorded, convention: ModalConvention, rows: slice = slice(None)
+) -> tuple[Floats, Floats, Floats]:
+    """Points of some rows in the three planes, polar, joint and modal (n, 2) each."""
+    joint, shank = recording["joint_pos"][rows], recording.description.design.shank.length
+    rate = joint_to_modal(recording["joint_vel"][rows], convention)[:, 1]
     radial = np.stack([joint_to_modal(joint, convention)[:, 1], rate], axis=-1)
     return joint_to_polar(joint, shank), joint, radial
 
@@ -61,10 +64,14 @@ def draw_other(
 ) -> None:
     """Draw those rows of another run over the planes that its own figure would highlight."""
     stretches, look = colouring_of(other).stretches, look_of(place)
-    shown = slice(stretches[0].first, stretches[-1].stop + 1) if stretches else slice(None)
-    for panel, points in zip(panels, planes_of(other, convention), strict=True):
-        panel.plot(
-            *points[shown].T,
+    first, stop = (stretches[0].first, stretches[-1].stop + 1) if stretches else (0, None)
+    shown = slice(first, stop, plane_stride(other.time[first:stop]))
+    for panel, points in zip(panels, planes_of(other, convention, shown), strict=True):
+        x, y = points.T
+        draw_line(
+            panel,
+            x,
+            y,
             color=look.colour,
             linestyle=look.dashes,
             linewidth=0.8,
@@ -91,9 +98,12 @@ def draw_differences(
             (panels[1], apart.joint[:, 0], style.unit(style.FIRST), "$q_1$"),
             (panels[1], apart.joint[:, 1], style.unit(style.SECOND), "$q_2$"),
         ):
-            panel.plot(
-                apart.time,
-                np.maximum(np.abs(values), LEAST),
+            size = np.maximum(np.abs(values), LEAST)
+            rows = peaks(size, stride(len(size)))
+            draw_line(
+                panel,
+                apart.time[rows],
+                size[rows],
                 color=colour,
                 linestyle=dashes,
                 linewidth=0.8,

@@ -8,6 +8,7 @@ from legbench.signals import Signal
 from legbench.viz import style
 from legbench.viz.print._matplotlib import Axes
 from legbench.viz.print.overlay import look_of
+from legbench.viz.print.thinning import draw_line, peaks, stride
 
 COLOURS = tuple(map(style.unit, style.COMPONENTS))
 """Colours of a signal's components in turn."""
@@ -51,9 +52,11 @@ def _draw(panel: Axes, signal: Signal, run: Recorded, other: int | None = None) 
     rows = run[signal.name].reshape(len(run.time), -1)
     names = signal.components or (signal.name,)
     for place, (name, values) in enumerate(zip(names, rows.T, strict=True)):
-        panel.plot(
-            run.time,
-            values,
+        shown = peaks(values, stride(len(values)))
+        draw_line(
+            panel,
+            run.time[shown],
+            values[shown],
             color=COLOURS[place % len(COLOURS)] if other is None else look_of(other).colour,
             linestyle="-" if other is None else look_of(other).dashes,
             linewidth=1.0 if other is None else 0.8,

@@ -1,0 +1,109 @@
+"""Columns of a long run, which are decoded each time they are asked for instead of being kept."""
+
+import shutil
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from tempfile import mkdtemp
+from typing import Any, Final, final
+from weakref import finalize
+
+import numpy as np
+import pyarrow as pa
+from pyarrow import parquet
+
+from legbench.errors import RecordingError
+from legbench.recording.archive import write_archive
+from legbench.recording.layout import ARCHIVE
+from legbench.recording.stream import WholeBatches
+from legbench.writing import reason
+
+LONG_ROWS: Final = 1 << 18
+"""Rows above which columns are not kept: four minutes at 1 kHz, 60 MB."""
+WINDOW_ROWS: Final = 1 << 16
+"""Rows of a window, in which long runs are gone through: 65 s at 1 kHz, 15 MB."""
+
+
+@final
+class ArchiveColumns(Mapping[str, np.ndarray]):
+    """Columns of a `samples.parquet`; each access reads one of them from the file.
+
+    Raises:
+        RecordingError: the file is damaged, also where a column is asked for.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Read the footer of the archive at a path."""
+        self._path = path
+        try:
+            with parquet.ParquetFile(str(path)) as file:
+                self.schema: pa.Schema = file.schema_arrow
+                self.rows: int = file.metadata.num_rows
+        except (OSError, pa.ArrowException) as error:
+            raise RecordingError(f"{path} is damaged: {reason(error)}") from error
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """Values of a column (n,), read-only."""
+        if name not in self.schema.names:
+            raise KeyError(name)
+        try:
+            with parquet.ParquetFile(str(self._path)) as file:
+                return column_values(file.read([name])[name])
+        except (OSError, pa.ArrowException) as error:
+            raise RecordingError(f"{self._path} is damaged: {reason(error)}") from error
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.schema.names
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.schema.names)
+
+    def __len__(self) -> int:
+        return len(self.schema.names)
+
+    def windows(self, rows: int) -> Iterator[dict[str, np.ndarray]]:
+        """All columns of consecutive rows, at most `rows` of them at a time."""
+        try:
+            with parquet.ParquetFile(str(self._path)) as file:
+                for batch in file.iter_batches(batch_size=rows):
+                    table = pa.Table.from_batches([batch])
+                    yield {name: column_values(table[name]) for name in table.column_names}
+        except (OSError, pa.ArrowException) as error:
+            raise RecordingError(f"{self._path} is damaged: {reason(error)}") from error
+
+
+def spooled(stream: WholeBatches, manifest: Mapping[str, Any]) -> ArchiveColumns:
+    """Columns of a long stream, through an archive that lives as long as they do.
+
+    Raises:
+        RecordingError: there is no room for it where temporary files go.
+    """
+    folder = Path(mkdtemp(prefix="legbench-"))
+    try:
+        write_archive(folder, stream, manifest)
+        columns = ArchiveColumns(folder / ARCHIVE)
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+    finalize(columns, shutil.rmtree, folder, ignore_errors=True)
+    return columns
+
+
+def column_values(column: pa.ChunkedArray) -> np.ndarray:
+    """Return one column (n,), read-only; nulls of an integer are -1."""
+    values = column.to_numpy()
+    if column.null_count and pa.types.is_integer(column.type):
+        values = np.where(np.isnan(values), -1, values).astype(column.type.to_pandas_dtype())
+    values.flags.writeable = False
+    return values
+
+
+def column_windows(
+    columns: Mapping[str, np.ndarray], rows: int
+) -> Iterator[Mapping[str, np.ndarray]]:
+    """Consecutive rows of columns of equal length, at most `rows` of them at a time."""
+    if isinstance(columns, ArchiveColumns):
+        yield from columns.windows(rows)
+        return
+    length = max(map(len, columns.values()), default=0)
+    for first in range(0, length, rows):
+        yield {name: values[first : first + rows] for name, values in columns.items()}

@@ -1,0 +1,95 @@
+"""A run too long to be kept in memory gives what it gives in memory, column by column."""
+
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from recorded_rows import append_rows
+
+from legbench.errors import RecordingError
+from legbench.recording import reader
+from legbench.recording.archive_columns import ArchiveColumns
+from legbench.recording.reader import Recording, load
+from legbench.recording.writer import RunWriter
+
+ROWS = 730
+
+
+@pytest.fixture(params=["closed", "torn"])
+def run(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    writer = RunWriter.create(tmp_path, {})
+    append_rows(writer, ROWS // 2)
+    append_rows(writer, ROWS - ROWS // 2, start=ROWS // 2, truth=False)
+    if request.param == "closed":
+        writer.close()
+    else:
+        # As a killed process leaves it.
+        writer._disk.close()
+    return writer.path
+
+
+@pytest.fixture
+def both(run: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Recording, Recording]:
+    """The run in memory, and as a long one is read."""
+    short = load(run)
+    monkeypatch.setattr(reader, "LONG_ROWS", 100)
+    return short, load(run)
+
+
+def test_columns_are_read_from_the_file_and_the_same(both: tuple[Recording, Recording]) -> None:
+    short, long = both
+    assert isinstance(long.columns, ArchiveColumns)
+    assert not isinstance(short.columns, ArchiveColumns)
+    assert list(long.columns) == list(short.columns)
+    assert len(long.columns) == len(short.columns)
+    for name, values in short.columns.items():
+        assert long.columns[name].dtype == values.dtype
+        np.testing.assert_array_equal(long.columns[name], values)
+    assert long.signals == short.signals
+    assert (long.torn, long.has_truth, long.manifest) == (short.torn, False, short.manifest)
+    np.testing.assert_array_equal(long["joint_pos"], short["joint_pos"])
+    assert long.to_arrow().equals(short.to_arrow()) or np.isnan(short["trunk_pos"]).any()
+    with pytest.raises(ValueError, match="read-only"):
+        long.columns["joint_pos_1"][0] = 1.0
+    with pytest.raises(KeyError):
+        long.columns["no_such"]
+
+
+@pytest.mark.parametrize("rows", [1, 64, ROWS, 10 * ROWS])
+def test_windows_are_the_rows_in_order(both: tuple[Recording, Recording], rows: int) -> None:
+    for recording in both:
+        parts = list(recording.windows(rows))
+        assert max(len(part.time) for part in parts) <= rows
+        np.testing.assert_array_equal(np.concatenate([p.time for p in parts]), recording.time)
+        for name in ("joint_pos", "contact_force", "phase", "contact"):
+            joined = np.concatenate([part[name] for part in parts])
+            np.testing.assert_array_equal(joined, recording[name])
+
+
+def test_the_temporary_file_of_a_torn_run_goes_with_it(
+    run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reader, "LONG_ROWS", 100)
+    spool = tmp_path / "spool"
+    spool.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(spool))
+    recording = load(run)
+    torn = recording.torn is not None
+    assert len(list(spool.iterdir())) == torn
+    del recording
+    assert list(spool.iterdir()) == []
+
+
+def test_damage_is_named_where_it_is_met(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    writer = RunWriter.create(tmp_path, {})
+    append_rows(writer, ROWS)
+    writer.close()
+    monkeypatch.setattr(reader, "LONG_ROWS", 100)
+    path = writer.path / "samples.parquet"
+    content = bytearray(path.read_bytes())
+    middle = content.index(pa.py_buffer(b"PAR1").to_pybytes()) + 4
+    content[middle : len(content) // 2] = bytes(len(content) // 2 - middle)
+    path.write_bytes(content)
+    with pytest.raises(RecordingError, match=r"samples\.parquet is damaged"):
+        load(writer.path)["joint_pos"]
