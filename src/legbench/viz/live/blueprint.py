@@ -51,7 +51,7 @@ def blueprint(
         states_view(),
         state_key_view(facts),
         rrb.TextDocumentView(origin="/run", name="run"),
-        row_shares=[5, 1.5, 1.25, 2.6],
+        row_shares=[5, 1.5, 1.4, 2.6],
     )
     middle = rrb.Vertical(
         rrb.Horizontal(plots["polar"], plots["joint"]),

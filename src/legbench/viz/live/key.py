@@ -16,8 +16,10 @@ PATH = "/key"
 """Entity path of the key of the states."""
 GLYPH, PAD = 0.105, 0.30
 """Width of a letter, and of the margins of a word, in an XY plot of the usual size [plot units]."""
-LONGEST = 3.1
+LONGEST = 3.25
 """Longest key beside an axis' title [plot units]."""
+LABEL_DROP = 0.15
+"""Height by which the viewer writes a label below its point in the states' key [key units]."""
 ROW, WORD = 0.5, 0.16
 """Height of a row of the states' key, and width of one of its letters [key units]."""
 WIDTH = 6.5
@@ -94,7 +96,7 @@ def log_state_key(stream: rr.RecordingStream, facts: Facts) -> None:
     for place, row in enumerate(_state_rows(facts)):
         ends = np.cumsum([0.0, *map(_width, row)])
         entries += row
-        points += [(x, ROW * place) for x in (0.5 * (ends[:-1] + ends[1:])).tolist()]
+        points += [(x, ROW * place - LABEL_DROP) for x in (0.5 * (ends[:-1] + ends[1:])).tolist()]
     _log(stream, PATH, entries, points)
 
 
