@@ -14,6 +14,7 @@ TYPE_CHECKING = False
 """Type checkers take it for true; `typing` is not imported for it."""
 if TYPE_CHECKING:
     from legbench.control.bang_bang import BangBangConfig
+    from legbench.control.chirp import ChirpConfig
     from legbench.control.jump import JumpConfig
     from legbench.control.position_jump import PositionJumpConfig
     from legbench.design.leg import LegDesign
@@ -37,6 +38,7 @@ __all__ = [
     "AnalyticChoice",
     "BangBangConfig",
     "CanChoice",
+    "ChirpConfig",
     "Comparison",
     "Experiment",
     "JumpConfig",
@@ -62,6 +64,7 @@ _HOMES = {
     "AnalyticChoice": "legbench.plant.analytic_choice",
     "BangBangConfig": "legbench.control.bang_bang",
     "CanChoice": "legbench.plant.can_choice",
+    "ChirpConfig": "legbench.control.chirp",
     "Comparison": "legbench.metrics.compare",
     "Experiment": "legbench.experiment.data",
     "JumpConfig": "legbench.control.jump",

@@ -13,6 +13,7 @@ import pytest
 from legbench.control import (
     CONTROLLERS,
     BangBangConfig,
+    ChirpConfig,
     ControllerSettings,
     JumpConfig,
     LegTargets,
@@ -38,6 +39,7 @@ CONTROLLED: dict[str, ControllerSettings] = {
     "bang-bang": BangBangConfig(delay=0.02),
     "bang-bang of three levels": BangBangConfig(delay=0.02, three_levels=True),
     "position-jump": PositionJumpConfig(delay=0.02),
+    "chirp": ChirpConfig(delay=0.02, sweep=0.4),
     "guest sine": CONTROLLERS.find(f"{ROOT / 'tests/control/guests/sine.py'}:Sine")(freq=3.0),
     "guest pump": CONTROLLERS.find(f"{ROOT / 'scripts/examples/own_controller.py'}:Pump")(),
 }

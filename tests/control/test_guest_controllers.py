@@ -223,7 +223,7 @@ def test_a_broken_package_fails_only_when_it_is_asked_for(
         EntryPoint(name="sine", value="swinging:Sine", group=CONTROLLERS.group),
     ]
     monkeypatch.setattr(guests, "entry_points", lambda group: installed)
-    assert CONTROLLERS.names() == ("jump", "bang-bang", "position-jump", "walk", "sine")
+    assert CONTROLLERS.names() == ("jump", "bang-bang", "position-jump", "chirp", "walk", "sine")
     assert CONTROLLERS.find("sine").kind == "sine"
     assert CONTROLLERS.find("jump") is JumpConfig
     with pytest.raises(GuestError, match=r"'walk'.*does not import:\n") as caught:

@@ -168,7 +168,8 @@ def test_units_that_are_no_table() -> None:
 
 
 def test_files_that_are_not_there_or_no_text(tmp_path: Path) -> None:
-    with pytest.raises(DesignError, match=r"nowhere\.toml: no such design file; .*optimal\.toml"):
+    told = r"nowhere\.toml: no such design file; .*optimal, prototype"
+    with pytest.raises(DesignError, match=told):
         load_design(tmp_path / "nowhere.toml")
     with pytest.raises(DesignError, match="cannot be read: "):
         load_design(tmp_path)

@@ -73,6 +73,15 @@ def smooth_integrator(
     return copy.deepcopy(_smooth(tolerance, hy.recommended_simd_size(), varied, friction, guide))
 
 
+def sensitive_integrator(tolerance: float, lanes: int, *, friction: bool) -> Any:
+    """New integrator of a batch of legs and of their derivatives, without stops and events.
+
+    The derivatives are those by the four states and by the parameters of the motion, the motors
+    among them, and by the friction if there is any: `sensitive_seeds`.
+    """
+    return copy.deepcopy(_sensitive(tolerance, lanes, friction))
+
+
 @cache
 def _events(kind: Kind, tolerance: float) -> Any:
     system, pushes = stopped_system()
@@ -124,6 +133,29 @@ def _smooth(tolerance: float, lanes: int, varied: bool, friction: bool, guide: b
         )
 
     return kept(f"smooth {tolerance!r} {lanes} {system} {seeds}", build)
+
+
+@cache
+def _sensitive(tolerance: float, lanes: int, friction: bool) -> Any:
+    system = smooth_system(friction=friction)
+    seeds = [*STATE, *(hy.par[place] for place in sensitive_seeds(friction=friction))]
+
+    def build() -> Any:
+        return hy.taylor_adaptive_batch(
+            hy.var_ode_sys(system, seeds),
+            np.zeros((len(system), lanes)),
+            tol=tolerance,
+            fast_math=True,
+            compact_mode=True,  # as in `_varied`, for the sake of compilation
+            opt_level=1,
+        )
+
+    return kept(f"sensitive {tolerance!r} {lanes} {system} {seeds}", build)
+
+
+def sensitive_seeds(*, friction: bool) -> range:
+    """Indices of the parameters by which `sensitive_integrator` differentiates."""
+    return range(SHARPNESS if friction else SMOOTH)
 
 
 def smooth_seeds(*, friction: bool) -> list[int]:

@@ -24,8 +24,8 @@ Stop = Callable[[], bool]
 class StoppedError(CampaignError):
     """Error of a work that was given up because somebody asked; nothing of it is kept."""
 
-    def __init__(self) -> None:
-        super().__init__("the work was given up as asked")
+    def __init__(self, message: str = "the work was given up as asked") -> None:
+        super().__init__(message)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

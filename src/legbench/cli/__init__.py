@@ -26,6 +26,7 @@ COMMANDS = {
     "hop": "apex return map, periodic hops and basin of a leg",
     "campaign": "run a grid of experiments, and make one table of it",
     "report": "a campaign beside the paper, on one page and in figures",
+    "identify": "parameters of a leg from recorded runs",
     "drives": "commission the servo drives, or emulate them",
 }
 """Command -> one line of help; the module is `legbench.cli.<command>` with `main(arguments)`."""

@@ -13,6 +13,7 @@ from legbench.signals import Command, Observation, Signal
 
 if TYPE_CHECKING:
     from legbench.control.bang_bang import BangBang, BangBangConfig
+    from legbench.control.chirp import Chirp, ChirpConfig
     from legbench.control.jump import Jump, JumpConfig
     from legbench.control.position_jump import PositionJump, PositionJumpConfig
 
@@ -21,6 +22,8 @@ __all__ = [
     "AbstractController",
     "BangBang",
     "BangBangConfig",
+    "Chirp",
+    "ChirpConfig",
     "Command",
     "ControllerDescription",
     "ControllerSettings",
@@ -44,6 +47,8 @@ __getattr__ = lazy_names(
     {
         "BangBang": "legbench.control.bang_bang",
         "BangBangConfig": "legbench.control.bang_bang",
+        "Chirp": "legbench.control.chirp",
+        "ChirpConfig": "legbench.control.chirp",
         "Jump": "legbench.control.jump",
         "JumpConfig": "legbench.control.jump",
         "PositionJump": "legbench.control.position_jump",

@@ -10,6 +10,7 @@ CONTROLLERS: Final = Registry(
         "jump": "legbench.control.jump:JumpConfig",
         "bang-bang": "legbench.control.bang_bang:BangBangConfig",
         "position-jump": "legbench.control.position_jump:PositionJumpConfig",
+        "chirp": "legbench.control.chirp:ChirpConfig",
     },
     group="legbench.controllers",
     members={

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 
+from legbench.choices import choose
 from legbench.design.statics import Support
 from legbench.errors import ConfigError
 
@@ -42,6 +43,7 @@ class Setup:
     """Length of the boom that guides the trunk in `ffs` [m]; none: a perfect plane."""
 
     def __post_init__(self) -> None:
+        choose(self, kind=SetupKind)
         if self.boom_radius is None:
             return
         if self.kind is not SetupKind.FFS:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, Literal
 
+from legbench.choices import choose
 from legbench.control import CONTROLLERS, ControllerSettings, SetpointMeaning
 from legbench.design import LegDesign
 from legbench.design.setup import Setup
@@ -34,6 +35,9 @@ class Conventions:
     rating_reference: Literal["setup", "motor", "equilibrium"] = "setup"
     """Reference from which the rating that is shown first measures a deflection, q_d of eq. (14):
     the motor, the equilibrium, or as suits the setup, the equilibrium unless the leg jumps."""
+
+    def __post_init__(self) -> None:
+        choose(self, modal=ModalConvention, setpoint=SetpointMeaning)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

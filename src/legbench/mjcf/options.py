@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
+from legbench.choices import choose
 from legbench.design import LegDesign
 from legbench.design.setup import Setup, SetupKind
 from legbench.errors import ConfigError
@@ -45,6 +46,7 @@ class Linkage:
     """Length of hip crank and thigh extension [m]."""
 
     def __post_init__(self) -> None:
+        choose(self, kind=LinkageKind)
         density = self.bar_density
         if density is not None and not LIGHTEST_BAR <= density < math.inf:
             raise ConfigError(

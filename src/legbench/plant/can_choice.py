@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Final
 
+from legbench.choices import choose
 from legbench.drives.emulated.faults import Fault
 from legbench.guests import WHERE, load_text
 from legbench.limits.safety import SafetyLimits
@@ -47,6 +48,9 @@ class CanChoice:
     is still, for 30 s at most; stop is a quick stop at the last row, in mid-flight, too."""
     faults: tuple[Fault, ...] = ()
     """Faults to inject into the emulated leg in this process, on its virtual time."""
+
+    def __post_init__(self) -> None:
+        choose(self, end=End)
 
     @property
     def bus_file(self) -> Path:

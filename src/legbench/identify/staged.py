@@ -1,0 +1,176 @@
+"""Identification in stages: data, wiring, identifiability, fit, errors, adequacy, held-out runs.
+
+    outcome = identify([load(path) for path in runs], free=parse_free(["k1", "k2"]))
+    outcome.trusted, outcome.estimate("k1").value
+
+A stage that fails ends it: hopeless data are not fitted, and what cannot be seen is refused.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+import numpy as np
+
+from legbench.analytic.terms import Bars
+from legbench.design import LegDesign
+from legbench.errors import ConfigError, PlantFault
+from legbench.identify.adequacy import residuals_of, scores_of
+from legbench.identify.alternatives import explain
+from legbench.identify.base import Leg, mended
+from legbench.identify.checks import Finding, check_data
+from legbench.identify.estimates import estimates_of
+from legbench.identify.fitting import Fit, fit
+from legbench.identify.gate import check_gate, look, pairs_alike
+from legbench.identify.held_out import hold_out
+from legbench.identify.outcome import Outcome
+from legbench.identify.parameters import INDEX, Freedom
+from legbench.identify.prediction import Guess, nothing_moved
+from legbench.identify.problem import Misfit, Problem
+from legbench.identify.spread import spread_of
+from legbench.identify.trial import Trial
+from legbench.identify.verdict import reasons_against
+from legbench.identify.wiring import check_wiring
+
+ALIKE: Final = 0.99
+"""Correlation from which two parameters are told to be hard to tell apart [-]."""
+APART: Final = 0.5
+"""Largest logarithm by which the further starts are off [-]: 0.6 to 1.65 times."""
+SAME: Final = 1e-3
+"""Share of the sum of squares within which two starts have ended alike [-]."""
+
+Say = Callable[[str], None]
+"""Told what is being done."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Question:
+    """What is to be learned, from which runs, starting where."""
+
+    design: LegDesign
+    """Leg as designed, where a fit starts."""
+    trials: tuple[Trial, ...]
+    held_out: tuple[Trial, ...] = ()
+    free: Freedom = field(default_factory=Freedom)
+    mass: float | None = None
+    """Mass of the whole leg as weighed [kg]; none: that of the design."""
+    bars: Bars | None = None
+    """Bars of the linkage; none: they weigh nothing."""
+    starts: int = 3
+    """Number of starts of the fit, the first from the design."""
+    seed: int = 0
+    """Source of the further starts."""
+
+    def __post_init__(self) -> None:
+        if not self.trials:
+            raise ConfigError("no run to learn from; give one or more")
+        if self.starts < 1:
+            raise ConfigError(f"starts is {self.starts}; it must be 1 or more")
+        if self.mass is not None and not 0.0 < self.mass < np.inf:
+            raise ConfigError(f"mass is {self.mass:g} kg; it must be positive and finite")
+
+    @property
+    def leg(self) -> Leg:
+        """Leg that the fit starts from."""
+        return Leg.of(self.design, bars=self.bars, mass=self.mass)
+
+
+def identify(question: Question, say: Say = lambda _: None) -> Outcome:
+    """Learn the parameters of a leg from runs.
+
+    Raises:
+        UnidentifiableError: the runs cannot show what is to be free; says which direction is
+            unseen, and what to add.
+        PlantFault: the design cannot be predicted at all.
+    """
+    leg, trials = question.leg, question.trials
+    runs = tuple(trial.name for trial in trials)
+    say("checking the data")
+    findings = _findings(question, leg)
+    if any(finding.hopeless for finding in findings):
+        reasons = tuple(f"{each.run}: {each.text}" for each in findings)
+        return Outcome(runs=runs, findings=tuple(findings), reasons=reasons)
+    problem = Problem(trials, leg.reach, question.free)
+    guess = Guess(values=leg.values, starts=nothing_moved(trials))
+    gate = look(problem.misfit(guess), problem.names)
+    check_gate(gate, {trial.setup for trial in trials})
+    say("fitting")
+    fits = fits_from(problem, guess, question.starts, question.seed)
+    best = min(fits, key=lambda each: each.misfit.cost)
+    agreeing = [each for each in fits if each.misfit.cost <= best.misfit.cost * (1.0 + SAME)]
+    outcome = Outcome(
+        runs=runs,
+        findings=tuple(findings),
+        starts=question.starts,
+        agreeing=len(agreeing),
+        evaluations=sum(each.evaluations for each in fits),
+        converged=best.converged,
+    )
+    say("judging")
+    return _judged(question, problem, best.misfit, outcome)
+
+
+def _judged(question: Question, problem: Problem, misfit: Misfit, begun: Outcome) -> Outcome:
+    """Add to an outcome what is known once the fit has ended."""
+    trials, names = question.trials, question.free.names
+    gate = look(misfit, problem.names)
+    check_gate(gate, {trial.setup for trial in trials})
+    spread = spread_of(misfit, trials)
+    correlation = spread.correlation[: len(names), : len(names)]
+    scores = scores_of(problem, misfit)
+    values = misfit.guess.values
+    outcome = replace(
+        begun,
+        gate=gate,
+        estimates=estimates_of(names, question.leg.values, values, spread),
+        correlation=correlation,
+        alike=tuple(pairs_alike(correlation, names, ALIKE)),
+        values=values,
+        misfit=misfit,
+        residuals=tuple(residuals_of(misfit, trials)),
+        scores=tuple(scores),
+        alternatives=tuple(explain(problem, misfit, scores)),
+        held_out=tuple(hold_out(each, misfit.guess, problem.reach) for each in question.held_out),
+    )
+    return replace(outcome, reasons=tuple(reasons_against(outcome)))
+
+
+def _findings(question: Question, leg: Leg) -> list[Finding]:
+    limits = question.design.limits
+    found = [each for trial in question.trials for each in check_data(trial, limits)]
+    if any(finding.hopeless for finding in found):
+        return found
+    guess = Guess(values=leg.values, starts=nothing_moved(question.trials))
+    wrong = check_wiring(question.trials, guess, leg.reach)
+    # Angles of encoders that are wired otherwise say nothing about stops.
+    rewired = {each.run for each in wrong}
+    return [each for each in found if each.run not in rewired or each.what != "stop"] + wrong
+
+
+def fits_from(problem: Problem, guess: Guess, starts: int, seed: int = 0) -> list[Fit]:
+    """Fits from a guess and from legs beside it; raises PlantFault where the first cannot be."""
+    found = [fit(problem, guess)]
+    random = np.random.default_rng(seed)
+    for _ in range(starts - 1):
+        try:
+            found.append(fit(problem, beside(guess, problem.freedom, problem.reach, random, APART)))
+        except PlantFault:
+            continue
+    return found
+
+
+def beside(
+    guess: Guess, free: Freedom, reach: float, random: np.random.Generator, apart: float
+) -> Guess:
+    """Guess whose free positive parameters are off by factors, mended to be a leg."""
+    names = [name for name in free.names if guess.values[INDEX[name]] > 0.0]
+    factors = np.exp(random.uniform(-apart, apart, len(names)))
+    found = guess
+    for name, factor in zip(names, factors.tolist(), strict=True):
+        found = found.at(name, float(guess.values[INDEX[name]]) * factor)
+    return replace(found, values=mended(found.values, reach)) if _shapes(free) else found
+
+
+def _shapes(free: Freedom) -> bool:
+    """Whether the coupling of the inertias may be changed."""
+    return "B" in free.names

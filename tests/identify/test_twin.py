@@ -1,0 +1,71 @@
+"""The loop closed on the desk: a leg behind emulated drives is driven, recorded and identified.
+
+Its hidden parameters are found, and the identified design predicts a hop that no fit has seen.
+"""
+
+from pathlib import Path
+
+import pytest
+from twins import PROTOTYPE
+
+import legbench
+from legbench.control import JumpConfig, PositionJumpConfig
+from legbench.design.setup import Setup, SetupKind
+from legbench.design.toml import load_design
+from legbench.errors import ConfigError
+from legbench.experiment import Experiment
+from legbench.identify import design_text, identify, parse_free, question_of, repeat, written_back
+from legbench.identify.base import Leg
+from legbench.identify.parameters import INDEX
+from legbench.identify.trial import bars_of
+from legbench.imperfections import Imperfections
+from legbench.plants import EMULATED, CanChoice
+
+HIDDEN = Imperfections(
+    stiffness_error=(0.05, -0.03),
+    damping_error=(0.2, -0.1),
+    com_error=(0.003, 0.0, -0.002),
+    inertia_error=(0.05, -0.04, 0.02),
+)
+ROOT = Path(__file__).parents[2]
+
+
+def driven(controller: PositionJumpConfig | JumpConfig, kind: SetupKind,
+           duration: float) -> legbench.Recording:  # fmt: skip
+    return legbench.run(
+        Experiment(
+            design=PROTOTYPE,
+            controller=controller,
+            setup=Setup(kind=kind),
+            plant=CanChoice(bus=ROOT / "hardware" / "leg.toml", interface=EMULATED),
+            imperfections=HIDDEN,
+            duration=duration,
+        )
+    )
+
+
+def test_a_twin_behind_emulated_drives_is_identified_and_its_hop_predicted(
+    tmp_path: Path,
+) -> None:
+    step = PositionJumpConfig(z2=1.0, dz2=0.3, delay=0.05)
+    runs = [driven(step, SetupKind.VFTS, 0.7), driven(step, SetupKind.FFS, 0.7)]
+    question = question_of(runs, free=parse_free(["nine"]), starts=1)
+    outcome = identify(question)
+    assert outcome.trusted, outcome.reasons
+    truth = Leg.of(HIDDEN.leg_of(PROTOTYPE), bars=bars_of(runs[0])).values
+    for each in outcome.estimates:
+        share = {"k": 5e-4, "d": 2e-3, "s": 2e-3}.get(each.name[0], 5e-3)
+        assert each.value == pytest.approx(truth[INDEX[each.name]], rel=share)
+    design = written_back(PROTOTYPE, outcome, question.bars)
+    (tmp_path / "identified.toml").write_text(design_text(design, outcome))
+    identified = load_design(tmp_path / "identified.toml")
+    recorded = driven(JumpConfig(), SetupKind.JUMP, 2.6)
+    hop = repeat(recorded, identified)
+    assert hop.good, hop.text
+    assert not repeat(recorded, PROTOTYPE).good
+
+
+def test_only_a_hop_is_repeated() -> None:
+    step = driven(PositionJumpConfig(), SetupKind.FFS, 0.06)
+    with pytest.raises(ConfigError, match="is in setup 'ffs'; only a hop is repeated"):
+        repeat(step, PROTOTYPE)

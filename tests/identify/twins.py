@@ -1,0 +1,91 @@
+"""Runs of a leg whose parameters the test knows and the fit does not."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from legbench.control import ControllerSettings, PositionJumpConfig
+from legbench.design import LegDesign, load_design
+from legbench.design.setup import Setup, SetupKind
+from legbench.experiment import Experiment, run_batch
+from legbench.identify.staged import Question
+from legbench.identify.trial import FIXED, Trial, trial_of
+from legbench.imperfections import Imperfections
+from legbench.mjcf.options import Linkage, LinkageKind
+from legbench.servo import ServoConfig
+from legbench.signals import Floats
+
+PROTOTYPE = load_design(Path(__file__).parents[2] / "models" / "prototype.toml")
+NOISE = math.radians(0.05)
+REDUCED = Linkage(kind=LinkageKind.REDUCED)
+STEP = PositionJumpConfig(z2=1.0, dz2=0.3, delay=0.06)
+OFF = replace(PROTOTYPE, stiffness=(3.0, 1.7), damping=(0.0065, 0.0095))
+"""Leg from which fits start: springs and dampers 30 % off."""
+
+
+def experiments(
+    design: LegDesign = PROTOTYPE,
+    *,
+    kinds: Sequence[SetupKind] = FIXED,
+    controller: ControllerSettings = STEP,
+    linkage: Linkage = REDUCED,
+    duration: float = 0.6,
+    **flaws: tuple[float, ...],
+) -> list[Experiment]:
+    """One run in each of some setups, with noise and counts on the encoders."""
+    return [
+        Experiment(
+            design=design,
+            controller=controller,
+            setup=Setup(kind=kind),
+            linkage=linkage,
+            servo=ServoConfig(encoder_counts=65536),
+            imperfections=Imperfections(link_noise=(NOISE, NOISE), **flaws),  # pyright: ignore
+            duration=duration,
+            seed=place,
+        )
+        for place, kind in enumerate(kinds)
+    ]
+
+
+def trials(chosen: Sequence[Experiment]) -> tuple[Trial, ...]:
+    """Runs of experiments, each by the name of its setup."""
+    recordings = run_batch(chosen, threads=1)
+    return tuple(
+        replace(trial_of(recording), name=str(each.setup.kind))
+        for recording, each in zip(recordings, chosen, strict=True)
+    )
+
+
+def question(runs: Sequence[Trial], design: LegDesign = OFF, **more: object) -> Question:
+    """Question to some runs that starts once, from a leg that is 30 % off."""
+    return Question(design=design, trials=tuple(runs), starts=1, **more)  # pyright: ignore
+
+
+def stretched(trial: Trial, factor: float) -> Trial:
+    """Run whose clock goes slow by a factor: what happened, sampled at stretched times."""
+    wanted = trial.time * factor
+    joint_pos = np.stack([np.interp(wanted, trial.time, q) for q in trial.joint_pos.T], axis=1)
+    rows = np.minimum(np.round(wanted / trial.period).astype(int), len(wanted) - 1)
+    return replace(
+        trial,
+        joint_pos=joint_pos,
+        motor_pos=trial.motor_pos[rows],
+        applied_pos=trial.applied_pos[rows],
+    )
+
+
+def late(trial: Trial, cycles: int) -> Trial:
+    """Run whose link encoders answer some cycles late."""
+    first = np.repeat(trial.joint_pos[:1], cycles, axis=0)
+    return trial.with_links(np.concatenate([first, trial.joint_pos[:-cycles]]))
+
+
+def frozen(trial: Trial, joint: int, row: int) -> Trial:
+    """Run one of whose link encoders stands still from a row on."""
+    links: Floats = trial.joint_pos.copy()
+    links[row:, joint] = links[row, joint]
+    return trial.with_links(links)
