@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from test_viz_render import gl_works
 from viz_runs import record, stream_of
 
 from legbench.cli import replay
@@ -68,9 +69,6 @@ def test_no_half_figure_or_view_stays(short: Recording, tmp_path: Path) -> None:
 
 
 def test_no_half_film_stays(short: Recording, tmp_path: Path) -> None:
-    pytest.importorskip("av")
-    from test_viz_render import gl_works
-
     if not gl_works():
         pytest.skip("no OpenGL without a display")
     refused((".mp4", ".gif", ".film.png"), short, tmp_path)

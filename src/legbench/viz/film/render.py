@@ -158,12 +158,12 @@ def _still_rows(recording: Recording, playback: Playback) -> Ints:
     Otherwise they show the last jump; without jumps the widest period, which is the first of a step
     that dies away, and one of the last of an oscillation that builds up.
     """
-    begin, end = playback.span(recording.time) if not playback.whole else _cycle(recording)
+    begin, end = playback.span(recording.time) if not playback.whole else stills_span(recording)
     instants = np.linspace(begin, end, STILLS)
     return np.minimum(np.searchsorted(recording.time, instants), len(recording.time) - 1)
 
 
-def _cycle(recording: Recording) -> tuple[float, float]:
+def stills_span(recording: Recording) -> tuple[float, float]:
     """Begin and end of the last jump, of the widest period, or of the motion without either [s]."""
     run = Analysis(recording)
     jumps, periods = run.gait.jumps, run.periods
