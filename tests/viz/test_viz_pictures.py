@@ -11,6 +11,7 @@ from legbench.campaign.curves import Cell, RatingCurve
 from legbench.kinematics import leg_points
 from legbench.metrics.analysis import Analysis
 from legbench.recording.reader import Recording
+from legbench.signals import Bools
 from legbench.viz import style
 from legbench.viz.facts import facts_of
 from legbench.viz.film.labels import labelled, scale_length_mm
@@ -54,7 +55,7 @@ def test_the_scale_is_as_long_as_it_says() -> None:
     image = np.full((400, 600, 3), 255, dtype=np.uint8)
     done = labelled(image, 1.25, 1000.0)
     assert scale_length_mm(1000.0, 600) == 100
-    dark = (done < 100).all(axis=2)
+    dark: Bools = np.asarray(done.max(axis=2) < 100)
     longest = max(
         np.diff(np.flatnonzero(np.diff(np.pad(row, 1).astype(int)))).max(initial=0) for row in dark
     )
@@ -145,7 +146,9 @@ def test_ratings_near_one_are_drawn_as_what_they_lack_of_it() -> None:
     assert (axes.get_yscale(), axes.get_ylabel()) == ("log", "1 - $P^r$")
     low, high = axes.get_ylim()
     assert low > 1.5e-3 > 0.8e-5 > high
-    np.testing.assert_allclose(axes.lines[0].get_ydata(), [1e-3, 1e-5], rtol=1e-6)
+    np.testing.assert_allclose(
+        np.asarray(axes.lines[0].get_ydata(), dtype=np.float64), [1e-3, 1e-5], rtol=1e-6
+    )
     far = ratings_figure([panel([0.99, 0.8], 0.78)], "far").axes[0]
     assert (far.get_yscale(), far.get_ylabel()) == ("linear", "$P^r$")
     assert far.get_ylim()[0] < 0.78
