@@ -64,7 +64,7 @@ def test_own_signals_and_phases_are_shown(guest: Recording, tmp_path: Path) -> N
 
 def test_each_own_signal_has_a_tab_with_its_unit(guest: Recording) -> None:
     facts = facts_of(guest.description)
-    names = _view_names(blueprint(facts, room=(0.0, 1.0)).root_container)
+    names = _view_names(blueprint(facts, room=(0.0, 1.0), span=(0.0, 1.0)).root_container)
     assert {"target [rad]", "effort [W]"} <= set(names)
 
 

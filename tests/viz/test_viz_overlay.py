@@ -108,7 +108,9 @@ def test_several_runs_have_looks_and_names_of_their_own(swing: Recording) -> Non
     for place in range(3):
         assert len(dashed(figure.axes[2], place)) > 1000
     folder = f"bars / prototype {swing.path.name}"
-    assert legend(figure) == [folder, "sim / bars / prototype", "can / bars / prototype", folder]
+    *named, unrated = legend(figure)
+    assert named == [folder, "sim / bars / prototype", "can / bars / prototype", folder]
+    assert unrated.startswith("not rated")
 
 
 def test_other_setups_stubs_and_itself_are_drawn(

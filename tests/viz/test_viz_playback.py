@@ -81,11 +81,15 @@ def test_a_part_in_the_viewer_is_that_of_the_whole(hop: Recording, tmp_path: Pat
 
 def test_the_viewer_plays_at_the_speed_that_was_asked_for(hop: Recording) -> None:
     facts = facts_of(hop.description)
-    slow = blueprint(facts, room=(0.0, 1.0), playback=Playback(speed=0.25, loop=True)).time_panel
+    slow = blueprint(
+        facts, room=(0.0, 1.0), span=(0.0, 1.0), playback=Playback(speed=0.25, loop=True)
+    ).time_panel
     assert (slow.playback_speed, slow.play_state, slow.loop_mode) == (0.25, "playing", "all")
-    once = blueprint(facts, room=(0.0, 1.0), playback=Playback(begin=0.5)).time_panel
+    once = blueprint(
+        facts, room=(0.0, 1.0), span=(0.0, 1.0), playback=Playback(begin=0.5)
+    ).time_panel
     assert (once.playback_speed, once.loop_mode) == (1.0, "off")
-    usual = blueprint(facts, room=(0.0, 1.0)).time_panel
+    usual = blueprint(facts, room=(0.0, 1.0), span=(0.0, 1.0)).time_panel
     assert (usual.playback_speed, usual.play_state, usual.loop_mode) == (None, None, None)
 
 

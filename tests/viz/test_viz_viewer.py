@@ -64,7 +64,8 @@ def test_the_viewer_has_nothing_to_complain_about(
         "leg",
         "model",
         "run",
-        "P^r [-]",
+        "P^r [-], gaps: no motion to rate",
+        "colours",
         "spring torque [N m]",
     }
     picture = client.take_screenshot(next(view.view_id for view in views if view.name == "leg"))

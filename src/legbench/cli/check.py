@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from tyro.conf import Positional
 
-from legbench.cli.output import note, print_json, progress
+from legbench.cli.output import note, print_json, timed_progress
 from legbench.cli.parse import parse
 from legbench.design import LegDesign, load_design
 from legbench.design.matching import TOLERANCE, Parameters, check_conditions, standing_angle
@@ -31,7 +31,8 @@ class CheckArguments:
     tolerance: float = TOLERANCE
     """Ratio up to which a decoupling condition counts as met [-]."""
     model: bool = True
-    """Whether to measure the conditions on the generated MuJoCo model, too."""
+    """Whether to measure the conditions on the generated MuJoCo model, too; without it they are
+    computed from the design's numbers alone."""
     target: Path | None = None
     """Design file of the planned leg: prints the weights that bring the built one there."""
     tolerances: str | None = None
@@ -137,7 +138,7 @@ def add_yield(
 
     scatter = tolerances_named(tolerances)
     note(f"simulating {legs} legs with all tolerances, then some with each alone")
-    result = measure_yield(design, scatter, legs=legs, seed=seed, progress=progress)
+    result = measure_yield(design, scatter, legs=legs, seed=seed, progress=timed_progress())
     lines += ["", *yield_lines(result)]
     content["yield"] = asdict(result)
 

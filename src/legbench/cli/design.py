@@ -44,7 +44,8 @@ class DesignArguments:
     overhang: float | None = None
     """Largest reach of mass beyond both joints of its segment [m]; the paper does not ask."""
     cross_check: bool = True
-    """Whether to search by differential evolution as well, and compare."""
+    """Whether to search by differential evolution as well, and compare; without it the search takes
+    half the time, and nothing says that another leg is not better."""
     tolerances: str | None = None
     """`default` or a tolerance file: candidates also pay for the P^r that scatter costs them, and
     the yield of the result is measured."""

@@ -40,9 +40,11 @@ class ExplainArguments:
     """Method that weighs the causes with all of them there at once; needs the extra
     `screening`."""
     setups: bool = True
-    """Whether to try the best fits against everything else that was measured."""
+    """Whether to try the best fits against everything else that was measured; without it they are
+    ranked by the step's ratings alone."""
     jump: bool = True
-    """Whether to simulate the jump of the best fits, too."""
+    """Whether to simulate the jump of the best fits, too; without it the other setups alone are
+    tried, and no jump is run."""
     seed: int = 0
     """Seed of the screening; nothing else is drawn."""
     out: Path | None = None

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from tyro.conf import Positional
 
-from legbench.cli.output import note, print_json, progress
+from legbench.cli.output import note, print_json, timed_progress
 from legbench.cli.parse import parse, wrong_usage
 from legbench.export.formats import Format, export
 from legbench.recording.reader import load
@@ -46,7 +46,7 @@ def main(arguments: list[str]) -> int:
     if recording.torn is not None:
         note(f"legbench: {chosen.run} is torn ({recording.torn}); written as far as it goes")
     path = chosen.out or recording.path / f"{recording.path.resolve().name}.{kind.value}"
-    export(recording, path, kind, progress)
+    export(recording, path, kind, timed_progress())
     rows = len(recording.time)
     if chosen.json:
         print_json({"out": str(path), "format": kind.value, "rows": rows})

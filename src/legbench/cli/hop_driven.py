@@ -16,7 +16,7 @@ from legbench.cli.hop_tables import (
     family_lines,
     hop_lines,
 )
-from legbench.cli.output import note, progress
+from legbench.cli.output import note, timed_progress
 from legbench.design import LegDesign
 from legbench.errors import ConfigError
 from legbench.modes.basin import Axis, Fate, Question, map_basin
@@ -61,7 +61,9 @@ def answer(flags: "HopArguments", design: LegDesign) -> tuple[dict[str, Any], li
     for cycle in cycles:
         lines += cycle_lines(cycle)
     if flags.family is not None and flags.to is not None:
-        family = follow_hop(design, flags.jump, flags.family, chosen, flags.to, progress=progress)
+        family = follow_hop(
+            design, flags.jump, flags.family, chosen, flags.to, progress=timed_progress()
+        )
         content["family"] = family_content(family)
         lines += family_lines(family)
         if flags.out is not None:
@@ -97,7 +99,8 @@ def _hopped(leg: TaylorLeg, law: JumpLaw, start: Apex, hops: int) -> list[Apex]:
         ConfigError: the leg stops hopping before.
     """
     apexes = [start]
-    progress(0, hops)
+    tell = timed_progress()
+    tell(0, hops)
     for done in range(hops):
         after = settle(leg, law, apexes[-1], 1)[1:]
         if not after:
@@ -107,7 +110,7 @@ def _hopped(leg: TaylorLeg, law: JumpLaw, start: Apex, hops: int) -> list[Apex]:
                 f"{start.height:.4g} m: {WHY[ending]}"
             )
         apexes += after
-        progress(done + 1, hops)
+        tell(done + 1, hops)
     return apexes
 
 
@@ -180,7 +183,7 @@ def _basin(flags: "HopArguments", design: LegDesign, cycle: Cycle, out: Path) ->
         up=axis(flags.up, flags.up_span),
     )
     rows = out / "basin.jsonl"
-    fates = map_basin(question, rows, workers=flags.workers, progress=progress)
+    fates = map_basin(question, rows, workers=flags.workers, progress=timed_progress())
     plot_basin(question, fates, out / "basin.png")
     note(f"wrote {rows} and {out / 'basin.png'}")
     return fates

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from legbench.cli.output import note, print_json, progress, results_in, write_json
+from legbench.cli.output import note, print_json, results_in, timed_progress, write_json
 from legbench.cli.parse import parse
 from legbench.design import load_design
 from legbench.errors import ConfigError
@@ -117,7 +117,7 @@ def _found(flags: ModesArguments, scene: Scene) -> "ModesFound":
     names = ("radial", "polar") if flags.family is Followed.BOTH else (str(flags.family),)
     curves, ridden = responses_of(scene, flags.respond, flags.ride, flags.threshold)
     families, shown, branched = families_of(
-        scene, names, flags.energy, flags.at, branched=flags.branches, progress=progress
+        scene, names, flags.energy, flags.at, branched=flags.branches, progress=timed_progress()
     )
     return ModesFound(
         scene=scene,

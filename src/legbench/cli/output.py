@@ -4,7 +4,8 @@ import errno
 import os
 import select
 import sys
-from collections.abc import Iterator, Mapping
+import time
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -91,7 +92,8 @@ def progress(done: int, total: int, left: float | None = None) -> None:
     """Draw a line that overwrites itself, on a terminal that takes it at once.
 
     A stalled terminal (^S, a lost connection) must not hold up who reports, and one that is gone
-    is no terminal.
+    is no terminal. The bar of rich, which tyro brings along, draws from a thread of its own, which
+    waits for a stalled terminal while it holds the lock that every update takes.
 
     Args:
         done: how much is done.
@@ -107,6 +109,21 @@ def progress(done: int, total: int, left: float | None = None) -> None:
     # Blanks overwrite what a longer line before has left.
     rest = f", {duration_text(left)} left" if left is not None and done < total else ""
     _to_stderr(f"\r[{bar}] {100 * done // max(total, 1):3d} %{rest:<18}{end}")
+
+
+def timed_progress() -> Callable[[int, int], None]:
+    """Return a progress line that tells the time left, by the pace since its first report."""
+    first: list[tuple[float, int]] = []
+
+    def tell(done: int, total: int) -> None:
+        now = time.monotonic()
+        begin, before = first[0] if first else (now, done)
+        if not first:
+            first.append((now, done))
+        left = (now - begin) * (total - done) / (done - before) if done > before else None
+        progress(done, total, left)
+
+    return tell
 
 
 def duration_text(seconds: float) -> str:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from tyro.conf import Positional
 
-from legbench.cli.output import print_json, progress
+from legbench.cli.output import print_json, timed_progress
 from legbench.cli.parse import parse
 from legbench.cli.playback_arguments import PlaybackArguments
 from legbench.recording.reader import load
@@ -34,7 +34,9 @@ def main(arguments: list[str]) -> int:
     recording = load(chosen.run)
     from legbench.viz.film.render import render
 
-    written = render(recording, chosen.out, time=chosen.time, progress=progress, playback=playback)
+    written = render(
+        recording, chosen.out, time=chosen.time, progress=timed_progress(), playback=playback
+    )
     if chosen.json:
         print_json({"out": str(written)})
     else:

@@ -1,6 +1,9 @@
 """`legbench replay`: a recorded run, rated again, shown, and made to happen again."""
 
+import os
+import tempfile
 from contextlib import suppress
+from pathlib import Path
 
 from legbench.cli.output import note, print_json
 from legbench.cli.parse import parse
@@ -91,12 +94,11 @@ def show(
     from legbench.viz.live.rrd import write_rrd
     from legbench.viz.live.viewer import open_viewer
 
-    path = recording.path
-    beside = path / "view.rrd" if path.is_dir() else path.with_suffix(".rrd")
-    playback = chosen.playback.playback
-    rrd = write_rrd(recording, chosen.rrd or beside, others, playback, summary=summary)
+    playback, watched = chosen.playback.playback, chosen.view or chosen.serve
+    rrd = chosen.rrd or _beside(recording.path, watched)
+    write_rrd(recording, rrd, others, playback, summary=summary)
     note(f"wrote {rrd}")
-    if not (chosen.view or chosen.serve):
+    if not watched:
         return
     viewer = open_viewer(rrd, serve=chosen.serve)
     if viewer.url is not None:
@@ -104,3 +106,13 @@ def show(
         with suppress(KeyboardInterrupt):
             viewer.wait()
         viewer.stop()
+
+
+def _beside(run: Path, watched: bool) -> Path:
+    """File for the viewer in the folder of a run, or elsewhere where that is read-only."""
+    path = run / "view.rrd" if run.is_dir() else run.with_suffix(".rrd")
+    if not watched or os.access(path.parent, os.W_OK):
+        return path
+    folder = Path(tempfile.mkdtemp(prefix="legbench-"))
+    note(f"legbench: {path.parent} cannot be written; what the viewer reads goes to {folder}")
+    return folder / f"{run.stem}.rrd"

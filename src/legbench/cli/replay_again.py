@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from legbench.cli.output import note, progress
+from legbench.cli.output import note, timed_progress
 from legbench.cli.replay_arguments import ReplayArguments
 from legbench.recording.reader import Recording
 
@@ -66,7 +66,7 @@ def _controller(recording: Recording, chosen: ReplayArguments, edits: dict[str, 
     from legbench.replay.recorded import recorded_controller
 
     controller = recorded_controller(recording, edits)
-    found = replay_controller(recording, controller, progress)
+    found = replay_controller(recording, controller, timed_progress())
     edited = f", with {', '.join(f'{key} = {value}' for key, value in edits.items())}"
     return Again(
         title=f"controller {controller.controller.kind}{edited if edits else ''}",
@@ -84,7 +84,7 @@ def _leg(recording: Recording, chosen: ReplayArguments, edits: dict[str, Any]) -
 
     leg = recorded_leg(recording, edits, plant=chosen.plant)
     source = Source(chosen.resimulate)
-    found = resimulate(recording, leg, source, progress)
+    found = resimulate(recording, leg, source, timed_progress())
     for line in found.notes:
         note(f"legbench: {line}")
     if found.fault is not None:

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from legbench.cli.output import note, progress
+from legbench.cli.output import note, timed_progress
 from legbench.cli.replay_arguments import ReplayArguments
 from legbench.errors import ConfigError
 from legbench.recording.description import describe
@@ -61,7 +61,7 @@ def _log(chosen: ReplayArguments, bus: Path) -> Recording:
     from legbench.viz.playback import cut
 
     design, setup = _leg_of(chosen)
-    decoded = load_log(chosen.run, load_bus(bus), str(bus), design, setup, progress)
+    decoded = load_log(chosen.run, load_bus(bus), str(bus), design, setup, timed_progress())
     recording = decoded.recording
     if recording.torn is not None:
         note(f"legbench: {recording.torn}; read as far as it goes")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from legbench.cli.output import note, print_json, progress, report_error
+from legbench.cli.output import note, print_json, report_error, timed_progress
 from legbench.cli.run_chosen import UsageError, chosen_by
 from legbench.errors import MissingExtraError
 from legbench.experiment.data import Experiment
@@ -110,7 +110,7 @@ def main(arguments: list[str]) -> int:
             chosen.out,
             clock=clock,
             stop=stop,
-            progress=progress,
+            progress=timed_progress(),
             on_note=report_error,
             on_started=watching.start if watched else None,
         )

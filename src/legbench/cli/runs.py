@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from tyro.conf import Positional
 
-from legbench.cli.output import print_json, progress
+from legbench.cli.output import print_json, timed_progress
 from legbench.cli.parse import parse
 from legbench.runs.columns import USUAL, column_named, names_in, titled
 from legbench.runs.index import rows_of
@@ -38,7 +38,7 @@ class RunsArguments:
 def main(arguments: list[str]) -> int:
     """Run `legbench runs`; its exit status is 0 also where no run fulfils the condition."""
     chosen = parse(RunsArguments, "runs", arguments)
-    rows = rows_of(chosen.directory, progress)
+    rows = rows_of(chosen.directory, timed_progress())
     names = names_in(rows)
     if chosen.columns == ("all",) and not chosen.json:
         print("\n".join(names))

@@ -4,8 +4,10 @@ import math
 
 from legbench.metrics import Comparison, Summary
 from legbench.metrics.rating_text import rated_lines
-from legbench.metrics.soundness import Soundness
+from legbench.metrics.soundness import LARGEST_RESIDUAL, Soundness
 
+RESIDUAL = "energy residual"
+"""Label of the energy that nothing explains."""
 Row = tuple[str, float, str, float]
 """Row of a table: label, value, unit, and factor from SI to that unit."""
 
@@ -23,10 +25,22 @@ def print_summary(summary: Summary) -> None:
     if summary.jumps:
         print(f"{'jumps':<17} {summary.jumps}")
     for label, value, unit, factor in _rows(summary):
-        if math.isfinite(value):
+        if label == RESIDUAL and value > LARGEST_RESIDUAL:
+            print(f"{label:<17} {residual_text(summary)}")
+        elif math.isfinite(value):
             print(f"{label:<17} {value * factor:.4g} {unit}")
     for warning in summary.warnings:
         print(f"{'note':<17} {warning}")
+
+
+def residual_text(summary: Summary) -> str:
+    """Say what an energy residual above its bound means: unsound numerics, or rows too sparse."""
+    if summary.numerics != Soundness.UNSOUND:
+        return "unknown: between rows that are not those of every cycle energy flows unseen"
+    return (
+        f"{summary.energy_residual:.3g} times the peak kinetic energy came from or went to "
+        f"nowhere; up to {LARGEST_RESIDUAL:g} a run is sound"
+    )
 
 
 def limited(summary: Summary) -> str:
@@ -63,7 +77,7 @@ def _rows(summary: Summary) -> tuple[Row, ...]:
         ("hopping", summary.hop_freq, "Hz", 1.0),
         ("polar angle, max", summary.polar_max, "rad", 1.0),
         ("loop gap, max", summary.loop_gap_max, "um", 1e6),
-        ("energy residual", summary.energy_residual, "of the peak kinetic energy", 1.0),
+        (RESIDUAL, summary.energy_residual, "of the peak kinetic energy", 1.0),
         ("duration", summary.duration, "s", 1.0),
         ("speed", summary.real_time_factor, "x real time", 1.0),
     )

@@ -9,6 +9,9 @@ from legbench.mjcf.options import Linkage, LinkageKind
 GREY, BLUE, GREEN, BLACK, ORANGE = "segment", "trunk", "bar_green", "bar_black", "servo"
 BAR_SIDE = 0.014
 """How far the bars run beside the segments; seen only, hinges stay in the plane [m]."""
+TIP_BALL = 0.007
+"""Radius of the ball that is seen at the tip [m]: more than the 6 mm of the foot's round end, whose
+surface would else lie in that of the ball, and the two fight for every pixel."""
 MATERIALS = {
     GREY: (0.80, 0.80, 0.82, 1.0),
     BLUE: (0.16, 0.36, 0.62, 1.0),
@@ -86,7 +89,7 @@ def dress(spec: mujoco.MjSpec, design: LegDesign, linkage: Linkage) -> None:
             name="tip_ball",
             type=mujoco.mjtGeom.mjGEOM_SPHERE,
             pos=spec.site("tip").pos.tolist(),
-            size=[0.006, 0.0, 0.0],
+            size=[TIP_BALL, 0.0, 0.0],
             material="tip",
         )
     )

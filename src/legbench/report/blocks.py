@@ -113,7 +113,7 @@ def ratings_block(name: str, title: str, caption: str, contents: Sequence[Rating
     def draw(content: RatingPanel, panel: Axes) -> None:
         draw_ratings(panel, content, looks, INK)
         panel.set_xlabel("oscillation period")
-        panel.set_ylabel("Pʳ")
+        panel.set_ylabel(looks.scales[content.group].label("Pʳ"))
 
     panels = []
     for place, content in enumerate(contents):

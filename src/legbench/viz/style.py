@@ -138,6 +138,12 @@ def colours_by_code(phases: Sequence[PhaseInfo], codes: Ints) -> Colours:
     return palette[np.clip(codes, 0, LARGEST_CODE)]
 
 
+def faint(colour: Rgb) -> Rgb:
+    """Return a colour half way to grey."""
+    red, green, blue = ((own + grey) // 2 for own, grey in zip(colour, GREY, strict=True))
+    return (red, green, blue)
+
+
 def packed(colour: Rgb) -> int:
     """Colour as 0xRRGGBBAA, as rerun's state configuration requires it."""
     red, green, blue = colour

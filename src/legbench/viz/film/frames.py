@@ -40,6 +40,9 @@ class Size:
 class Film:
     """A run's model, ready to be photographed from the side.
 
+    Attributes:
+        time: plant time of each row of the run (n,) [s].
+
     Raises:
         RecordingError: the run has no rows.
         FormatError: its manifest describes no model that can be drawn.
@@ -52,8 +55,13 @@ class Film:
         self._camera = self._posed.model.camera(CAMERA).id
         self._hip = self._posed.hip(hip_of(recording, facts))
         self._joint = recording["joint_pos"]
-        self._time = recording.time
-        self._start = self._frame(leg_points(self._joint, facts.run.design.lengths))
+        self.time = recording.time
+        self._half_angle = 0.5 * float(np.radians(self._posed.model.cam_fovy[self._camera]))
+        self._start, self._distance = self._frame(leg_points(self._joint, facts.run.design.lengths))
+
+    def scale(self, size: Size) -> float:
+        """Pixels that a metre beside the leg takes in images of a size [1/m]."""
+        return size.height / (2.0 * self._distance * np.tan(self._half_angle))
 
     def shoot(
         self, rows: Ints, size: Size, *, follow: bool = True, smooth: bool = True
@@ -88,17 +96,16 @@ class Film:
                 scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = False
                 yield screen.draw(scene)
 
-    def _frame(self, points: Floats) -> Floats:
-        """Camera position (3,) from which every height that trunk and leg reach is seen [m]."""
+    def _frame(self, points: Floats) -> tuple[Floats, float]:
+        """Camera position (3,) from which trunk and leg are always seen, and its distance [m]."""
         model, data = self._posed.model, self._posed.data
         mujoco.mj_kinematics(model, data)
         mujoco.mj_camlight(model, data)
         heights = self._hip[:, 1:] + points[..., 1]
         low, high = heights.min() - BELOW, heights.max() + ABOVE
-        half_angle = 0.5 * np.radians(model.cam_fovy[self._camera])
-        distance = 0.5 * (high - low) / np.tan(half_angle)
+        distance = 0.5 * float(high - low) / np.tan(self._half_angle)
         backwards = data.cam_xmat[self._camera].reshape(3, 3)[:, 2]
-        return np.array([0.0, 0.0, 0.5 * (low + high)]) + distance * backwards
+        return np.array([0.0, 0.0, 0.5 * (low + high)]) + distance * backwards, distance
 
     def _ahead(self, rows: Ints, follow: bool) -> Floats:
         """Forward position (m,) of the camera, which follows the averaged hip or stays put [m]."""
@@ -107,6 +114,6 @@ class Film:
             return np.full(len(rows), forward[rows].mean())
         sums = np.concatenate([[0.0], np.cumsum(forward)])
         half = 0.5 * CALM
-        first = np.searchsorted(self._time, self._time[rows] - half)
-        stop = np.searchsorted(self._time, self._time[rows] + half, side="right")
+        first = np.searchsorted(self.time, self.time[rows] - half)
+        stop = np.searchsorted(self.time, self.time[rows] + half, side="right")
         return (sums[stop] - sums[first]) / (stop - first)

@@ -7,12 +7,14 @@ import numpy as np
 
 from legbench.errors import ConfigError
 from legbench.metrics.analysis import Analysis
+from legbench.metrics.periods import STILL as AT_REST
 from legbench.recording.reader import Recording
 from legbench.signals import Ints
 from legbench.viz.drafts import draft_of
 from legbench.viz.film._imageio import Image as Picture
 from legbench.viz.film._imageio import av
 from legbench.viz.film.frames import Film, Size
+from legbench.viz.film.labels import labelled
 from legbench.viz.film.offscreen import Image
 from legbench.viz.playback import WHOLE, Playback
 
@@ -25,6 +27,8 @@ PRESET = "veryfast"
 """Preset of the encoder: a third of the usual time, for files that are hardly larger."""
 GAP = 3
 """Gap between two stills of a series [pixels]."""
+SAME = 0.999
+"""Share of the widest period's amplitude from which on a period counts as being as wide [-]."""
 STILLS = 7
 """Number of stills in a series from one lower apex to the next, as in Fig. 7."""
 
@@ -71,10 +75,20 @@ def render(
             fps, size = (VIDEO_FPS, VIDEO) if kind == ".mp4" else (ANIMATION_FPS, ANIMATION)
             rows = playback.frames(recording.time, fps)
             # In a video nobody sees the steps of an edge, and everybody waits for it.
-            images = film.shoot(rows, size, smooth=kind == ".gif")
+            images = _shots(film, rows, size, smooth=kind == ".gif")
             write = _write_video if kind == ".mp4" else _write_animation
             write(draft, _told(images, len(rows), progress))
     return path
+
+
+def _shots(
+    film: Film, rows: Ints, size: Size, *, follow: bool = True, smooth: bool = True
+) -> Iterator[Image]:
+    """Images of the rows, each with its time and with the scale in its lower left corner."""
+    scale = film.scale(size)
+    images = film.shoot(rows, size, follow=follow, smooth=smooth)
+    for row, image in zip(rows.tolist(), images, strict=True):
+        yield labelled(image, float(film.time[row]), scale)
 
 
 def _check_playback(kind: str, playback: Playback, time: float | None) -> None:
@@ -125,7 +139,7 @@ def _write_stills(
     single: bool,
 ) -> None:
     size = FRAME if single else STILL
-    images = list(_told(film.shoot(rows, size, follow=False), len(rows), progress))
+    images = list(_told(_shots(film, rows, size, follow=False), len(rows), progress))
     white = np.full((size.height, GAP, 3), 255, dtype=np.uint8)
     strip = np.concatenate([part for image in images for part in (white, image)][1:], axis=1)
     Picture.fromarray(strip).save(path, format="PNG")
@@ -141,19 +155,25 @@ def _row_at(recording: Recording, time: float) -> Ints:
 def _still_rows(recording: Recording, playback: Playback) -> Ints:
     """Rows of the stills, evenly spread over a part of the run that was asked for.
 
-    Otherwise they show the last jump, or the last period without jumps.
+    Otherwise they show the last jump; without jumps the widest period, which is the first of a step
+    that dies away, and one of the last of an oscillation that builds up.
     """
-    begin, end = playback.span(recording.time) if not playback.whole else _last_cycle(recording)
+    begin, end = playback.span(recording.time) if not playback.whole else stills_span(recording)
     instants = np.linspace(begin, end, STILLS)
     return np.minimum(np.searchsorted(recording.time, instants), len(recording.time) - 1)
 
 
-def _last_cycle(recording: Recording) -> tuple[float, float]:
-    """Begin and end of the last jump, or of the last period without jumps [s]."""
+def stills_span(recording: Recording) -> tuple[float, float]:
+    """Begin and end of the last jump, of the widest period, or of the motion without either [s]."""
     run = Analysis(recording)
-    jumps, periods, begin, end = run.gait.jumps, run.periods, run.time[0], run.time[-1]
+    jumps, periods = run.gait.jumps, run.periods
     if len(jumps):
-        begin, end = jumps.start[-1], jumps.end[-1]
-    elif len(periods):
-        begin, end = periods.start[-1], periods.end[-1]
-    return float(begin), float(end)
+        return float(jumps.start[-1]), float(jumps.end[-1])
+    if len(periods):
+        # Turning points lie between rows: periods as wide as the widest but for that are as good.
+        widest = int(np.flatnonzero(periods.amplitude > SAME * periods.amplitude.max())[-1])
+        return float(periods.start[widest]), float(periods.end[widest])
+    rate = np.abs(run.trajectory.modal_rate[:, 1])
+    moving = np.flatnonzero(rate > AT_REST * rate.max(initial=0.0))
+    begin, end = (moving[0], moving[-1]) if len(moving) > 1 else (0, -1)
+    return float(run.time[begin]), float(run.time[end])

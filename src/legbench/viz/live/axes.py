@@ -11,6 +11,7 @@ import numpy as np
 from legbench.signals import Floats
 from legbench.viz import style
 from legbench.viz.live._rerun import rr
+from legbench.viz.live.key import log_key
 from legbench.viz.ticks import tick_labels, ticks
 
 WIDTH = HEIGHT = 4.0
@@ -40,6 +41,8 @@ class PlotSpec:
     """Shortest ranges of x and y, so that very small motion is not magnified."""
     trail: float = 2.0
     """Time that the coloured trail covers [s]."""
+    key: tuple[tuple[str, style.Rgb], ...] = ()
+    """Words that explain the colours of the trail, each in its colour."""
 
 
 def draw_axes(stream: rr.RecordingStream, spec: PlotSpec, x: Span, y: Span) -> None:
@@ -59,6 +62,7 @@ def draw_axes(stream: rr.RecordingStream, spec: PlotSpec, x: Span, y: Span) -> N
     ]
     placed += [((0.5 * WIDTH, 0.46), spec.x.text), ((0.0, -HEIGHT - 0.24), spec.y.text)]
     stream.log(f"{spec.path}/axes/labels", _texts(placed), static=True)
+    log_key(stream, f"{spec.path}/axes/key", spec.key, WIDTH, -HEIGHT - 0.24)
     if spec.through is not None:
         _draw_modes(stream, spec.path, spec.through, (x, y))
 

@@ -18,6 +18,8 @@ PATH, VIEW = "/leg/plane", "/leg/view"
 """Entity paths of the drawing, and of the frame that follows the hip and shows it."""
 TRUNK_HALF = (0.055, 0.02)
 """Half width and half height of the trunk [m]."""
+TRUNK_LINE = 0.003
+"""Radius of the trunk's outline [m]."""
 FORCE_SCALE = 0.003
 """Length of the arrow that shows the contact force [m/N]."""
 FORCE_MAX = 80.0
@@ -34,6 +36,14 @@ def bar_points(joint: Floats, lengths: tuple[float, float, float], arm: float) -
     stub = (lengths[0] + arm) * thigh
     black = [lengths[0] * thigh, stub, stub + lengths[1] * shank]
     return [np.stack(points, axis=1) for points in (green, black)]
+
+
+def trunk_lines() -> list[list[list[float]]]:
+    """The outline of the trunk and its mount, in the hip's frame [m]."""
+    width, height = TRUNK_HALF
+    low, high = 0.012, 0.012 + 2.0 * height
+    box = [[-width, low], [width, low], [width, high], [-width, high], [-width, low]]
+    return [box, [[0.0, 0.0], [0.0, low]]]
 
 
 @final
@@ -103,11 +113,9 @@ class Leg2D:
         self._stream.send_columns(f"{PATH}/force", index, arrows)
 
     def _draw_trunk(self) -> None:
-        width, height = TRUNK_HALF
-        low, high = 0.012, 0.012 + 2.0 * height
-        box = [[-width, low], [width, low], [width, high], [-width, high], [-width, low]]
-        mount = [[0.0, 0.0], [0.0, low]]
-        looks = rr.LineStrips2D([box, mount], colors=[style.TRUNK], radii=[0.003], draw_order=9)
+        looks = rr.LineStrips2D(
+            trunk_lines(), colors=[style.TRUNK], radii=[TRUNK_LINE], draw_order=9
+        )
         self._stream.log(f"{PATH}/trunk/box", looks, static=True)
 
     def _draw_ground(self) -> None:

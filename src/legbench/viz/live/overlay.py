@@ -10,12 +10,11 @@ import numpy as np
 
 from legbench.kinematics import leg_points
 from legbench.recording.reader import Recording
-from legbench.signals import Floats
 from legbench.viz import style
 from legbench.viz.facts import Facts, facts_of
 from legbench.viz.live._rerun import rr
 from legbench.viz.live.leg2d import FREQ as LEG_FREQ
-from legbench.viz.live.leg2d import PATH, hip_of
+from legbench.viz.live.leg2d import PATH, TRUNK_LINE, hip_of, trunk_lines
 from legbench.viz.trace import Thinner, Tracer
 
 COLOURS: tuple[style.Rgb, ...] = ((200, 150, 198), (196, 176, 130), (130, 180, 150))
@@ -98,7 +97,9 @@ class Overlay:
     def _push_leg(self) -> None:
         other, path = self._other, f"{PATH}/{self._other.key}"
         kept = Thinner(LEG_FREQ).pick(self.trace.time)
-        points = self._leg()[kept]
+        hip = hip_of(other.recording, other.facts)[kept]
+        joint = self.trace.joint[kept]
+        points = hip[:, None] + leg_points(joint, other.facts.run.design.lengths)
         colour = [*other.colour, OPACITY]
         lines = rr.LineStrips2D.from_fields(colors=[colour], radii=[SEGMENT], draw_order=6.0)
         tip = rr.Points2D.from_fields(colors=[colour], radii=[TIP], draw_order=7.0)
@@ -109,8 +110,9 @@ class Overlay:
         self._stream.send_columns(f"{path}/segments", index, strips)
         tips = rr.Points2D.columns(positions=points[:, 3])
         self._stream.send_columns(f"{path}/tip", index, tips)
-
-    def _leg(self) -> Floats:
-        """Positions of hip, knees and foot tip in the world (n, 4, 2) [m]."""
-        hip = hip_of(self._other.recording, self._other.facts)
-        return hip[:, None] + leg_points(self.trace.joint, self._other.facts.run.design.lengths)
+        trunk = rr.LineStrips2D(
+            trunk_lines(), colors=[colour], radii=[0.6 * TRUNK_LINE], draw_order=5.0
+        )
+        self._stream.log(f"{path}/trunk/box", trunk, static=True)
+        moved = rr.Transform3D.columns(translation=np.pad(hip, ((0, 0), (0, 1))))
+        self._stream.send_columns(f"{path}/trunk", index, moved)

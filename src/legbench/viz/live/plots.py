@@ -9,6 +9,7 @@ from legbench.viz import style
 from legbench.viz.facts import Facts
 from legbench.viz.live._rerun import rr
 from legbench.viz.live.axes import PlotSpec
+from legbench.viz.live.key import period_key, phase_key, stance_key
 from legbench.viz.live.xyplot import XYPlot
 from legbench.viz.trace import Thinner, TracedRows
 
@@ -21,7 +22,11 @@ more: eleven minutes of them, 2 MB a plane."""
 
 def plot_specs(facts: Facts) -> dict[str, PlotSpec]:
     """The plots by name; jumps are coloured by stance and flight, the rest by period."""
-    coloured = "stance / flight" if facts.run.jumps else "periods"
+    jumps = facts.run.jumps
+    coloured = "stance / flight" if jumps else "periods"
+    periods = period_key("jump" if jumps else "period")
+    phases = stance_key() if jumps else phase_key(facts, at_rest=False)
+    usual = stance_key() if jumps else periods
     return {
         "polar": PlotSpec(
             path="/plots/polar",
@@ -29,6 +34,7 @@ def plot_specs(facts: Facts) -> dict[str, PlotSpec]:
             x=style.X1,
             y=style.X2,
             least=(style.POLAR_LEAST, 0.0),
+            key=usual,
         ),
         "joint": PlotSpec(
             path="/plots/joint",
@@ -38,15 +44,21 @@ def plot_specs(facts: Facts) -> dict[str, PlotSpec]:
             equal=True,
             margin=0.12,
             through=facts.rest,
+            key=usual,
         ),
         "periods": PlotSpec(
             path="/plots/periods",
-            title=f"{style.MODAL}: {'jumps' if facts.run.jumps else 'periods'}",
+            title=f"{style.MODAL}: {'jumps' if jumps else 'periods'}",
             x=style.Z2,
             y=style.DZ2,
+            key=periods,
         ),
         "phases": PlotSpec(
-            path="/plots/phases", title=f"{style.MODAL}: {_phases(facts)}", x=style.Z2, y=style.DZ2
+            path="/plots/phases",
+            title=f"{style.MODAL}: {_phases(facts)}",
+            x=style.Z2,
+            y=style.DZ2,
+            key=phases,
         ),
     }
 

@@ -10,8 +10,10 @@ from typing import final
 from legbench.metrics.source import Recorded
 from legbench.metrics.summary import Summary
 from legbench.viz.facts import Facts, as_markdown
+from legbench.viz.force_axis import ForceAxis, force_axis, live_force_axis
 from legbench.viz.live._rerun import rr
 from legbench.viz.live.blueprint import blueprint
+from legbench.viz.live.key import log_state_key
 from legbench.viz.live.leg2d import Leg2D, hip_of, leg_room
 from legbench.viz.live.overlay import Other, Overlay
 from legbench.viz.live.plots import Plots
@@ -20,7 +22,7 @@ from legbench.viz.live.scene import ModelScene
 from legbench.viz.live.series import Series
 from legbench.viz.live.states import States
 from legbench.viz.playback import WHOLE, Playback
-from legbench.viz.trace import Tracer
+from legbench.viz.trace import Tracer, stance_of
 
 APPLICATION = "legbench"
 """Application id under which the viewer keeps the layout that a user has arranged."""
@@ -55,6 +57,7 @@ class Publisher:
             Series(stream, facts),
             self._rating,
         )
+        log_state_key(stream, facts)
         self.describe(facts)
 
     def describe(self, facts: Facts, summary: Summary | None = None) -> None:
@@ -74,10 +77,23 @@ class Publisher:
         room = leg_room(self._facts, hip, live=self._live)
         keys = [other.key for other in self._others]
         layout = blueprint(
-            self._facts, room=room, live=self._live, others=keys, playback=self._playback
+            self._facts,
+            room=room,
+            span=(float(rows.time[0]), float(rows.time[-1])),
+            force=self._force_axis(rows),
+            live=self._live,
+            others=keys,
+            playback=self._playback,
         )
         self._stream.send_blueprint(layout)
         self._laid_out = True
+
+    def _force_axis(self, rows: Recorded) -> ForceAxis | None:
+        """Axis of the contact force, for these rows or for those of a run that goes on."""
+        run = self._facts.run
+        if self._live:
+            return live_force_axis(run.design.total_mass)
+        return force_axis(rows["contact_force"], stance_of(rows, run.setup.kind))
 
     def pass_over(self, rows: Recorded) -> None:
         """Leave rows out that come before those that are shown; their periods count."""

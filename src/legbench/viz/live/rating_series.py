@@ -62,7 +62,8 @@ class RatingSeries:
     """Publisher of P^r of every finished period, or of every stance and flight of a jump.
 
     Each is rated about the motor and about the equilibrium, and shown as P^r and, since ratings
-    near one differ there alone, as the logarithm of 1 - P^r.
+    near one differ there alone, as the logarithm of 1 - P^r. What has too little motion to be rated
+    is a gap in the line.
     """
 
     def __init__(self, stream: rr.RecordingStream, facts: Facts) -> None:
@@ -77,12 +78,12 @@ class RatingSeries:
         self._whole = False
         self._hip = np.nan
         for reference in REFERENCES:
-            width = 1.5 if reference is facts.run.reference else 0.75
+            leads = reference is facts.run.reference
             for name in ("flight", "stance") if facts.run.jumps else ("period",):
                 looks = rr.SeriesLines(
-                    names=[f"{name}, about the {reference.value}"],
-                    colors=[LANES[name]],
-                    widths=[width],
+                    names=[f"{name}, {reference.value}"],
+                    colors=[LANES[name] if leads else style.faint(LANES[name])],
+                    widths=[1.5 if leads else 0.75],
                     interpolation_mode="StepBefore",
                 )
                 for origin in (ORIGIN, LOST):
@@ -169,10 +170,10 @@ class RatingSeries:
             # In flight nothing is carried: the equilibrium is the motor's position.
             place = REFERENCES.index(Reference.MOTOR if name == "flight" else reference)
             rated = int(stretch.rated[place])
-            if rated < SHORTEST:
-                continue
-            value = float(stretch.total[place]) / rated
-            lost = np.log10(max(1.0 - value, LEAST))
+            # What is not rated is a gap in the line, which would else go on from before.
+            known = rated >= SHORTEST
+            value = float(stretch.total[place]) / rated if known else np.nan
+            lost = np.log10(np.maximum(1.0 - value, LEAST))
             for origin, shown in ((ORIGIN, value), (LOST, lost)):
                 column = rr.Scalars.columns(scalars=[shown])
                 self._stream.send_columns(f"{origin}/{reference.value}/{name}", index, column)

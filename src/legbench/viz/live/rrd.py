@@ -11,6 +11,7 @@ from legbench.viz.facts import facts_of
 from legbench.viz.live._rerun import rr
 from legbench.viz.live.overlay import other_of
 from legbench.viz.live.publish import APPLICATION, Publisher
+from legbench.viz.live.rrd_sink import saved
 from legbench.viz.playback import WHOLE, Playback, cut
 
 WINDOW_ROWS = 1 << 18
@@ -48,13 +49,12 @@ def write_rrd(
     others = [other_of(run, place, facts) for place, run in shown]
     with draft_of(path) as draft:
         stream = rr.RecordingStream(APPLICATION, recording_id=facts.run.id)
-        stream.save(draft)
-        publisher = Publisher(stream, facts, others=others, playback=playback)
-        publisher.lay_out(RowWindow(recording, rows.start, rows.stop))
-        _push(publisher, recording, rows)
-        publisher.finish()
-        publisher.describe(facts, summarise(recording) if summary is None else summary)
-        stream.disconnect()
+        with saved(stream, draft):
+            publisher = Publisher(stream, facts, others=others, playback=playback)
+            publisher.lay_out(RowWindow(recording, rows.start, rows.stop))
+            _push(publisher, recording, rows)
+            publisher.finish()
+            publisher.describe(facts, summarise(recording) if summary is None else summary)
     return path
 
 

@@ -14,6 +14,7 @@ from legbench.kinematics import leg_points
 from legbench.signals import Floats
 from legbench.synthesis.manufacture import shown
 from legbench.synthesis.trace import Trace
+from legbench.viz.print.bars import CRANK, draw_bars
 
 PAGE = (297.0, 210.0)
 """Width and height of the page, A4 landscape [mm]."""
@@ -96,8 +97,11 @@ def _draw_assembly(panel: Panel, design: LegDesign, half_angle: float, per_metre
     panel.text(
         x, y + 12.5, f"trunk  {shown(design.trunk_mass, 'kg')}", ha="center", va="center", size=8
     )
+    bars = draw_bars(panel, points, per_metre)
     for index in (2, 1, 0):
         _draw_body(panel, points[index], points[index + 1], SHADES[index])
+    for pivot in bars:
+        _draw_circle(panel, pivot, 0.9, "white")
     marks = []
     for index, segment in enumerate(design.segments):
         share = segment.com / segment.length
@@ -109,7 +113,7 @@ def _draw_assembly(panel: Panel, design: LegDesign, half_angle: float, per_metre
         left = index == 1
         panel.text(
             float(points[index, 0]) + (-7.0 if left else 7.0),
-            float(points[index, 1]) + (4.0 if name == "tip" else 0.0),
+            float(points[index, 1]) + (-5.0 if name == "tip" else 0.0),
             name,
             ha="right" if left else "left",
             va="center",
@@ -156,10 +160,11 @@ def _draw_words(panel: Panel, design: LegDesign, half_angle: float, scale: float
         f"springs  $k_1$ = {first:.3f},  $k_2$ = {second:.3f} N m/rad",
         f"damping  $d_1$ = {low:.4g},  $d_2$ = {high:.4g} N m s/rad",
         "inertias about the centres of mass; centres of mass from the upper joint; lengths in mm",
+        f"green and black: the parallel bars, here on cranks of {1e3 * CRANK:g} mm, which are free",
         f"drawn at x1 = 0, q2 - q1 = {np.degrees(2.0 * half_angle):.1f} deg",
     )
     for row, line in enumerate(lines):
-        panel.text(112.0, 44.0 - 7.0 * row, line, size=8.5, color=INK)
+        panel.text(112.0, 46.0 - 6.5 * row, line, size=8.5, color=INK)
     panel.text(PAGE[0] - 12.0, 9.0, design.name, ha="right", size=13, weight="bold", color=INK)
     panel.text(112.0, 9.0, f"1 : {scale:g}", size=11, color=INK)
     span = 50.0

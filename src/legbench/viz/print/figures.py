@@ -23,6 +23,8 @@ from legbench.viz.print.panels import panels_of, size_of
 from legbench.viz.print.planes import FAINT, PLANES, draw_modes, widen
 from legbench.viz.print.thinning import draw_line, plane_stride
 
+MOST_TICKS = 3
+"""Most intervals between ticks across a third of the page: labels such as -0.0025 fit between."""
 WIDTH, WIDE = 1.3, 2.4
 """Widths of the coloured lines alone, and under the lines of another run [pt]."""
 
@@ -61,7 +63,7 @@ def phase_figure(recording: Recorded, against: Sequence[Recorded] = ()) -> Figur
             panel.set_title(f"({letter}) {title}", loc="left")
             panel.set_xlabel(x.math)
             panel.set_ylabel(y.math)
-            panel.locator_params(axis="x", nbins=4)
+            panel.locator_params(axis="x", nbins=MOST_TICKS)
             panel.locator_params(axis="y", nbins=5)
             lines = [planes[place] for planes in bright]
             _draw(panel, faint[place], lines, colouring, WIDE if against else WIDTH)

@@ -17,6 +17,7 @@ from legbench.viz.print._matplotlib import (
     styled,
 )
 from legbench.viz.print.modes import DPI, GREY, RADIAL
+from legbench.viz.print.off_data import legend_below, legend_beside
 from legbench.viz.print.save import save_figure
 
 FATES = {
@@ -44,7 +45,7 @@ def plot_return(heights: Floats, fixed: Floats, title: str, path: Path) -> None:
         axes.plot(span, span, lw=0.8, color=GREY, label="same height again")
         axes.plot(*heights.T, "o-", ms=3, lw=0.9, color=RADIAL, label="hops in a row")
         axes.plot(*fixed.T, "o", ms=7, mfc="none", color="k", ls="", label="periodic hop")
-        axes.legend(frameon=False)
+        legend_below(axes, 3)
         axes.set(
             xlabel="apex of the centre of mass [m]",
             ylabel="next apex of the centre of mass [m]",
@@ -115,7 +116,7 @@ def plot_family(family: HopFamily, title: str, path: Path) -> None:
             lower.plot(change.value, 1.0, "o", ms=6, mfc="white", color=RADIAL)
         upper.plot([], [], lw=1.6, color=RADIAL, label="stable")
         upper.plot([], [], lw=1.2, ls=":", color=RADIAL, label="not stable")
-        upper.legend(frameon=False)
+        legend_beside(upper)
         upper.set(ylabel="apex of the centre of mass [m]", title=title)
         lower.set(xlabel=LABELS[family.setting], ylabel="size of the largest multiplier")
         save_figure(figure, path, DPI)

@@ -17,6 +17,8 @@ from legbench.viz.print._matplotlib import (
 from legbench.viz.print.overlay import look_of
 from legbench.viz.print.planes import FAINT
 
+UNRATED = "not rated: at rest, before the first or after the last period that counts"
+"""Words for the rows of a run that belong to no period."""
 HANDLE, ROW = 8, 150
 """Widths of a legend's line and of its widest row [characters]."""
 
@@ -24,7 +26,7 @@ HANDLE, ROW = 8, 150
 def explain(
     figure: Figure, panels: list[Axes], colouring: Colouring, names: Sequence[str] = ()
 ) -> None:
-    """A colour bar of the periods, or a legend of stance and flight; the names of several runs."""
+    """Explain the colours of periods or of stance and flight, faint rows, and several runs."""
     lines: list[Line2D] = []
     if colouring.periods:
         _draw_bar(figure, panels, colouring)
@@ -39,6 +41,8 @@ def explain(
             colour = shown[len(shown) // 2].colour if shown else FAINT
             own = Line2D([], [], color=colour, label=names[0])
         lines = [own, *lines, *_others(names[1:])]
+    if colouring.periods:
+        lines.append(Line2D([], [], color=FAINT, label=UNRATED))
     if lines:
         wide = sum(len(str(line.get_label())) + HANDLE for line in lines) > ROW
         columns = 2 if wide else len(lines)

@@ -12,6 +12,7 @@ from legbench.signals import Floats
 from legbench.viz import style
 from legbench.viz.colouring import colouring_of
 from legbench.viz.print._matplotlib import Axes
+from legbench.viz.print.off_data import legend_beside
 from legbench.viz.print.thinning import draw_line, peaks, plane_stride, stride
 
 Dashes = tuple[float, tuple[float, ...]]
@@ -119,7 +120,7 @@ def draw_differences(
         panel.set_ylim(10.0**-DECADES * top, 3.0 * top)
         panel.grid(alpha=0.25, linewidth=0.5)
         panel.margins(x=0.0)
-    panels[1].legend(loc="lower right", ncols=2, fontsize=8.0, framealpha=0.8)
+    legend_beside(panels[1])
 
 
 def _draw_landing(panels: Sequence[Axes], landing: float, name: str) -> None:

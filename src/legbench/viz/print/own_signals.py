@@ -7,6 +7,7 @@ from legbench.metrics.source import Recorded
 from legbench.signals import Signal
 from legbench.viz import style
 from legbench.viz.print._matplotlib import Axes
+from legbench.viz.print.off_data import legend_beside
 from legbench.viz.print.overlay import look_of
 from legbench.viz.print.thinning import draw_line, peaks, stride
 
@@ -44,7 +45,7 @@ def draw_own_signals(
         panel.grid(alpha=0.25, linewidth=0.5)
         panel.margins(x=0.0)
         if signal.components:
-            panel.legend(loc="upper right", fontsize=8.0, framealpha=0.8)
+            legend_beside(panel)
 
 
 def _draw(panel: Axes, signal: Signal, run: Recorded, other: int | None = None) -> None:

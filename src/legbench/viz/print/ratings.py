@@ -7,6 +7,7 @@ from typing import Final, Literal
 import numpy as np
 
 from legbench.campaign.curves import RatingCurve
+from legbench.signals import Floats
 from legbench.viz import style
 from legbench.viz.print._matplotlib import Axes, Figure, FigureCanvasAgg, Line2D, styled
 
@@ -19,8 +20,12 @@ COLUMNS: Final = 3
 """Number of panels in a row: one for each setup."""
 GRAIN: Final = 0.02
 """Grain of the lower end of the axis of ratings [-]."""
-HIGHEST: Final = 0.95
-"""Highest lower end of that axis [-]: noise of ratings near one fills no panel."""
+NEAR_ONE: Final = 0.95
+"""Ratings that are all above this are drawn as what they lack of one, on a logarithmic axis [-]."""
+LEAST: Final = 1e-9
+"""Smallest 1 - P^r that is drawn [-]; below it there is the noise of a mean."""
+PRINTED_LEAST: Final = 0.005
+"""Half a unit of the paper's last digit [-]: a printed 1.00 may be this far from one."""
 DASHES: Final[tuple[Dashes, ...]] = ("solid", (0.0, (5.0, 2.0)), (0.0, (1.5, 1.5)))
 """Dashes of the deflections in turn, from the smallest on."""
 
@@ -55,8 +60,30 @@ class Looks:
     """Colour by set point z2 [rad]."""
     dashes: dict[str, dict[float, Dashes]]
     """Dashes by group, and by size of the deflection dz2 [rad]."""
-    lowest: dict[str, float]
-    """Lower end of the axis of ratings by group [-]."""
+    scales: dict[str, "RatingScale"]
+    """Axis of ratings by group."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RatingScale:
+    """Axis of the ratings of one group: of P^r, or of 1 - P^r where all are near one."""
+
+    lost: bool
+    """Whether 1 - P^r is drawn, logarithmically and with the best rating on top."""
+    ends: tuple[float, float]
+    """Values at the lower and the upper end [-]."""
+
+    def of(self, rating: Floats) -> Floats:
+        """Values that are drawn for some ratings."""
+        return np.maximum(1.0 - rating, LEAST) if self.lost else rating
+
+    def printed(self, rating: float) -> float:
+        """Value that is drawn for a rating that the paper prints, to its digits."""
+        return max(1.0 - rating, PRINTED_LEAST) if self.lost else rating
+
+    def label(self, symbol: str) -> str:
+        """Title of the axis, where `symbol` is that of the rating."""
+        return f"1 - {symbol}" if self.lost else symbol
 
 
 def looks_of(panels: Sequence[RatingPanel]) -> Looks:
@@ -65,21 +92,27 @@ def looks_of(panels: Sequence[RatingPanel]) -> Looks:
     palette = style.COMPONENTS
     colours = {value: style.unit(palette[n % len(palette)]) for n, value in enumerate(z2)}
     dashes: dict[str, dict[float, Dashes]] = {}
-    lowest: dict[str, float] = {}
+    scales: dict[str, RatingScale] = {}
     for group in dict.fromkeys(panel.group for panel in panels):
         shown = [panel for panel in panels if panel.group == group]
         sizes = sorted({abs(curve.cell.dz2) for panel in shown for curve in panel.curves})
         dashes[group] = {size: DASHES[n % len(DASHES)] for n, size in enumerate(sizes)}
-        lowest[group] = _lowest(shown)
-    return Looks(colours=colours, dashes=dashes, lowest=lowest)
+        scales[group] = _scale(shown)
+    return Looks(colours=colours, dashes=dashes, scales=scales)
 
 
-def _lowest(panels: Sequence[RatingPanel]) -> float:
-    """Lower end of an axis that shows all curves and printed ratings of some panels [-]."""
-    lows = [float((c.mean - c.spread).min()) for p in panels for c in p.curves if len(c.mean)]
+def _scale(panels: Sequence[RatingPanel]) -> RatingScale:
+    """Axis that shows all curves and printed ratings of some panels."""
+    curves = [curve for panel in panels for curve in panel.curves if len(curve.mean)]
     printed = [each.rating for panel in panels for each in panel.printed]
-    lowest = min([*lows, *printed, HIGHEST])
-    return max(0.0, GRAIN * float(np.floor(lowest / GRAIN - 0.5)))
+    lowest = min([*(float((each.mean - each.spread).min()) for each in curves), *printed, 1.0])
+    if lowest < NEAR_ONE or not curves:
+        low = max(0.0, GRAIN * float(np.floor(min(lowest, NEAR_ONE) / GRAIN - 0.5)))
+        return RatingScale(lost=False, ends=(low, 1.004))
+    lost = [max(1.0 - float(each.mean.max()), LEAST) for each in curves]
+    least = min([*lost, PRINTED_LEAST]) if printed else min(lost)
+    most = 2.0 * max(1.0 - lowest, PRINTED_LEAST if printed else LEAST)
+    return RatingScale(lost=True, ends=(most, 0.5 * least))
 
 
 def draw_ratings(panel: Axes, content: RatingPanel, looks: Looks, colour: str) -> None:
@@ -91,25 +124,31 @@ def draw_ratings(panel: Axes, content: RatingPanel, looks: Looks, colour: str) -
         looks: colours, dashes and axes.
         colour: colour of the printed ratings.
     """
+    scale = looks.scales[content.group]
     longest = max((len(curve.mean) for curve in content.curves), default=1)
     for curve in content.curves:
         periods = np.arange(1, len(curve.mean) + 1)
         ink = looks.colours[curve.cell.z2]
         dashes = looks.dashes[content.group][abs(curve.cell.dz2)]
-        panel.plot(periods, curve.mean, color=ink, linestyle=dashes, linewidth=1.2, zorder=3)
-        panel.plot(periods, curve.mean, ".", color=ink, markersize=3.5, zorder=3)
+        mean = scale.of(curve.mean)
+        panel.plot(periods, mean, color=ink, linestyle=dashes, linewidth=1.2, zorder=3)
+        panel.plot(periods, mean, ".", color=ink, markersize=3.5, zorder=3)
         if curve.spread.any():
             low, high = curve.mean - curve.spread, np.minimum(curve.mean + curve.spread, 1.0)
-            panel.fill_between(periods, low, high, color=ink, alpha=0.16, linewidth=0, zorder=1)
+            band = scale.of(low), scale.of(high)
+            panel.fill_between(periods, *band, color=ink, alpha=0.16, linewidth=0, zorder=1)
     for each in content.printed:
         ends = [each.first, max(longest, each.first) if each.last is None else each.last]
         look = "x" if each.first == each.last else "-"
-        at = [each.rating] * 2
+        at = [scale.printed(each.rating)] * 2
         panel.plot(ends, at, look, color=colour, markersize=6, linewidth=1.4, zorder=4)
     panel.set_xlim(0.5, max(longest, *(each.first for each in content.printed), 6) + 0.5)
-    panel.set_ylim(looks.lowest[content.group], 1.004)
+    if scale.lost:
+        panel.set_yscale("log")
+    else:
+        panel.locator_params(axis="y", nbins=6)
+    panel.set_ylim(*scale.ends)
     panel.locator_params(axis="x", nbins=8, integer=True)
-    panel.locator_params(axis="y", nbins=6)
 
 
 def ratings_figure(panels: Sequence[RatingPanel], title: str) -> Figure:
@@ -129,7 +168,7 @@ def ratings_figure(panels: Sequence[RatingPanel], title: str) -> Figure:
             panel.set_title(content.title, loc="left")
             draw_ratings(panel, content, looks, "black")
             panel.set_xlabel("oscillation period")
-            panel.set_ylabel("$P^r$")
+            panel.set_ylabel(looks.scales[content.group].label("$P^r$"))
         printed = any(panel.printed for panel in panels)
         handles = _handles(looks, printed)
         figure.legend(handles=handles, loc="outside lower center", ncols=5, frameon=False)

@@ -7,7 +7,9 @@ import numpy as np
 from legbench.replay.comparison import Replayed
 from legbench.signals import SIGNALS
 from legbench.viz import style
+from legbench.viz.force_axis import force_axis
 from legbench.viz.print._matplotlib import Axes, Figure, FigureCanvasAgg, styled
+from legbench.viz.print.off_data import legend_beside
 
 WIDTH_INCH, ROW_INCH = 10.0, 1.75
 """Width of the figure, and height of the row of each signal [inch]."""
@@ -35,6 +37,8 @@ def replay_figure(signals: Replayed, title: str) -> Figure:
             left.set_ylabel(f"{name} [{unit}]")
             right.set_ylabel(f"[{unit}]")
             _draw(left, right, signals, columns)
+            if name == "contact_force":
+                _limit_force(left, signals, columns)
         for panel in panels[-1]:
             panel.set_xlabel("$t$ [s]")
         panels[0, 0].set_title("recorded in colour, replayed dashed", loc="left")
@@ -52,6 +56,15 @@ def _groups(signals: Replayed) -> dict[str, list[str]]:
         name = known.get(column, own if len(component) == 1 and own else column)
         groups.setdefault(name, []).append(column)
     return {name: columns for name, columns in groups.items() if name not in LEFT_OUT}
+
+
+def _limit_force(panel: Axes, signals: Replayed, columns: Sequence[str]) -> None:
+    """Show the forces of stance, and say what impacts reach beyond them."""
+    force = np.stack([signals.recorded[column] for column in columns], axis=-1)
+    axis = force_axis(force, force[:, -1] > 0.0)
+    if axis is not None:
+        panel.set_ylim(axis.low, axis.high)
+        panel.set_title(axis.words, loc="right", fontsize=8.0)
 
 
 def _draw(left: Axes, right: Axes, signals: Replayed, columns: Sequence[str]) -> None:
@@ -72,7 +85,7 @@ def _draw(left: Axes, right: Axes, signals: Replayed, columns: Sequence[str]) ->
             label=column,
             rasterized=True,
         )
-    right.legend(loc="upper right", fontsize=7.5, framealpha=0.8, ncols=2)
+    legend_beside(right)
     for panel in (left, right):
         panel.grid(alpha=0.25, linewidth=0.5)
         panel.margins(x=0.0)

@@ -14,6 +14,7 @@ from legbench.modes.ridden import RiddenCurve
 from legbench.modes.scene import Scene
 from legbench.viz.print._matplotlib import Axes, Figure, styled
 from legbench.viz.print.modes import COLOURS, DPI, GREY
+from legbench.viz.print.off_data import legend_below
 from legbench.viz.print.save import save_figure
 
 CURVES = ("#26a69a", "#5c6bc0", "#8d6e63", "#ec407a", "#78909c")
@@ -68,7 +69,7 @@ def _draw_responses(
         _draw(axes, ridden.cycles, RIDDEN, label)
     axes.plot([], [], lw=1.2, ls=":", color=GREY, label="not stable")
     axes.set(xlabel="frequency [Hz]", ylabel="amplitude of $z_2$ [rad]", title="radial response")
-    axes.legend(frameon=False, fontsize=7)
+    legend_below(axes, 2)
 
 
 def _draw(axes: Axes, responses: Sequence[Response], colour: str, label: str) -> None:
@@ -104,4 +105,4 @@ def _draw_damping(axes: Axes, damped: Sequence[DampedFamily]) -> None:
     # Room above, for a ratio that hardly changes.
     largest = max(orbit.damping_ratio for family in damped for orbit in family.orbits)
     axes.set_ylim(0.0, 120.0 * largest or 1.0)
-    axes.legend(frameon=False)
+    legend_below(axes, 2)

@@ -6,6 +6,7 @@ import numpy as np
 
 from legbench.signals import Floats
 from legbench.viz.print._matplotlib import Figure, styled
+from legbench.viz.print.off_data import legend_beside
 from legbench.viz.print.save import save_figure
 
 
@@ -31,5 +32,5 @@ def _draw(late_us: Floats, exchange_us: Floats, path: Path) -> None:
     axes.set_xlabel("time [us]")
     axes.set_ylabel("share of cycles that took longer")
     axes.grid(alpha=0.3)
-    axes.legend()
+    legend_beside(axes)
     save_figure(figure, path)
