@@ -61,9 +61,8 @@ def aligned_figure(runs: Sequence[Analysis], found: SideBySide, span: float) -> 
             panel.margins(x=0.0)
         ratings.set_yscale("log")
         ratings.locator_params(axis="x", integer=True)
-        kinds = {
-            label: mark for mark, label in zip(*ratings.get_legend_handles_labels(), strict=True)
-        }
+        marks, labels = ratings.get_legend_handles_labels()
+        kinds = dict(zip(labels, marks, strict=True))  # One mark for each kind.
         if kinds:
             ratings.legend(kinds.values(), kinds.keys(), fontsize=7.5, framealpha=0.8)
         handles, labels = radial.get_legend_handles_labels()
