@@ -1,5 +1,5 @@
 .DEFAULT_GOAL := help
-.PHONY: help setup jump dist test test-engine test-readers test-socketcan check bench mutants models clean
+.PHONY: help setup jump docs dist test test-engine test-readers test-socketcan check bench mutants models clean
 
 # The first of these that is new enough; another one by make PYTHON=...
 PYTHON ?= $(shell for name in python3 python3.14 python3.13 python3.12 python3.11; do \
@@ -23,6 +23,12 @@ jump: $(STAMP) ## the prototype jumps: table, recording, .rrd and phase plots in
 
 typings/mujoco/__init__.pyi: $(STAMP)
 	@$(BIN)/python scripts/stubs.py typings
+
+docs: $(STAMP) ## the documentation's site in docs/_build/html, without a warning, every link in it checked
+	@$(BIN)/python -c 'import furo, myst_parser, sphinx' 2>/dev/null || \
+	  $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[docs]'
+	$(BIN)/python -m sphinx --quiet --nitpicky --fail-on-warning --keep-going -c docs . docs/_build/html
+	$(BIN)/python scripts/docs_links.py docs/_build/html
 
 dist: $(STAMP) ## wheel and sdist in dist/, installed and used in an empty folder
 	$(BIN)/python scripts/dist.py

@@ -112,3 +112,10 @@ def stranger() -> Sheet:
             mappable=known.mappable,
         )
     return sheet
+
+
+def fremd_7() -> Sheet:
+    """The incomplete drive of the documents, whose second encoder is an object of its maker."""
+    sheet = stranger().without(0x1006, 0x1016, (0x1018, 4), 0x605E, 0x60E4)
+    sheet.fixed({(0x1005, 0): "0x80", (0x1017, 0): "30"})
+    return sheet.add((0x2100, 0), DataType.INTEGER32, name="second encoder value")
