@@ -30,7 +30,7 @@ from legbench.analytic import Accuracy, HybridLeg, LegModel, LegState, Method, f
 from legbench.analytic import matrices as mx
 from legbench.analytic.compiled import TOLERANCE
 from legbench.analytic.contact import switch
-from legbench.analytic.lanes import Lanes
+from legbench.analytic.leg_batch import LegBatch
 from legbench.analytic.state import Regime
 from legbench.analytic.taylor import MAP_TOLERANCE, TaylorLeg
 from legbench.control import JumpConfig
@@ -131,9 +131,9 @@ def legs_a_second() -> dict[str, float]:
     ).reshape(count, 4)
     found = {}
     for name, derivatives in (("plain", False), ("with nine derivatives", True)):
-        lanes = Lanes([model] * count, Regime.PINNED, derivatives=derivatives)
+        lanes = LegBatch([model] * count, Regime.PINNED, derivatives=derivatives)
 
-        def run(lanes: Lanes = lanes) -> None:
+        def run(lanes: LegBatch = lanes) -> None:
             lanes.start(starts)
             lanes.path(times, np.tile([-0.7, 0.7], (count, 1)))
 
@@ -173,8 +173,8 @@ def over_bare(name: str, tolerance: float) -> tuple[float, float]:
             pieces.append((*begin, real.time))
             return outcome
 
-    for watch in leg.course.watches():
-        watch.integrator = Spy(watch.integrator)
+    for compiled in leg.course.compiled_regimes():
+        compiled.integrator = Spy(compiled.integrator)
     return_map(leg, law, apex)
     bare = 0.0
     for real, state, pars, begin, end in pieces:

@@ -90,7 +90,8 @@ def read_toml(path: Path) -> dict[str, Any]:
 
     Raises:
         FileNotFoundError: there is no such file.
-        UnreadableError: it cannot be read, is no UTF-8 or no TOML, too large, too wide or too deep.
+        UnreadableError: it cannot be read, is no UTF-8 or no TOML, empty, too large, too wide or
+            too deep.
     """
     return parse_toml(read_file(path, LARGEST_TOML))
 
@@ -99,8 +100,11 @@ def parse_toml(content: bytes) -> dict[str, Any]:
     """Return the tables of a TOML text.
 
     Raises:
-        UnreadableError: it is no UTF-8 or no TOML, too wide or too deep.
+        UnreadableError: it is no UTF-8 or no TOML, too wide or too deep; or it is empty, as files
+            are that a full disk has cut off.
     """
+    if not content.strip():
+        raise UnreadableError("is empty; write it anew, or leave it out")
     for mark, encoding in _MARKS.items():
         if content.startswith(mark):
             raise UnreadableError(

@@ -7,7 +7,7 @@ import pytest
 
 from legbench.analytic import LegModel
 from legbench.analytic.compiled import parameters_of, sensitive_seeds
-from legbench.analytic.lanes import Lanes
+from legbench.analytic.leg_batch import LegBatch
 from legbench.analytic.parameters import FRICTION, MOTOR, SHARPNESS, SMOOTH
 from legbench.analytic.sensitivity import STATES, SensitiveLegs, Track
 from legbench.analytic.state import Regime
@@ -35,7 +35,7 @@ def test_paths_are_those_of_legs_that_are_held_side_by_side(
 ) -> None:
     mine = track(prototype, regime)
     path = SensitiveLegs(friction=False).follow([mine])[0]
-    lanes = Lanes([LegModel.of(prototype)], regime)
+    lanes = LegBatch([LegModel.of(prototype)], regime)
     lanes.start(mine.start[np.newaxis])
     for row, motors in enumerate(mine.motors, start=1):
         states = lanes.go(float(TIMES[row]), motors[np.newaxis])

@@ -163,7 +163,7 @@ def test_drives_are_asked_for_their_temperature_in_cycles_200_and_199() -> None:
     it = cycle(wire, config(nodes=nodes))
     for _ in range(401):
         it.tick()
-        it.send_rest()
+        it.send_heartbeat()
     # The first tick is cycle 1, at 1 ms.
     assert [at // MS for at in wire.when(0x601)] == [200, 400]
     assert [at // MS for at in wire.when(0x602)] == [199, 399]
@@ -180,17 +180,17 @@ def test_heartbeats_keep_to_the_grid_whatever_is_skipped(beat_ms: int) -> None:
     it = cycle(wire, config(master_heartbeat_ms=beat_ms))
     for _ in range(60):
         it.tick()
-        it.send_rest()
+        it.send_heartbeat()
     beats = [at // MS for at in wire.when(0x77E)]
     assert it.silent_total == 3
     # The first one a heartbeat after the first tick; sent in the cycle before its time.
     assert beats[0] == beat_ms
     assert {b - a for a, b in itertools.pairwise(beats)} <= {beat_ms, beat_ms + 1}
     wire.refuses = {0x77E}
-    sent = [it.send_rest() for _ in range(1) if it.tick()]
+    sent = [it.send_heartbeat() for _ in range(1) if it.tick()]
     for _ in range(beat_ms):
         it.tick()
-        sent.append(it.send_rest())
+        sent.append(it.send_heartbeat())
     assert False in sent
 
 

@@ -41,9 +41,10 @@ def test_each_drive_is_asked_for_its_temperature_every_200_cycles(tmp_path: Path
         it.run(1000)
         asked = {place: times(it, Frame(0x601 + place, ASK), begin_ns) for place in (0, 1)}
         assert [len(moments) for moments in asked.values()] == [5, 5]
-        assert apart(asked[0]) == apart(asked[1]) == {200}
+        # Due every 200 cycles, and asked in the first one after that with room for the answer.
+        assert all(abs(gap - 200) < 30 for gap in apart(asked[0]) | apart(asked[1]))
         # Never in one cycle: the frames of a cycle leave room for one question.
-        assert {round((b - a) / MS) % 200 for a, b in zip(asked[0], asked[1], strict=True)} == {199}
+        assert not {at // MS for at in asked[0]} & {at // MS for at in asked[1]}
         for place, warmth in ((0, 312), (1, 418)):
             it.network.drives[place]._values[0x2070, 0] = warmth
         it.run(250)

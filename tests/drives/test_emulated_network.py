@@ -49,15 +49,26 @@ def heard(station: Station) -> list[tuple[int, int]]:
 
 def test_of_frames_that_wait_the_lowest_identifier_goes_first() -> None:
     network = wire()
-    here, there = network.attach(), network.attach()
-    for cob_id in (0x300, 0x181, 0x180, 0x7FF):
-        network.send(here, Frame(cob_id, bytes(8)))
-    network.send(there, Frame(0x200))
+    ports = [network.attach() for _ in range(5)]
+    for port, cob_id in zip(ports, (0x300, 0x181, 0x180, 0x7FF, 0x200), strict=True):
+        network.send(port, Frame(cob_id, bytes(8 if cob_id != 0x200 else 0)))
     network.advance(MS)
     # 111 us of eight bytes and 47 of none; nobody hears itself.
-    assert heard(there) == [(111, 0x180), (222, 0x181), (380, 0x300), (491, 0x7FF)]
-    assert heard(here) == [(269, 0x200)]
-    assert here.waiting == there.waiting == 0
+    assert heard(ports[4]) == [(111, 0x180), (222, 0x181), (380, 0x300), (491, 0x7FF)]
+    assert (269, 0x200) in heard(ports[0])
+    assert not any(port.waiting for port in ports)
+
+
+def test_frames_of_one_master_leave_in_their_order_also_after_one_was_destroyed() -> None:
+    network = wire(FrameFault(kind=KIND.BAD_BITS, cob_id=0x300, end_ns=200 * US))
+    here, there = network.attach(), network.attach()
+    for cob_id in (0x300, 0x181, 0x180):
+        network.send(here, Frame(cob_id))
+    network.send(there, Frame(0x200))
+    network.advance(2 * MS)
+    sent = [frame.cob_id for _, frame in network.log or []]
+    # The other master's frame wins against 300h, and not against what waits behind it.
+    assert sent == [0x200, 0x300, 0x181, 0x180]
 
 
 def test_frames_of_one_identifier_keep_their_order() -> None:

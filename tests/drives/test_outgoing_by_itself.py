@@ -14,12 +14,12 @@ from legbench.drives.protocol.frame import HEARTBEAT_BASE
 def outgoing(wire: Wire, failed: list[BusError]) -> Outgoing:
     bus = config()
     axes = tuple(AxisLink(node) for node in bus.nodes)
-    return Outgoing(cast(Any, wire), bus, axes, (), failed.append)
+    return Outgoing(cast(Any, wire), bus, axes, failed.append)
 
 
 def test_a_heartbeat_is_due_at_once_where_a_stop_comes_before_the_grid_is_laid() -> None:
     wire, failed = Wire(), list[BusError]()
-    assert outgoing(wire, failed).rest(0, 0)
+    assert outgoing(wire, failed).heartbeat(0)
     assert [cob_id for _, cob_id, _ in wire.sent] == [HEARTBEAT_BASE + config().master_id]
     assert failed == []
 
@@ -27,7 +27,7 @@ def test_a_heartbeat_is_due_at_once_where_a_stop_comes_before_the_grid_is_laid()
 def test_a_heartbeat_that_is_refused_is_told_and_raises_nothing() -> None:
     wire, failed = Wire(), list[BusError]()
     wire.refuses = {HEARTBEAT_BASE + config().master_id}
-    assert not outgoing(wire, failed).rest(0, 0)
+    assert not outgoing(wire, failed).heartbeat(0)
     assert [str(error) for error in failed] == [
         f"{HEARTBEAT_BASE + config().master_id:03X}h refused"
     ]

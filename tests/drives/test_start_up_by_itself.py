@@ -65,7 +65,7 @@ class Drives:
         self.words = list(words)
         self.done.append(tuple(words))
 
-    def send_rest(self) -> None:
+    def send_heartbeat(self) -> None:
         self.done.append("rest")
 
     def tick(self) -> Tick:

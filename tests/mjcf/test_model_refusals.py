@@ -25,7 +25,9 @@ def test_an_inertia_that_mujoco_refuses(optimal: LegDesign) -> None:
 def test_ground_needs_real_numbers(value: float) -> None:
     with pytest.raises(ConfigError, match=r"friction is .*; it must be finite, zero or more"):
         Ground(friction=value)
-    with pytest.raises(ConfigError, match=r"tip_radius is .* m; it must be positive and finite"):
+    with pytest.raises(
+        ConfigError, match=r"tip_radius is .* m; it must be above 0 and at most 0.05 m"
+    ):
         Ground(tip_radius=value)
 
 

@@ -89,7 +89,7 @@ def test_a_stop_never_pulls(tolerance: float) -> None:
         for tick in range(1, 401):
             course.go(5e-4 * tick)
             for joint in (0, 1):
-                if course.watch.pars[PUSHES + 2 * joint] == 0.0:
+                if course.compiled.pars[PUSHES + 2 * joint] == 0.0:
                     continue
                 pushed += 1
                 torque = model.torque(course.motor, course.q, course.v)

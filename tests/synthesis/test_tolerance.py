@@ -187,7 +187,7 @@ def test_yield_names_the_worst_tolerance() -> None:
     assert next(iter(found.causes)) == "stiffness"
     means = [mean for _, mean in found.causes.values()]
     assert means == sorted(means)
-    with pytest.raises(ConfigError, match="a yield needs legs; 0 and 6"):
+    with pytest.raises(ConfigError, match="legs is 0; a yield needs 1 leg or more"):
         measure_yield(LEG, Tolerances(), legs=0, legs_each=6)
 
 

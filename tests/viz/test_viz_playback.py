@@ -21,7 +21,7 @@ from legbench.viz.live.blueprint import blueprint
 from legbench.viz.live.mujoco_viewer import FPS, FrameClock, play_run
 from legbench.viz.live.rrd import write_rrd
 from legbench.viz.playback import WHOLE, Playback, cut
-from legbench.viz.pose import Puppet
+from legbench.viz.pose import PosedModel
 from legbench.viz.run_model import model_of
 
 TIME: Floats = np.arange(1000, dtype=np.float64) * 1e-3
@@ -127,9 +127,9 @@ def test_mujocos_viewer_shows_the_part_at_its_speed(hop: Recording) -> None:
     times = [time for time, _ in window.shown]
     assert len(times) == 25
     np.testing.assert_allclose(np.diff(times), 1.0 / FPS)
-    puppet = Puppet(model_of(hop.description))
+    posed = PosedModel(model_of(hop.description))
     rows = playback.frames(hop.time, FPS)
-    wanted = puppet.positions(puppet.hip(hop["trunk_pos"])[rows], hop["joint_pos"][rows])
+    wanted = posed.positions(posed.hip(hop["trunk_pos"])[rows], hop["joint_pos"][rows])
     np.testing.assert_array_equal([qpos for _, qpos in window.shown], wanted)
 
 

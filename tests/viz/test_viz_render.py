@@ -15,7 +15,7 @@ from legbench.recording.description import describe
 from legbench.recording.reader import Recording
 from legbench.viz.film.offscreen import OffScreen, backend
 from legbench.viz.film.render import FRAME, STILL, STILLS, VIDEO, render
-from legbench.viz.pose import Puppet
+from legbench.viz.pose import PosedModel
 from legbench.viz.run_model import model_of
 
 
@@ -36,28 +36,28 @@ needs_gl = pytest.mark.skipif(not gl_works(), reason="no OpenGL without a displa
 @pytest.mark.parametrize("kind", list(SetupKind))
 def test_the_model_takes_the_recorded_posture(kind: SetupKind, tmp_path: Path) -> None:
     run = record(tmp_path, kind, 300)
-    puppet = Puppet(model_of(run.description))
+    posed = PosedModel(model_of(run.description))
     points = run["trunk_pos"][:, None] + leg_points(run["joint_pos"], PROTOTYPE.lengths)
-    for row, qpos in enumerate(puppet.positions(run["trunk_pos"], run["joint_pos"])):
-        puppet.pose(qpos)
-        places = [puppet.data.body(name).xpos for name in ("thigh", "shank", "foot")]
-        places.append(puppet.data.site("tip").xpos)
+    for row, qpos in enumerate(posed.positions(run["trunk_pos"], run["joint_pos"])):
+        posed.pose(qpos)
+        places = [posed.data.body(name).xpos for name in ("thigh", "shank", "foot")]
+        places.append(posed.data.site("tip").xpos)
         np.testing.assert_allclose(np.array(places)[:, [0, 2]], points[row], atol=1e-9)
         for loop in ("loop_thigh", "loop_foot"):
-            equality = puppet.model.equality(loop)
+            equality = posed.model.equality(loop)
             first, second = equality.obj1id[0], equality.obj2id[0]
-            gap = puppet.data.site_xpos[first] - puppet.data.site_xpos[second]
+            gap = posed.data.site_xpos[first] - posed.data.site_xpos[second]
             assert np.linalg.norm(gap) < 1e-9
 
 
 def test_a_boom_carries_the_hip_where_it_was() -> None:
     setup = {"kind": "ffs", "boom_radius": 1.2}
-    puppet = Puppet(model_of(describe(manifest_of(SetupKind.FFS, setup=setup))))
+    posed = PosedModel(model_of(describe(manifest_of(SetupKind.FFS, setup=setup))))
     hip = np.array([[0.02, 0.21], [-0.03, 0.17]])
     joint = np.array([[-0.6, 0.7], [-0.5, 0.6]])
-    for row, qpos in enumerate(puppet.positions(hip, joint)):
-        puppet.pose(qpos)
-        np.testing.assert_allclose(puppet.data.site("hip").xpos[[0, 2]], hip[row], atol=1e-12)
+    for row, qpos in enumerate(posed.positions(hip, joint)):
+        posed.pose(qpos)
+        np.testing.assert_allclose(posed.data.site("hip").xpos[[0, 2]], hip[row], atol=1e-12)
 
 
 @needs_gl

@@ -92,7 +92,7 @@ def test_following_ends_with_the_run_and_its_ratings(hop: Recording, tmp_path: P
     np.testing.assert_allclose(shown["/series/joint/link"]["t"], hop.time, atol=1e-9)
     fixed = viz_rrd.static(tmp_path / "live.rrd")
     assert "P^r stance" in fixed["/run"]["text"][0]
-    assert len(fixed["/plots/polar/data/ghost"]["strips"][0]) == len(hop.time[::5])
+    assert len(fixed["/plots/polar/data/backdrop"]["strips"][0]) == len(hop.time[::5])
 
 
 def test_a_writer_that_was_killed_ends_it_too(hop: Recording, tmp_path: Path) -> None:

@@ -22,6 +22,7 @@ from legbench.analytic.compiled import (
     steady_point,
     terms_of,
 )
+from legbench.analytic.compiled_regime import CompiledRegime
 from legbench.analytic.contact import MIN_PHASE
 from legbench.analytic.dual import DUAL, floats, without_gradients
 from legbench.analytic.equations import Pair, sweep, sweep_rate, touchdown_rates
@@ -41,7 +42,6 @@ from legbench.analytic.parameters import HEIGHT, MOTOR, SPEED, Event, Kind, Watc
 from legbench.analytic.state import LegState, Regime
 from legbench.analytic.stop_switches import StopSwitches
 from legbench.analytic.variation import Variation
-from legbench.analytic.watch import Watch
 from legbench.errors import PlantFault
 
 MAX_EVENTS = 10_000
@@ -70,7 +70,7 @@ class Course:
         since: time at which the regime began [s].
         point: steady point of the angles at the beginning of the piece (forward, up) [m].
         drift: velocity of the steady point then [m/s].
-        watch: the compiled regime.
+        compiled: the compiled regime.
         stop_switches: the joint stops.
         detector: the events that are watched.
         told: the state that `state` last returned; None once the leg has moved on.
@@ -90,7 +90,7 @@ class Course:
         self.stop_switches = StopSwitches(self.plain)
         self._tolerance, self._min_phase = tolerance, min_phase
         self._arm = foot_from_centre(model)
-        self._watches: dict[tuple[Regime, bool], Watch] = {}
+        self._regimes: dict[tuple[Regime, bool], CompiledRegime] = {}
         self._variation = Variation(tolerance) if model.ops is DUAL else None
         self.detector = EventDetector(self, self.plain, min_phase)
         self.motor: Pair = (0.0, 0.0)
@@ -119,7 +119,7 @@ class Course:
     def state(self) -> LegState:
         """State of the leg at the present time."""
         ops, along = self.model.ops, steady_point(self.model, self.regime)
-        (x, z), (dx, dz) = self.centre() if self.watch.flies else (self.point, self.drift)
+        (x, z), (dx, dz) = self.centre() if self.compiled.flies else (self.point, self.drift)
         inner, inner_vel = sweep(ops, self.q, along), sweep_rate(ops, self.q, self.v, along)
         self.told = LegState(
             time=self.time,
@@ -151,17 +151,17 @@ class Course:
         """Set the motor positions, which are held until the next call [rad]."""
         if motor != self.motor:
             self.motor, self.plain_motor = motor, floats(motor)
-            self.watch.pars[MOTOR : MOTOR + 2] = motor
+            self.compiled.pars[MOTOR : MOTOR + 2] = motor
             if self.stop_switches.touched:
                 self.stop_switches.decide(
-                    self.watch, self.terms, self.plain_motor, self.plain_q, self.plain_v
+                    self.compiled, self.terms, self.plain_motor, self.plain_q, self.plain_v
                 )
 
     def switch(self) -> None:
         """Apply a touchdown or lift-off: change the regime, and the rates by eq. (12)."""
         ops, model = self.model.ops, self.model
         arm, arm_vel = sweep(ops, self.q, self._arm), sweep_rate(ops, self.q, self.v, self._arm)
-        if self.watch.flies:
+        if self.compiled.flies:
             (x, _), (dx, dz) = self.centre()
             # The height is zero by definition, also if the foot went below it while unwatched.
             self.point, self.drift = (x + arm[0], 0.0), (0.0, 0.0)
@@ -199,22 +199,22 @@ class Course:
         why = f"integration failed at t = {self.time:.6f} s: the leg chatters"
         raise PlantFault("integration failed", why)
 
-    def watches(self) -> list[Watch]:
+    def compiled_regimes(self) -> list[CompiledRegime]:
         """Compiled regimes in which the leg has been so far."""
-        return list(self._watches.values())
+        return list(self._regimes.values())
 
     def march(self, step: float, count: int) -> None:
         """Take `count` steps of a fixed length, without error control and without events."""
         for _ in range(count):
-            self.watch.integrator.step(step)
+            self.compiled.integrator.step(step)
         self.time = self.began + count * step
-        q1, q2, v1, v2 = self.watch.state.tolist()
+        q1, q2, v1, v2 = self.compiled.state.tolist()
         self.q = self.plain_q = (q1, q2)
         self.v = self.plain_v = (v1, v2)
 
     def _piece(self, until: float) -> int | None:
         """Integrate to `until` or to the next event."""
-        integrator = self.watch.integrator
+        integrator = self.compiled.integrator
         # max_steps is passed by position: a keyword costs a fifth of a short call.
         outcome = int(integrator.propagate_until(float(until - self.began), MAX_STEPS)[0])
         event = None if outcome == TIME_LIMIT else -outcome - 1
@@ -222,7 +222,7 @@ class Course:
             at = self.began + float(integrator.time)
             why = f"integration failed at t = {at:.6f} s: the state runs away"
             raise PlantFault("integration failed", why)
-        q1, q2, v1, v2 = self.watch.state.tolist()
+        q1, q2, v1, v2 = self.compiled.state.tolist()
         self.plain_q, self.plain_v = (q1, q2), (v1, v2)
         if self._variation is not None:
             self._variation.carry(self, self.plain_q, self.plain_v, until, event)
@@ -234,7 +234,7 @@ class Course:
 
     def _meaning(self, event: int) -> Watched | None:
         """Event as the caller sees it; those of stops and held feet are handled here, for None."""
-        watch = self.watch
+        compiled = self.compiled
         if event in SEEN:
             return SEEN[event]
         if event == TURN:
@@ -242,15 +242,15 @@ class Course:
             return Watched.TURN
         if event <= Event.HIP_HIGH:
             self.stop_switches.cross(event)
-            self.stop_switches.lay(watch)
+            self.stop_switches.lay(compiled)
             self.stop_switches.decide(
-                self.watch, self.terms, self.plain_motor, self.plain_q, self.plain_v
+                self.compiled, self.terms, self.plain_motor, self.plain_q, self.plain_v
             )
         elif event == Event.RECOVER:
             self._load(held=False)
         elif event != CONTACT:
-            self.stop_switches.flip(watch, event)
-        elif watch.flies or watch.held or self.detector.released() > -TIE:
+            self.stop_switches.flip(compiled, event)
+        elif compiled.flies or compiled.held or self.detector.released() > -TIE:
             return Watched.CONTACT
         else:
             self._load(held=True)
@@ -273,25 +273,25 @@ class Course:
 
     def _load(self, *, held: bool) -> None:
         """Load the present state into the integrator of the regime."""
-        watch = self.watch = self._watch_of(held=held)
+        compiled = self.compiled = self._compiled_for(held=held)
         self.plain_q, self.plain_v = floats(self.q), floats(self.v)
         self.plain_motor = floats(self.motor)
         self.began = self.time
-        watch.integrator.time = 0.0
-        watch.integrator.reset_cooldowns()
-        watch.state[:] = (*self.plain_q, *self.plain_v)
-        watch.pars[MOTOR : MOTOR + 2] = self.plain_motor
-        if watch.flies:
-            watch.pars[HEIGHT], watch.pars[SPEED] = self.point[1], self.drift[1]
-        self.detector.move_to(watch)
+        compiled.integrator.time = 0.0
+        compiled.integrator.reset_cooldowns()
+        compiled.state[:] = (*self.plain_q, *self.plain_v)
+        compiled.pars[MOTOR : MOTOR + 2] = self.plain_motor
+        if compiled.flies:
+            compiled.pars[HEIGHT], compiled.pars[SPEED] = self.point[1], self.drift[1]
+        self.detector.move_to(compiled)
         self.stop_switches.decide(
-            self.watch, self.terms, self.plain_motor, self.plain_q, self.plain_v
+            self.compiled, self.terms, self.plain_motor, self.plain_q, self.plain_v
         )
 
-    def _watch_of(self, *, held: bool) -> Watch:
-        found = self._watches.get((self.regime, held))
+    def _compiled_for(self, *, held: bool) -> CompiledRegime:
+        found = self._regimes.get((self.regime, held))
         if found is None:
             kind = Kind.HELD if held else KINDS.get(self.regime, Kind.FIXED)
             values = parameters_of(self.plain, self.regime, self.probe)
-            found = self._watches[self.regime, held] = Watch(kind, values, self._tolerance)
+            found = self._regimes[self.regime, held] = CompiledRegime(kind, values, self._tolerance)
         return found

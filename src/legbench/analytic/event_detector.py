@@ -1,13 +1,14 @@
 """Events that a course watches: levels of the probe, its turning points, limits and the ground.
 
 A piece of a course begins where something has happened. Before the integration goes on, the sign of
-every event function that could be near zero there is made certain (`watch`). A condition that
-holds already, because a motor, the regime or a level has jumped, is an event at once.
+every event function that could be near zero there is made certain (`compiled_regime`). A condition
+that holds already, because a motor, the regime or a level has jumped, is an event at once.
 """
 
 from typing import TYPE_CHECKING, NamedTuple, final
 
 from legbench.analytic.compiled import foot_from_centre
+from legbench.analytic.compiled_regime import NUDGE, OFF, CompiledRegime
 from legbench.analytic.dual import floats
 from legbench.analytic.equations import (
     Pair,
@@ -20,7 +21,6 @@ from legbench.analytic.equations import (
 from legbench.analytic.model import LegModel
 from legbench.analytic.parameters import Event, Kind, Watched
 from legbench.analytic.state import Regime
-from legbench.analytic.watch import NUDGE, OFF, Watch
 from legbench.design.statics import GRAVITY
 
 if TYPE_CHECKING:
@@ -82,39 +82,39 @@ class EventDetector:
         self._free, self._turn = regime in KINDS, 0.0
         self.blind = since + self._min_phase if self._free else since
 
-    def move_to(self, watch: Watch) -> None:
+    def move_to(self, compiled: CompiledRegime) -> None:
         """Set all levels in another integrator."""
-        course, self._watch = self._course, watch
-        watch.restore()
-        watch.lay_bounds(FELL, FELL_BACK, -self.lean, self.lean, NEVER)
-        course.stop_switches.lay(watch)
+        course, self._compiled = self._course, compiled
+        compiled.restore()
+        compiled.lay_bounds(FELL, FELL_BACK, -self.lean, self.lean, NEVER)
+        course.stop_switches.lay(compiled)
         self.lay(self.levels)
 
     def lay(self, levels: Levels) -> None:
         """Replace the levels of the probe."""
-        self.levels, watch = levels, self._watch
-        watch.lay_bounds(FALL, RISE, levels.lower, levels.upper, NEVER)
+        self.levels, compiled = levels, self._compiled
+        compiled.lay_bounds(FALL, RISE, levels.lower, levels.upper, NEVER)
         if not levels.turns:
             self._turn = 0.0
-            if watch.gain[TURN] != 0.0:
-                watch.lay(TURN, *OFF)
+            if compiled.gain[TURN] != 0.0:
+                compiled.lay(TURN, *OFF)
 
     def turned(self) -> None:
         """Watch the probe's next turning point: a minimum after a maximum, or the reverse."""
         self._turn = -self._turn
-        self._watch.lay(TURN, self._turn, 0.0)
+        self._compiled.lay(TURN, self._turn, 0.0)
 
     def due(self) -> int | None:
         """Guard every event, and return one whose condition holds already, if there is one."""
-        course, watch = self._course, self._watch
-        if watch.moved:
-            watch.restore()
+        course, compiled = self._course, self._compiled
+        if compiled.moved:
+            compiled.restore()
         due = self._near()
         if self.levels.turns:
             self._guard_turn()
         if course.stop_switches.touched:
             course.stop_switches.guard(
-                watch, course.terms, course.plain_motor, course.plain_q, course.plain_v
+                compiled, course.terms, course.plain_motor, course.plain_q, course.plain_v
             )
         if self._free:
             contact = self._contact()
@@ -123,30 +123,35 @@ class EventDetector:
 
     def _near(self) -> int | None:
         """Guard the events of angles, and return one whose condition holds already, or None."""
-        course, watch = self._course, self._watch
-        (p1, p2), (q1, q2), gain, level = course.probe, course.plain_q, watch.gain, watch.level
+        course, compiled = self._course, self._compiled
+        (p1, p2), (q1, q2), gain, level = (
+            course.probe,
+            course.plain_q,
+            compiled.gain,
+            compiled.level,
+        )
         reading, lean, knee = p1 * q1 + p2 * q2, q1 + q2, q2 - q1
         due = None
         for event, value in zip(
             ANGLES, (reading, reading, lean, lean, knee, knee, q1, q1), strict=True
         ):
             if gain[event] * value - level[event] > -NUDGE:
-                beyond = watch.guard(event, value)
+                beyond = compiled.guard(event, value)
                 if beyond and due is None and event in SEEN:
                     due = event
         return due
 
     def _contact(self) -> int | None:
         """Guard touchdown or lift-off; return the event if the leg cannot stay in its regime."""
-        course, watch = self._course, self._watch
+        course, compiled = self._course, self._compiled
         if course.time < self.blind:
-            if watch.gain[CONTACT] != 0.0:
-                watch.lay(CONTACT, *OFF)
+            if compiled.gain[CONTACT] != 0.0:
+                compiled.lay(CONTACT, *OFF)
             return None
-        if watch.flies:
+        if compiled.flies:
             return self._touchdown()
         force = self._force()
-        if not watch.held:
+        if not compiled.held:
             if force < 0.0:
                 return CONTACT
             self._expect(force)
@@ -155,14 +160,14 @@ class EventDetector:
         if force > TIE or released > -TIE:
             return Event.RECOVER if force > TIE else CONTACT
         for event, reading in ((CONTACT, released), (Event.RECOVER, force)):
-            watch.lay(event, 1.0, 0.0)
-            watch.guard(event, reading)
+            compiled.lay(event, 1.0, 0.0)
+            compiled.guard(event, reading)
         return None
 
     def _touchdown(self) -> int | None:
         """Guard touchdown, and return it if the foot is below the ground and sinking."""
-        course, watch = self._course, self._watch
-        elapsed = float(watch.integrator.time)
+        course, compiled = self._course, self._compiled
+        elapsed = float(compiled.integrator.time)
         z, dz = float(course.point[1]), float(course.drift[1])
         fallen = self._plain.floating.gravity * elapsed
         height = z + (dz - 0.5 * fallen) * elapsed
@@ -174,15 +179,15 @@ class EventDetector:
         if dz - fallen + arm_vel[1] < 0.0:
             return CONTACT
         self.blind = course.time + self._min_phase  # below the ground and rising: no touchdown yet
-        watch.lay(CONTACT, *OFF)
+        compiled.lay(CONTACT, *OFF)
         return None
 
     def _expect(self, reading: float) -> None:
         """Watch the height or the contact force fall to zero."""
-        if self._watch.gain[CONTACT] != -1.0:
-            self._watch.lay(CONTACT, -1.0, 0.0)
+        if self._compiled.gain[CONTACT] != -1.0:
+            self._compiled.lay(CONTACT, -1.0, 0.0)
         if reading < NUDGE:
-            self._watch.guard(CONTACT, reading)
+            self._compiled.guard(CONTACT, reading)
 
     def _force(self) -> float:
         """Vertical contact force on the standing foot over the weight [-]."""
@@ -219,7 +224,7 @@ class EventDetector:
                 a = self._accelerations()
                 towards = p1 * a[0] + p2 * a[1]
             self._turn = -1.0 if towards > 0.0 else 1.0
-        if self._watch.gain[TURN] != self._turn:
-            self._watch.lay(TURN, self._turn, 0.0)
+        if self._compiled.gain[TURN] != self._turn:
+            self._compiled.lay(TURN, self._turn, 0.0)
         if self._turn * rate > -NUDGE:
-            self._watch.guard(TURN, rate)
+            self._compiled.guard(TURN, rate)

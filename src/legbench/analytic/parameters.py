@@ -17,7 +17,7 @@ positions [rad]."""
 SMOOTH = 11
 """Number of parameters of the equations of motion between events, which come first [-]."""
 FRICTION, SHARPNESS = 11, 13
-"""First indices of what a batch of legs (`analytic.lanes`) has in addition: Coulomb friction of
+"""First indices of what a batch of legs (`analytic.leg_batch`) has in addition: Coulomb friction of
 both joints [N m], and the inverse width of its smoothing over the rate [s/rad]."""
 GUIDE, REACH = 14, 16
 """First indices of what a batch of legs has for a damped guide: its damping forward and upward

@@ -39,7 +39,7 @@ def read(
             return q2 - q1
         case Event.HIP_LOW | Event.HIP_HIGH:
             return q1
-        case Event.CONTACT if course.watch.flies:
+        case Event.CONTACT if course.compiled.flies:
             return _height(course, state, elapsed, plain=plain)
         case _:
             return _pressed(course, event, state, plain=plain)
@@ -59,7 +59,7 @@ def _pressed(course: "Course", event: int, state: "Sequence[Term]", *, plain: bo
     model = replace(course.plain, ops=DUAL) if plain else course.model
     motor = course.plain_motor if plain else course.motor
     q, v = (state[0], state[1]), (state[2], state[3])
-    free = event >= Event.KNEE_FREE or (event == Event.CONTACT and course.watch.held)
+    free = event >= Event.KNEE_FREE or (event == Event.CONTACT and course.compiled.held)
     terms = model.falling if free else terms_of(model, course.regime)
     turns, a = course.stop_switches.turns(DUAL, terms, model.torque(motor, q, v), q, v, free=free)
     match event:

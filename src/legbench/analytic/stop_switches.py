@@ -9,12 +9,12 @@ stop can pull.
 
 from typing import final
 
+from legbench.analytic.compiled_regime import OFF, CompiledRegime
 from legbench.analytic.equations import SCALAR, Ops, Pair, Term, pair_acceleration, pair_share
 from legbench.analytic.model import LegModel
 from legbench.analytic.parameters import FREE_PUSHES, PUSHES, Event
 from legbench.analytic.stops import TIME_CONSTANT, Stop
 from legbench.analytic.terms import PairTerms
-from legbench.analytic.watch import OFF, Watch
 
 AT_LIMIT = 1e-12
 """Largest depth that may be rounding; the speed then says whether the stop is touched [rad]."""
@@ -50,15 +50,15 @@ class StopSwitches:
             self._touched = found
             self._changed()
 
-    def lay(self, watch: Watch) -> None:
+    def lay(self, compiled: CompiledRegime) -> None:
         """Set the four events of the limits: to go beyond each, or to come back from beyond it."""
-        if watch.version == self._version:
+        if compiled.version == self._version:
             return
-        watch.version = self._version
+        compiled.version = self._version
         for index, (stop, beyond) in enumerate(zip(self._stops, self._touched, strict=True)):
             gain = stop.sign if beyond else -stop.sign
-            if watch.gain[FIRST + index] != gain:
-                watch.lay(FIRST + index, gain, gain * stop.limit)
+            if compiled.gain[FIRST + index] != gain:
+                compiled.lay(FIRST + index, gain, gain * stop.limit)
 
     def cross(self, event: int) -> None:
         """Note that a joint has gone beyond a limit, or has come back."""
@@ -73,62 +73,66 @@ class StopSwitches:
         self.touched = True in self._touched
         self._version += 1
 
-    def decide(self, watch: Watch, terms: PairTerms, motor: Pair, q: Pair, v: Pair) -> None:
+    def decide(
+        self, compiled: CompiledRegime, terms: PairTerms, motor: Pair, q: Pair, v: Pair
+    ) -> None:
         """Set the switches of the pushes by the law, after something has jumped."""
         if not self.touched:
-            if watch.pushed:
-                self._silence(watch)
+            if compiled.pushed:
+                self._silence(compiled)
             return
-        watch.pushed = True
+        compiled.pushed = True
         asked = self._asked(terms, motor, q, v)
         self._pushing = [push > 0.0 for push in asked]
-        if watch.held:
+        if compiled.held:
             asked = self._asked(self._model.falling, motor, q, v)
             self._free = [push > 0.0 for push in asked]
-        self._switch(watch)
+        self._switch(compiled)
 
-    def flip(self, watch: Watch, event: int) -> None:
+    def flip(self, compiled: CompiledRegime, event: int) -> None:
         """Note that a stop begins or ends to push, or would if the foot were released."""
         if event >= Event.KNEE_FREE:
             self._free[event - Event.KNEE_FREE] ^= True
         else:
             self._pushing[event - Event.KNEE_PUSH] ^= True
-        self._switch(watch)
+        self._switch(compiled)
 
-    def guard(self, watch: Watch, terms: PairTerms, motor: Pair, q: Pair, v: Pair) -> None:
+    def guard(
+        self, compiled: CompiledRegime, terms: PairTerms, motor: Pair, q: Pair, v: Pair
+    ) -> None:
         """Set and guard the events of the pushes, for the joints that are beyond a limit."""
         found = [(Event.KNEE_PUSH, terms, self._pushing)]
-        if watch.held:
+        if compiled.held:
             found.append((Event.KNEE_FREE, self._model.falling, self._free))
         for first, inertia, pushing in found:
             asked = self._asked(inertia, motor, q, v)
             for joint in (0, 1):
                 stop = self._acting[joint]
                 if stop is None:
-                    watch.lay(first + joint, *OFF)
+                    compiled.lay(first + joint, *OFF)
                     continue
-                watch.lay(first + joint, -stop.sign if pushing[joint] else stop.sign, 0.0)
-                watch.guard(first + joint, stop.sign * asked[joint])
+                compiled.lay(first + joint, -stop.sign if pushing[joint] else stop.sign, 0.0)
+                compiled.guard(first + joint, stop.sign * asked[joint])
 
-    def _silence(self, watch: Watch) -> None:
+    def _silence(self, compiled: CompiledRegime) -> None:
         """Switch all pushes and their events off, as no joint is beyond a limit."""
-        watch.pushed = False
-        watch.pars[PUSHES : PUSHES + 4 : 2] = 0.0
+        compiled.pushed = False
+        compiled.pars[PUSHES : PUSHES + 4 : 2] = 0.0
         for event in (Event.KNEE_PUSH, Event.HIP_PUSH):
-            watch.lay(event, *OFF)
-        if watch.held:
-            watch.pars[FREE_PUSHES : FREE_PUSHES + 2] = 0.0
+            compiled.lay(event, *OFF)
+        if compiled.held:
+            compiled.pars[FREE_PUSHES : FREE_PUSHES + 2] = 0.0
             for event in (Event.KNEE_FREE, Event.HIP_FREE):
-                watch.lay(event, *OFF)
+                compiled.lay(event, *OFF)
 
-    def _switch(self, watch: Watch) -> None:
+    def _switch(self, compiled: CompiledRegime) -> None:
         for joint in (0, 1):
             stop = self._acting[joint]
             place = PUSHES + 2 * joint
-            watch.pars[place] = float(stop is not None and self._pushing[joint])
-            watch.pars[place + 1] = 0.0 if stop is None else stop.limit
-            if watch.held:
-                watch.pars[FREE_PUSHES + joint] = float(stop is not None and self._free[joint])
+            compiled.pars[place] = float(stop is not None and self._pushing[joint])
+            compiled.pars[place + 1] = 0.0 if stop is None else stop.limit
+            if compiled.held:
+                compiled.pars[FREE_PUSHES + joint] = float(stop is not None and self._free[joint])
 
     def turns(
         self, ops: Ops, terms: PairTerms, torque: Pair, q: Pair, v: Pair, *, free: bool = False

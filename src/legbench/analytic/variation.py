@@ -44,18 +44,18 @@ class Variation:
             until: time at which the piece was to end [s].
             event: the event that ended it, if one did.
         """
-        watch, plain = course.watch, course.plain
-        time = float(watch.integrator.time)
+        compiled, plain = course.compiled, course.plain
+        time = float(compiled.integrator.time)
         varied = parameters_of(course.model, course.regime, course.probe)[:MOTOR]
         start = [*course.q, *course.v]
-        moved = self._moved(start, watch.pars, time, [*varied, *course.motor])
+        moved = self._moved(start, compiled.pars, time, [*varied, *course.motor])
         torque = plain.torque(course.plain_motor, q, v)
         a = course.stop_switches.turns(SCALAR, course.terms, torque, q, v)[1]
         values, rates = [*q, *v], np.array([*v, *a])
         if event is None:
             shift = gradient(until - course.began)
         else:
-            gain, level = watch.gain[event], watch.level[event]
+            gain, level = compiled.gain[event], compiled.level[event]
             reading = read(course, event, _duals(values, moved), time)
             change = gradient(gain * reading - level)
             timed, elapsed = _duals(values, rates[:, np.newaxis]), Dual(time, np.ones(1))
@@ -64,11 +64,11 @@ class Variation:
         q1, q2, v1, v2 = _duals(values, moved + np.multiply.outer(rates, shift))
         course.q, course.v = (q1, q2), (v1, v2)
         course.time = until if event is None else course.began + Dual(time, shift)
-        if watch.flies:
+        if compiled.flies:
             course.point, course.drift = course.centre()
-            watch.pars[HEIGHT], watch.pars[SPEED] = course.point[1], course.drift[1]
+            compiled.pars[HEIGHT], compiled.pars[SPEED] = course.point[1], course.drift[1]
         course.began = course.time
-        watch.integrator.time = 0.0
+        compiled.integrator.time = 0.0
 
     def _moved(self, start: list[float], pars: Floats, time: float, varied: list[float]) -> Floats:
         """Derivative of the state at a fixed time by the seeds (4, m).

@@ -71,6 +71,7 @@ def run_on_bench(
     """
     if not 0.0 <= pause < 3600.0:
         raise ConfigError(f"pause is {pause:g} s; it must be 0 to 3600 s")
+    _check_buses(plan)
     asked, say, shards = stop or StopFlag(), note or _silent, _in_order(plan)
     with open_folder(folder, plan):
         missing = [shard for shard in shards if not is_done(folder, shard)]
@@ -90,15 +91,19 @@ def run_on_bench(
 
 
 def _in_order(plan: Plan) -> list[Shard]:
-    """Shards of one experiment each in the order of the file; raises ConfigError."""
-    for each in plan.planned:
-        _choice(each)
+    """Shards of one experiment each in the order of the file."""
     places = {each.hash: place for place, each in enumerate(plan.planned)}
     return sorted(shards_of(plan, 1), key=lambda shard: places[shard.planned[0].hash])
 
 
 def _silent(_line: str) -> None:
     """Tell nobody."""
+
+
+def _check_buses(plan: Plan) -> None:
+    """Refuse another plant and a wrong bus file before anything is begun; raises ConfigError."""
+    for file in dict.fromkeys(_choice(each).bus for each in plan.planned):
+        load_bus(file)
 
 
 def _choice(planned: Planned) -> CanChoice:

@@ -10,7 +10,7 @@ from legbench.campaign._distributed import Client, KilledWorker, LocalCluster, c
 from legbench.campaign.executor import AbstractExecutor, Done, Note
 from legbench.campaign.pool import LOOK_EVERY, died_twice, done_of, workers_or_processors
 from legbench.campaign.work import Work, do_work
-from legbench.errors import CampaignError
+from legbench.errors import CampaignError, ConfigError
 from legbench.interrupts import StopFlag, children_without_interrupts
 
 AHEAD = 2
@@ -34,7 +34,17 @@ class DaskExecutor(AbstractExecutor):
             address: HOST:PORT of a scheduler that runs; none: one of this campaign's own, which
                 listens on loopback alone and has no dashboard.
             workers: number of its own worker processes, one thread each; none: one a processor.
+
+        Raises:
+            ConfigError: the address is no HOST:PORT.
         """
+        if address is not None:
+            host, _, port = address.rpartition(":")
+            if not host or not port.isdecimal() or not 0 < int(port) < 1 << 16:
+                raise ConfigError(
+                    f"'{address}' is no address of a scheduler; give HOST:PORT, as in "
+                    "dask://127.0.0.1:8786, or leave it out for one of this campaign's own"
+                )
         self._address = address
         self._workers = workers_or_processors(workers)
 

@@ -51,6 +51,10 @@ def main(arguments: list[str]) -> int:
     chosen = parse(CheckArguments, "check", arguments)
     if not chosen.tolerance >= 0.0:
         raise ConfigError(f"tolerance is {chosen.tolerance:g}; it must be zero or more")
+    if chosen.tolerances is not None:
+        from legbench.synthesis.yields import check_sample
+
+        check_sample(chosen.legs, chosen.seed)
     design = load_design(chosen.design)
     angle = standing_angle(design, chosen.relaxed_length)
     conditions = check_conditions(Parameters.of(design), angle)

@@ -73,6 +73,11 @@ def main(arguments: list[str]) -> int:
         from legbench.viz.print.save import check_suffix
 
         check_suffix(chosen.plot)
+    if chosen.tolerances is not None:
+        from legbench.synthesis.yields import check_sample
+
+        check_sample(chosen.legs, chosen.seed)
+    measured = None if chosen.measured is None else load_design(chosen.measured)
     requirements = requirements_of(chosen)
     usual = 20_000 if chosen.tolerances is None else ROBUST_EVALUATIONS
     settings = SearchSettings(
@@ -85,10 +90,10 @@ def main(arguments: list[str]) -> int:
     rows = manufacture_table(solution.design)
     content = {**solution.to_json(), "manufacture": table_to_json(rows)}
     lines = _lines(solution, rows)
-    if chosen.measured is not None:
+    if measured is not None:
         from legbench.cli.check import add_adjustments
 
-        add_adjustments(load_design(chosen.measured), solution.design, content, lines)
+        add_adjustments(measured, solution.design, content, lines)
     if chosen.tolerances is not None and not stopped:
         from legbench.cli.check import add_yield
 

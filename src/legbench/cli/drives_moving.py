@@ -5,7 +5,7 @@ from pathlib import Path
 
 from legbench.cli.drives_reading import Bench
 from legbench.cli.output import note, print_json
-from legbench.cli.waived import tell_waived
+from legbench.cli.waived import note_waived
 from legbench.drives.master.session import Session
 from legbench.drives.setup.config import NodeConfig
 from legbench.drives.transport.realtime import Granted
@@ -13,7 +13,7 @@ from legbench.errors import ConfigError
 from legbench.plants import LIMITS_NAME, limits_for
 
 
-def tell(granted: Granted | None) -> None:
+def note_granted(granted: Granted | None) -> None:
     """Say on stderr what real-time scheduling was granted; in virtual time none was asked for."""
     if granted is not None:
         note(f"SCHED_FIFO {granted.fifo}; locked memory {granted.mlockall}")
@@ -111,7 +111,7 @@ class Home:
         if bench.json:
             print_json({**asdict(homed), "granted": granted and asdict(granted)})
         else:
-            tell(granted)
+            note_granted(granted)
             print(
                 f"{homed.node}: method {homed.method}, {homed.before_counts} counts before, "
                 f"{homed.after_counts} after"
@@ -137,9 +137,10 @@ class Jog:
         from legbench.commissioning.jog import jog
 
         design = bench.leg()
+        bench.config()  # A bus file that is wrong is named before the limits beside it.
         path = bench.limits or bench.choice.bus_file.parent / LIMITS_NAME
         limits = limits_for(path, design)
-        tell_waived(None, limits)
+        note_waived(None, limits)
         with bench.session(leads=True) as session:
             granted = session.request_realtime()
             jogged = jog(
@@ -154,7 +155,7 @@ class Jog:
         if bench.json:
             print_json({**asdict(jogged), "granted": granted and asdict(granted)})
             return 0
-        tell(granted)
+        note_granted(granted)
         note("enabled where they stood; quick stop at the end")
         for place, (before, after) in enumerate(
             zip(jogged.before_pos, jogged.after_pos, strict=True), start=1

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from legbench.cli.output import note, print_json
-from legbench.cli.waived import tell_waived
+from legbench.cli.waived import note_waived
 from legbench.design import LegDesign, load_design
 from legbench.drives.master.session import Session
 from legbench.drives.setup.bus_file import load_bus
@@ -58,7 +58,7 @@ class Bench:
     def session(self, *, leads: bool, read_only: bool = False) -> AbstractContextManager[Session]:
         """Open the bus; whoever leads drives locks its channel; raises ConfigError, BusError."""
         if leads:
-            tell_waived(self.choice.bus_file, None)
+            note_waived(self.choice.bus_file, None)
         choice = replace(self.choice, read_only=read_only)
         return open_session(self.config(), choice, leads=leads)
 

@@ -163,6 +163,8 @@ class Emulate:
         from legbench.drives.transport.system import require_linux
 
         require_linux("serving an emulated leg to other processes")
+        if self.patience < 1:
+            raise ConfigError(f"patience is {self.patience}; it must be 1 period or more")
         if self.serve == SLCAN and bench.interface is not None:
             raise ConfigError(
                 f"--serve slcan makes a terminal of its own, --interface {bench.interface} is "

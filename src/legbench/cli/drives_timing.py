@@ -1,5 +1,6 @@
 """`legbench drives jitter`: how punctual this computer is, with a recording and without."""
 
+import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
@@ -42,6 +43,9 @@ class Jitter:
 
         if self.cycles < 1:
             raise ConfigError(f"cycles is {self.cycles}; it must be 1 or more")
+        count = os.cpu_count() or 1
+        if self.cpu is not None and not 0 <= self.cpu < count:
+            raise ConfigError(f"cpu is {self.cpu}; this computer has 0 to {count - 1}")
         stiffness = bench.leg().stiffness
         found: dict[str, Timing] = {}
         with (

@@ -155,7 +155,15 @@ def _hops(
     leg = written_back(question.design, outcome, question.bars)
     repeated = [repeat(each, leg) for each in hops]
     lines += ["", *(f"held-out hop      {each.text}" for each in repeated)]
-    content["held_out_hops"] = [asdict(each) | {"good": each.good} for each in repeated]
+    lines += [
+        f"not predicted     {each.run}: {'; '.join(each.misses)}; a hop that has not settled yet "
+        "differs more: record it for longer"
+        for each in repeated
+        if not each.good
+    ]
+    content["held_out_hops"] = [
+        asdict(each) | {"good": each.good, "misses": each.misses} for each in repeated
+    ]
     return all(each.good for each in repeated)
 
 

@@ -92,13 +92,13 @@ def main(arguments: list[str]) -> int:
     except UsageError as error:
         report_error(str(error))
         return 2
-    from legbench.cli.waived import tell_waived_of
+    from legbench.cli.waived import note_waived_of
     from legbench.clock import WallClock
     from legbench.experiment.running import record
     from legbench.interrupts import stop_on_interrupt
 
     chosen, experiment = asked.arguments, asked.experiment
-    tell_waived_of(experiment.plant)
+    note_waived_of(experiment.plant)
     watched = chosen.view or chosen.serve
     watching = Watching(serve=chosen.serve)
     paced = watched or chosen.real_time

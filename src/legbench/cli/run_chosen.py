@@ -131,6 +131,11 @@ def first_tables(words: Scan) -> Tables:
     for flag, key in SCANNED.items():
         if flag in words.values:
             tables.put(key, tables.here_guest(words.values[flag]))
+    if words.subject is not None and tables.at("controller.kind") is None:
+        raise ConfigError(
+            f"{words.subject}: no experiment, as controller.kind is missing; there are "
+            f"{', '.join(CONTROLLERS.names())}"
+        )
     return tables
 
 

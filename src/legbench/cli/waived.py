@@ -10,12 +10,12 @@ from legbench.limits.safety import SafetyLimits
 from legbench.plants import LIMITS_NAME, CanChoice, PlantSettings
 
 
-def tell_waived(bus: Path | None, limits: SafetyLimits | None) -> None:
+def note_waived(bus: Path | None, limits: SafetyLimits | None) -> None:
     """Print a line for each protection that a bus file and limits waive; raises ConfigError."""
     _tell(None if bus is None else load_bus(bus), limits)
 
 
-def tell_waived_of(choice: PlantSettings) -> None:
+def note_waived_of(choice: PlantSettings) -> None:
     """Print a line for each protection that the files of a plant waive; raises ConfigError."""
     if isinstance(choice, CanChoice):
         # The bus file was named, the limits beside it are only guessed: it is missed first.

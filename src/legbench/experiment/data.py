@@ -1,6 +1,5 @@
 """Everything that decides a run, as one value."""
 
-import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, Literal
@@ -22,6 +21,8 @@ from legbench.servo import PERFECT, ServoConfig
 
 LARGEST_SEED: Final = (1 << 63) - 1
 """Largest seed: TOML and most generators hold no larger whole number."""
+LONGEST: Final = 604_800.0
+"""Longest run [s]: a week."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,7 +46,7 @@ class Experiment:
     """Experiment: everything that decides a run.
 
     Raises:
-        ConfigError: a duration that is shorter than a cycle, or endless; a seed that is negative;
+        ConfigError: a duration below a cycle or above a week; a seed that is negative;
             imperfections that leave no leg, or belong to another setup; a controller or plant
             that lacks something, or takes a built-in's name.
     """
@@ -77,10 +78,10 @@ class Experiment:
     differ in anything but their seed share it. Without noise it changes no row."""
 
     def __post_init__(self) -> None:
-        if not PERIOD <= self.duration < math.inf:
+        if not PERIOD <= self.duration <= LONGEST:
             raise ConfigError(
                 f"duration is {self.duration:g} s; it must be at least one cycle of {PERIOD:g} s, "
-                "and finite"
+                f"and finite: at most {LONGEST:.0f} s, a week"
             )
         if not 0 <= self.seed <= LARGEST_SEED:
             raise ConfigError(f"seed is {self.seed}; it must be 0 to {LARGEST_SEED}")

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from legbench.analytic import LegModel, Regime
-from legbench.analytic.lanes import Friction, Lanes
+from legbench.analytic.leg_batch import Friction, LegBatch
 from legbench.analytic.losses import CREEP
 from legbench.control import AbstractController, make_controllers
 from legbench.design.setup import SetupKind
@@ -71,7 +71,7 @@ def _command_after(
     return controller.step(seen)
 
 
-def _lanes(experiment: Experiment, imperfections: Sequence[Imperfections]) -> Lanes:
+def _lanes(experiment: Experiment, imperfections: Sequence[Imperfections]) -> LegBatch:
     kind = experiment.setup.kind
     gravity = 0.0 if kind is SetupKind.HFTS else GRAVITY
     models = [
@@ -86,4 +86,4 @@ def _lanes(experiment: Experiment, imperfections: Sequence[Imperfections]) -> La
     if any(each.guide_damping for each in imperfections):
         guide = [each.guide_damping or (0.0, 0.0) for each in imperfections]
     regime = Regime.PINNED if kind is SetupKind.FFS else Regime.HANGING
-    return Lanes(models, regime, friction=friction, guide=guide, tolerance=TOLERANCE)
+    return LegBatch(models, regime, friction=friction, guide=guide, tolerance=TOLERANCE)

@@ -52,15 +52,31 @@ class Repeated:
     predicted: Hop
 
     @property
+    def misses(self) -> tuple[str, ...]:
+        """Figures that the identified leg does not predict, each with its bound."""
+        one, two = self.measured, self.predicted
+        found = [
+            f"P^r {name} is off by {abs(off):.3f}, more than {RATING_WITHIN:g}"
+            for name, off in (
+                ("stance", two.rating_stance - one.rating_stance),
+                ("flight", two.rating_flight - one.rating_flight),
+            )
+            if not abs(off) <= RATING_WITHIN
+        ]
+        found += [
+            f"{name} is off by {abs(off):.2%}, more than {within:.1%}"
+            for name, off, within in (
+                ("rise", two.rise / one.rise - 1.0, RISE_WITHIN),
+                ("frequency", two.hop_freq / one.hop_freq - 1.0, FREQ_WITHIN),
+            )
+            if not abs(off) <= within
+        ]
+        return tuple(found)
+
+    @property
     def good(self) -> bool:
         """Whether the identified leg hops as the recorded one did."""
-        one, two = self.measured, self.predicted
-        return (
-            abs(one.rating_stance - two.rating_stance) <= RATING_WITHIN
-            and abs(one.rating_flight - two.rating_flight) <= RATING_WITHIN
-            and abs(two.rise / one.rise - 1.0) <= RISE_WITHIN
-            and abs(two.hop_freq / one.hop_freq - 1.0) <= FREQ_WITHIN
-        )
+        return not self.misses
 
     @property
     def text(self) -> str:

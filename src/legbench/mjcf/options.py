@@ -76,6 +76,10 @@ class Linkage:
         return self.density(design) * length
 
 
+LARGEST_TIP = 0.05
+"""Largest radius of a foot tip [m]: a third of the shipped designs' foot segments."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ground:
     """The contact of foot and ground.
@@ -95,9 +99,10 @@ class Ground:
     def __post_init__(self) -> None:
         if not 0.0 <= self.friction < math.inf:
             raise ConfigError(f"friction is {self.friction:g}; it must be finite, zero or more")
-        if not 0.0 < self.tip_radius < math.inf:
+        if not 0.0 < self.tip_radius <= LARGEST_TIP:
             raise ConfigError(
-                f"tip_radius is {self.tip_radius:g} m; it must be positive and finite"
+                f"tip_radius is {self.tip_radius:g} m; it must be above 0 and at most "
+                f"{LARGEST_TIP:g} m"
             )
 
 

@@ -162,17 +162,19 @@ def open_session(
 
     Raises:
         BusError: the interface is not there, is down, or has a master.
+        ConfigError: no bus has the bitrate that is asked for.
     """
+    seen = config.at(choice.bitrate)  # refuses a bitrate that no bus has before one is open
     if not choice.is_virtual(config):
         adapters = adapters_of(config, interface=choice.interface, channel=choice.channel)
-        bus, lock = open_channels(config.at(choice.bitrate), adapters, leads=leads)
-        return Session(bus, config.at(choice.bitrate), lock=lock)
+        bus, lock = open_channels(seen, adapters, leads=leads)
+        return Session(bus, seen, lock=lock)
     networks = _emulated(config, choice, leg)
     if len(networks) > 1:
         bus = ChannelsBus(tuple(networks), config, choice.bitrate)
     else:
         bus = LockstepBus("leg", network=networks[0], bitrate=choice.bitrate)
-    return Session(bus, config.at(choice.bitrate))
+    return Session(bus, seen)
 
 
 def _emulated(config: BusConfig, choice: CanChoice, leg: Leg | None) -> Sequence[Network]:

@@ -5,14 +5,14 @@ from scipy.optimize import differential_evolution
 
 from legbench.design.requirements import Bounds
 from legbench.signals import Floats
-from legbench.synthesis.search import Cost, Found
+from legbench.synthesis.search import Cost, SearchResult
 
 GENERATIONS = 600
 POPULATION = 10
 """Number of candidates for each generation and decision variable."""
 
 
-def evolve(bounds: Bounds, cost: Cost, seed: int) -> Found:
+def evolve(bounds: Bounds, cost: Cost, seed: int) -> SearchResult:
     """Minimise `cost` within bounds by differential evolution, with no gradient step after it."""
     evaluations = 0
 
@@ -32,7 +32,7 @@ def evolve(bounds: Bounds, cost: Cost, seed: int) -> Found:
         updating="deferred",
         vectorized=True,
     )
-    return Found(
+    return SearchResult(
         free=np.asarray(result.x),
         cost=float(result.fun),
         evaluations=evaluations,

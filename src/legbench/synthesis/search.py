@@ -24,7 +24,7 @@ Progress = Callable[[int, float], None]
 """Called after a generation with evaluations done and the best cost so far."""
 
 
-class Stop(Protocol):
+class StopRequest(Protocol):
     """Request to end a search, which is read between generations."""
 
     @property
@@ -57,7 +57,7 @@ class SearchSettings:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Found:
+class SearchResult:
     """Result of a search."""
 
     free: Floats
@@ -85,9 +85,9 @@ def search(
     settings: SearchSettings,
     trace: Trace,
     *,
-    stop: Stop | None = None,
+    stop: StopRequest | None = None,
     progress: Progress | None = None,
-) -> Found:
+) -> SearchResult:
     """Minimise `cost` within bounds; every evaluation goes into `trace`.
 
     Bounds are met by a transformation that reaches them exactly: the paper's optimum lies on six.
@@ -112,7 +112,7 @@ def search(
     if len(trace) == 0:
         raise ConfigError("the search was stopped before it had tried anything")
     free, lowest = trace.best()
-    return Found(free=free, cost=lowest, evaluations=len(trace), complete=complete)
+    return SearchResult(free=free, cost=lowest, evaluations=len(trace), complete=complete)
 
 
 def _ratios(bounds: Bounds, unit: Floats) -> Floats:

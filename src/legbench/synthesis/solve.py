@@ -17,10 +17,10 @@ from legbench.strict_json import null_for_nan
 from legbench.synthesis.crosscheck import evolve
 from legbench.synthesis.search import (
     Cost,
-    Found,
     Progress,
+    SearchResult,
     SearchSettings,
-    Stop,
+    StopRequest,
     identity_of,
     search,
 )
@@ -52,7 +52,7 @@ class Solution:
     complete: bool
     """Whether the search converged; else this is the best so far."""
     seed: int
-    check: Found | None
+    check: SearchResult | None
     """Result of differential evolution, if it was asked for."""
 
     def to_json(self) -> dict[str, Any]:
@@ -102,7 +102,7 @@ def solve(
     trace: Trace | None = None,
     scatter_cost: Callable[[Sequence[LegDesign]], Floats] | None = None,
     cross_check: bool = True,
-    stop: Stop | None = None,
+    stop: StopRequest | None = None,
     progress: Progress | None = None,
 ) -> Solution:
     """Search, refine and judge a leg.
@@ -143,7 +143,12 @@ def solve(
 
 
 def _judged(
-    requirements: Requirements, found: Found, check: Found | None, *, seed: int, plain: bool
+    requirements: Requirements,
+    found: SearchResult,
+    check: SearchResult | None,
+    *,
+    seed: int,
+    plain: bool,
 ) -> Solution:
     """Refine what the search found, if it minimised objective (11) alone, and judge the leg."""
     settled = plain and found.complete

@@ -32,6 +32,14 @@ class Yield:
     """Tolerance -> share of legs kept and mean P^r, when it scatters alone; the worst first."""
 
 
+def check_sample(legs: int, seed: int) -> None:
+    """Refuse a number of legs below 1, and a seed below 0; raises ConfigError."""
+    if legs < 1:
+        raise ConfigError(f"legs is {legs}; a yield needs 1 leg or more")
+    if seed < 0:
+        raise ConfigError(f"seed is {seed}; it must be 0 or more")
+
+
 def measure_yield(
     design: LegDesign,
     tolerances: Tolerances,
@@ -51,8 +59,7 @@ def measure_yield(
     """
     release = release or Release()
     legs_each = max(1, legs // 10) if legs_each is None else legs_each
-    if legs < 1 or legs_each < 1:
-        raise ConfigError(f"a yield needs legs; {legs} and {legs_each} were asked for")
+    check_sample(min(legs, legs_each), seed)
     made = [design, *scatter(design, tolerances, legs, seed)]
     for name in TOLERANCES:
         made += scatter(design, tolerances.only(name), legs_each, seed + 1)

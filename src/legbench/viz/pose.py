@@ -9,7 +9,7 @@ from legbench.signals import Floats
 
 
 @final
-class Puppet:
+class PosedModel:
     """A run's model, moved by its recorded angles; no physics runs."""
 
     def __init__(self, model: mujoco.MjModel) -> None:

@@ -1,6 +1,6 @@
 """The wire of an emulated bus and all that hangs on it, event by event in virtual time.
 
-Frames are sent one after the other, the lowest identifier first; the body moves on a fixed grid.
+Frames are sent one after the other, as arbitration decides; the body moves on a fixed grid.
 Nothing here looks at a clock, and the same calls give the same frames to the nanosecond.
 """
 
@@ -13,6 +13,7 @@ from legbench.drives.emulated.drive import EmulatedDrive
 from legbench.drives.emulated.error_frames import BUS_OFF_FRAME, ERROR_FRAME
 from legbench.drives.emulated.faults import Fault, NodeFault
 from legbench.drives.emulated.injector import Injector
+from legbench.drives.emulated.send_queue import SendQueue, Waiting
 from legbench.drives.emulated.station import Heard, Node, Participant, Station
 from legbench.drives.emulated.stuffing import Stuffing, bits_of
 from legbench.drives.errors import BusError
@@ -21,10 +22,6 @@ from legbench.drives.setup.wire import ERROR_BITS, worst_bits
 
 PASSIVE, BUS_OFF = 128, 256
 """Transmit error counts from which a node is error passive, or off the bus (ISO 11898-1)."""
-
-
-_Pending = tuple[int, int, int, Node, Frame]
-"""Frame that waits for the wire: ready at [ns], identifier, sequence number, sender, frame."""
 
 
 @final
@@ -65,10 +62,9 @@ class Network:
         self._stuffing = stuffing
         self._injector = Injector(faults)
         self._body_period_ns = self._tick_ns = body_period_ns
-        self._pending: list[_Pending] = []
-        self._sequence = 0
+        self._queue = SendQueue()
         self._copied: dict[int, Node] = {}
-        self._flying: _Pending | None = None
+        self._flying: Waiting | None = None
         self._broken = False
         self._end_ns = 0
         self._strangers: list[Station] = []
@@ -99,7 +95,7 @@ class Network:
         self._nodes.remove(station)
         if station in self._strangers:
             self._strangers.remove(station)
-            self._pending = [entry for entry in self._pending if entry[3] is not station]
+            self._queue.drop(station)
 
     def alone(self, station: Station) -> bool:
         """Whether a master is the only one, and nothing but drives takes part besides."""
@@ -140,7 +136,7 @@ class Network:
         if station.waiting >= station.tx_queue:
             raise BusError(f"the transmit queue is full ({station.tx_queue} frames)")
         station.waiting += 1
-        self._submit(station, self.now_ns, frame)
+        self._queue.put(station, self.now_ns, frame)
 
     def advance(self, until_ns: int, station: Station | None = None) -> None:
         """Advance virtual time to `until_ns`, or until a frame for `station` has come."""
@@ -162,8 +158,8 @@ class Network:
         """Time and handler of the next event; at equal times the grid of the body goes first."""
         if self._flying is not None:
             at_ns, event = self._end_ns, self._land
-        elif self._pending:
-            at_ns = max(self._end_ns, min(self._pending)[0])
+        elif self._queue:
+            at_ns = max(self._end_ns, self._queue.earliest_ns)
             event = self._arbitrate
         else:
             return self._tick_ns, self._tick
@@ -171,16 +167,12 @@ class Network:
             return self._tick_ns, self._tick
         return at_ns, event
 
-    def _submit(self, node: Node, ready_ns: int, frame: Frame) -> None:
-        self._sequence += 1
-        self._pending.append((ready_ns, frame.cob_id, self._sequence, node, frame))
-
     def _collect(self, node: Node) -> None:
         if isinstance(node, Station):
             return
         for ready_ns, frame in node.take():
             if not self.off_bus(node):
-                self._submit(node, ready_ns, frame)
+                self._queue.put(node, ready_ns, frame)
 
     def _tick(self) -> None:
         now_ns = self.now_ns
@@ -188,7 +180,7 @@ class Network:
         for fault, begins in self._injector.node_events(now_ns):
             self._strike(fault, begins=begins)
         for frame in self._injector.babble(now_ns, self._body_period_ns):
-            self._submit(self._injector, now_ns, frame)
+            self._queue.put(self._injector, now_ns, frame)
         angles = tuple([drive.tick(now_ns) for drive in self.drives])
         if angles:
             links, torques = self._body(angles)
@@ -202,12 +194,9 @@ class Network:
     def _arbitrate(self) -> None:
         """Start the ready frame with the lowest identifier, as arbitration does (ISO 11898-1)."""
         now_ns = self.now_ns
-        ready = [entry for entry in self._pending if entry[0] <= now_ns]
-        winner = min(ready, key=lambda entry: entry[1:3])
-        self._pending.remove(winner)
-        self._flying = winner
-        frame = winner[4]
-        self._broken = self._injector.breaks(frame, now_ns) or self._garbled(winner[3])
+        self._flying = winner = self._queue.pop(now_ns)
+        frame = winner.frame
+        self._broken = self._injector.breaks(frame, now_ns) or self._garbled(winner.sender)
         bits = ERROR_BITS + worst_bits(0) if self._broken else bits_of(frame, self._stuffing)
         self._end_ns = now_ns + bits * self._bit_ns
 
@@ -232,7 +221,7 @@ class Network:
             return
         _, _, sequence, sender, frame = flying
         if self._broken:
-            self._fail(sender, frame)
+            self._fail(flying)
             return
         if sender in self.errors:
             self.errors[sender] = max(0, self.errors[sender] - 1)
@@ -246,8 +235,8 @@ class Network:
             return
         for delay_ns, changed in self._injector.fate(frame, self.now_ns):
             if delay_ns:
-                self._submit(self._injector, self.now_ns + delay_ns, changed)
-                self._copied[self._sequence] = sender
+                copy = self._queue.put(self._injector, self.now_ns + delay_ns, changed)
+                self._copied[copy] = sender
             else:
                 self._deliver(sender, changed)
 
@@ -271,18 +260,19 @@ class Network:
     def _deaf(self, node: Participant) -> bool:
         return isinstance(node, EmulatedDrive) and self._injector.silent(node.node_id, self.now_ns)
 
-    def _fail(self, sender: Node, frame: Frame) -> None:
+    def _fail(self, flying: Waiting) -> None:
         """Send an error frame to all nodes; the sender repeats its frame until it is bus-off."""
         for node in self._nodes:
             if isinstance(node, Station):
                 node.received.append(Heard(self.now_ns, ERROR_FRAME))
+        sender = flying.sender
         if sender not in self.errors:
             return
         self.errors[sender] += 8
         if not self.off_bus(sender):
-            self._submit(sender, self.now_ns, frame)
+            self._queue.put_back(flying, self.now_ns)
             return
-        self._pending = [entry for entry in self._pending if entry[3] is not sender]
+        self._queue.drop(sender)
         if isinstance(sender, Station):
             sender.waiting = 0
             sender.received.append(Heard(self.now_ns, BUS_OFF_FRAME))

@@ -16,6 +16,7 @@ from legbench.drives.master.mode_poll import mode_polls
 from legbench.drives.master.notices import Notices
 from legbench.drives.master.outgoing import Outgoing
 from legbench.drives.master.port import Port
+from legbench.drives.master.requests import Requests
 from legbench.drives.master.temperature import temperature_polls
 from legbench.drives.master.tick import Tick
 from legbench.drives.master.watch import NodeWatch
@@ -77,14 +78,14 @@ class Cycle:
         self._period_ns = config.period_ns
         self._deadline_ns = 1000 * config.deadline_us
         self._due_ns = 0
-        self._count = 0
         self._owed: set[int] = set()
         """COB-IDs of process data that has not come, and still may."""
         self._sync = port.message(SYNC_ID)
         modes = mode_polls(self.axes, config)
         both = zip(config.nodes, self.polls, modes, strict=True)
         self._polls = {node.node_id: polls for node, *polls in both}
-        self._outgoing = Outgoing(port, config, self.axes, (*self.polls, *modes), self._failed)
+        self._requests = Requests(port, config, (*self.polls, *modes), self._failed)
+        self._outgoing = Outgoing(port, config, self.axes, self._failed)
 
     def begin(self) -> None:
         """Lay the grid: the next tick is one period from now, on a whole period."""
@@ -110,9 +111,8 @@ class Cycle:
         timebase.wait_until(self._due_ns)
         self.bus_error = None
         self._drain()
-        silent = 0
-        if self._owed and not self.stopping:
-            silent = 1
+        silent = int(bool(self._owed) and not self.stopping)
+        if silent:
             self._keep_silent()
         due_ns = self._due_ns
         for axis in self.axes:
@@ -125,10 +125,10 @@ class Cycle:
             self._failed(error)
         else:
             missing = self._gather(sync_ns + self._deadline_ns)
+        self._requests.turn(None if missing or self.stopping else timebase.now_ns() - sync_ns)
         for axis, watch in zip(self.axes, self.watches, strict=True):
             watch.cycle(complete=axis.fresh)
         self._due_ns = due_ns + self._period_ns
-        self._count += 1
         return Tick(sync_ns, sync_ns - due_ns, skipped + silent, silent, missing == 0)
 
     def hears_sync(self, until_ns: int) -> bool:
@@ -200,11 +200,11 @@ class Cycle:
         gets no frame.
         """
         sent = self._outgoing.commands(controlwords)
-        return self.send_rest() and sent
+        return self.send_heartbeat() and sent
 
-    def send_rest(self) -> bool:
-        """Send heartbeat and polls, where due; false if the bus failed."""
-        return self._outgoing.rest(self._due_ns, self._count)
+    def send_heartbeat(self) -> bool:
+        """Send the heartbeat, where due; false if the bus failed."""
+        return self._outgoing.heartbeat(self._due_ns)
 
     def other(self, message: can.Message) -> None:
         """Take a frame that is no process data of this cycle."""

@@ -1,22 +1,13 @@
-"""The frames that a master sends after the process data of a cycle: commands, heartbeat, polls."""
+"""The frames that a master sends after the process data of a cycle: commands and heartbeat."""
 
 from collections.abc import Callable, Sequence
-from typing import Protocol, final
+from typing import final
 
 from legbench.drives.errors import BusError
 from legbench.drives.master.axis_link import AxisLink
 from legbench.drives.master.port import Port
-from legbench.drives.protocol.frame import Frame
 from legbench.drives.protocol.nmt import NmtState, heartbeat_frame
 from legbench.drives.setup.config import BusConfig
-
-
-class Poll(Protocol):
-    """A request that is due in some cycles."""
-
-    def due(self, cycle: int) -> Frame | None:
-        """Request of this cycle, none if none is due."""
-        ...
 
 
 @final
@@ -28,7 +19,6 @@ class Outgoing:
         port: Port,
         config: BusConfig,
         axes: Sequence[AxisLink],
-        polls: Sequence[Poll],
         failed: Callable[[BusError], None],
     ) -> None:
         """Prepare the frames; nothing is sent.
@@ -37,10 +27,9 @@ class Outgoing:
             port: port of the bus.
             config: drives on the bus.
             axes: the drives.
-            polls: requests that are sent beside the commands, now and then.
             failed: called with the error of a frame that could not be sent.
         """
-        self._port, self._axes, self._polls, self._failed = port, axes, polls, failed
+        self._port, self._axes, self._failed = port, axes, failed
         self._beat = heartbeat_frame(config.master_id, NmtState.OPERATIONAL)
         self._beat_ns = 1_000_000 * config.master_heartbeat_ms
         self._beat_due_ns = 0
@@ -71,23 +60,17 @@ class Outgoing:
                     sent = False
         return sent
 
-    def rest(self, due_ns: int, count: int) -> bool:
-        """Send heartbeat and polls, where due; false if the bus failed.
+    def heartbeat(self, due_ns: int) -> bool:
+        """Send the heartbeat, if it is due at the next tick of the grid [ns]; false if it failed.
 
-        Args:
-            due_ns: next tick of the grid [ns].
-            count: number of this cycle, by which the polls take turns.
+        It follows the grid, not the cycles: silent ticks must not delay it.
         """
+        if due_ns < self._beat_due_ns:
+            return True
         try:
-            # The heartbeat follows the grid, not the cycles: silent ticks must not delay it.
-            if due_ns >= self._beat_due_ns:
-                self._port.send_frame(self._beat)
-                self._beat_due_ns = due_ns + self._beat_ns
-            for place, poll in enumerate(self._polls):
-                frame = poll.due(count + place)
-                if frame is not None:
-                    self._port.send_frame(frame)
+            self._port.send_frame(self._beat)
         except BusError as error:
             self._failed(error)
             return False
+        self._beat_due_ns = due_ns + self._beat_ns
         return True

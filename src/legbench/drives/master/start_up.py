@@ -60,7 +60,7 @@ class StartUp:
         if self.listening:
             return
         if self._read_only:
-            self._cycle.send_rest()
+            self._cycle.send_heartbeat()
             return
         words: list[int | None] = []
         for axis in self._cycle.axes:

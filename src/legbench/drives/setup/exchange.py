@@ -2,7 +2,8 @@
 
 Of the frames that are ready, the one with the lowest identifier is sent first, and a frame that is
 on the wire already is not interrupted (ISO 11898-1). So the last answer of a channel ends, at
-worst, after SYNC, the longest reply delay, one heartbeat that had just begun and all answers.
+worst, after SYNC, the longest reply delay, one heartbeat that had just begun and all answers. An
+SDO answer, which is longer, is asked for when it ends before SYNC (`asking`).
 """
 
 from dataclasses import dataclass

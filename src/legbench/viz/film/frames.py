@@ -14,7 +14,7 @@ from legbench.viz.drafts import require_rows
 from legbench.viz.facts import facts_of
 from legbench.viz.film.offscreen import Image, OffScreen
 from legbench.viz.hip import hip_of
-from legbench.viz.pose import Puppet
+from legbench.viz.pose import PosedModel
 from legbench.viz.run_model import model_of
 
 CAMERA = "side"
@@ -48,9 +48,9 @@ class Film:
     def __init__(self, recording: Recording) -> None:
         require_rows(recording)
         facts = facts_of(recording.description)
-        self._puppet = Puppet(model_of(recording.description))
-        self._camera = self._puppet.model.camera(CAMERA).id
-        self._hip = self._puppet.hip(hip_of(recording, facts))
+        self._posed = PosedModel(model_of(recording.description))
+        self._camera = self._posed.model.camera(CAMERA).id
+        self._hip = self._posed.hip(hip_of(recording, facts))
         self._joint = recording["joint_pos"]
         self._time = recording.time
         self._start = self._frame(leg_points(self._joint, facts.run.design.lengths))
@@ -69,7 +69,7 @@ class Film:
         Raises:
             MissingExtraError: the machine has no OpenGL that works.
         """
-        model, data = self._puppet.model, self._puppet.data
+        model, data = self._posed.model, self._posed.data
         # A buffer larger than the image would be cleared and resolved as a whole.
         model.vis.global_.offwidth, model.vis.global_.offheight = size.width, size.height
         model.vis.quality.offsamples = SAMPLES if smooth else 0
@@ -78,10 +78,10 @@ class Film:
         option, perturb, camera = mujoco.MjvOption(), mujoco.MjvPerturb(), mujoco.MjvCamera()
         camera.type, camera.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, self._camera
         with OffScreen(model, size.width, size.height) as screen:
-            qpos = self._puppet.positions(self._hip[rows], self._joint[rows])
+            qpos = self._posed.positions(self._hip[rows], self._joint[rows])
             for place, eye in zip(qpos, path, strict=True):
                 model.cam_pos[self._camera] = eye
-                self._puppet.pose(place)
+                self._posed.pose(place)
                 mujoco.mj_camlight(model, data)
                 everything = mujoco.mjtCatBit.mjCAT_ALL.value
                 mujoco.mjv_updateScene(model, data, option, perturb, camera, everything, scene)
@@ -90,7 +90,7 @@ class Film:
 
     def _frame(self, points: Floats) -> Floats:
         """Camera position (3,) from which every height that trunk and leg reach is seen [m]."""
-        model, data = self._puppet.model, self._puppet.data
+        model, data = self._posed.model, self._posed.data
         mujoco.mj_kinematics(model, data)
         mujoco.mj_camlight(model, data)
         heights = self._hip[:, 1:] + points[..., 1]

@@ -16,7 +16,7 @@ from legbench.viz.drafts import require_rows
 from legbench.viz.facts import facts_of
 from legbench.viz.hip import hip_of
 from legbench.viz.playback import WHOLE, Playback
-from legbench.viz.pose import Puppet
+from legbench.viz.pose import PosedModel
 from legbench.viz.run_model import model_of
 
 try:
@@ -100,14 +100,14 @@ def play_run(
             "has one"
         )
     require_rows(recording)
-    puppet, clock = Puppet(model_of(recording.description)), clock or FrameClock()
+    posed, clock = PosedModel(model_of(recording.description)), clock or FrameClock()
     rows = playback.frames(recording.time, FPS)
-    hip = puppet.hip(hip_of(recording, facts_of(recording.description)))[rows]
-    postures = puppet.positions(hip, recording["joint_pos"][rows])
-    with window(puppet.model, puppet.data) as shown:
+    hip = posed.hip(hip_of(recording, facts_of(recording.description)))[rows]
+    postures = posed.positions(hip, recording["joint_pos"][rows])
+    with window(posed.model, posed.data) as shown:
         for qpos in _paced(postures, playback.loop, shown, clock):
-            puppet.data.qpos[:] = qpos
-            mujoco.mj_forward(puppet.model, puppet.data)
+            posed.data.qpos[:] = qpos
+            mujoco.mj_forward(posed.model, posed.data)
             shown.sync()
         while shown.is_running():
             clock.sleep(1.0 / FPS)

@@ -132,7 +132,7 @@ class Plots:
         for name, plot in self._plots.items():
             if seen := self._seen[name]:
                 others = self._others[name]
-                plot.ghost(seen.points, np.concatenate(others) if others else None)
+                plot.backdrop(seen.points, np.concatenate(others) if others else None)
 
     def _phase_colours(self, trace: TracedRows) -> style.Colours:
         if self._jumps:

@@ -12,8 +12,8 @@ from legbench.metrics.summary import Summary
 from legbench.viz.facts import Facts, as_markdown
 from legbench.viz.live._rerun import rr
 from legbench.viz.live.blueprint import blueprint
-from legbench.viz.live.ghost import Ghost, Other
 from legbench.viz.live.leg2d import Leg2D, hip_of, leg_room
+from legbench.viz.live.overlay import Other, Overlay
 from legbench.viz.live.plots import Plots
 from legbench.viz.live.rating_series import RatingSeries
 from legbench.viz.live.scene import ModelScene
@@ -96,8 +96,8 @@ class Publisher:
     def finish(self) -> None:
         """Add what only a finished run has, and the other runs as a whole."""
         for other in self._others:
-            ghost = Ghost(self._stream, other)
-            ghost.push()
-            self._plots.overlay(other.key, ghost.trace, other.colour)
+            overlay = Overlay(self._stream, other)
+            overlay.push()
+            self._plots.overlay(other.key, overlay.trace, other.colour)
         self._plots.finish()
         self._rating.finish()

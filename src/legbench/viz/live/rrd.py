@@ -9,7 +9,7 @@ from legbench.recording.reader import Recording
 from legbench.viz.drafts import draft_of, require_rows
 from legbench.viz.facts import facts_of
 from legbench.viz.live._rerun import rr
-from legbench.viz.live.ghost import other_of
+from legbench.viz.live.overlay import other_of
 from legbench.viz.live.publish import APPLICATION, Publisher
 from legbench.viz.playback import WHOLE, Playback, cut
 

@@ -9,7 +9,7 @@ from legbench.viz.facts import Facts
 from legbench.viz.hip import hip_of
 from legbench.viz.live._rerun import rr, rrb
 from legbench.viz.live.leg2d import FREQ
-from legbench.viz.pose import Puppet
+from legbench.viz.pose import PosedModel
 from legbench.viz.run_model import model_of
 from legbench.viz.style import Colours
 from legbench.viz.trace import Thinner, TracedRows
@@ -40,23 +40,23 @@ class ModelScene:
         self._stream = stream
         self._facts = facts
         self._thinner = Thinner(FREQ)
-        self._puppet = Puppet(model_of(facts.run))
+        self._posed = PosedModel(model_of(facts.run))
         stream.log("/scene", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-        _draw_shapes(stream, self._puppet.model)
+        _draw_shapes(stream, self._posed.model)
 
     def push(self, trace: TracedRows) -> None:
         """Add poses of some of these rows."""
         kept = self._thinner.pick(trace.time)
         if len(kept) == 0:
             return
-        puppet = self._puppet
+        posed = self._posed
         hip = hip_of(trace.rows, self._facts)[kept]
-        bodies = range(1, puppet.model.nbody)
-        places = np.empty((len(kept), puppet.model.nbody, 3), dtype=np.float32)
-        turns = np.empty((len(kept), puppet.model.nbody, 4), dtype=np.float32)
-        for row, qpos in enumerate(puppet.positions(hip, trace.joint[kept])):
-            puppet.pose(qpos)
-            places[row], turns[row] = puppet.data.xpos, puppet.data.xquat
+        bodies = range(1, posed.model.nbody)
+        places = np.empty((len(kept), posed.model.nbody, 3), dtype=np.float32)
+        turns = np.empty((len(kept), posed.model.nbody, 4), dtype=np.float32)
+        for row, qpos in enumerate(posed.positions(hip, trace.joint[kept])):
+            posed.pose(qpos)
+            places[row], turns[row] = posed.data.xpos, posed.data.xquat
         index = [rr.TimeColumn("t", duration=trace.time[kept])]
         ahead = np.pad(hip[:, :1], ((0, 0), (0, 2)))
         self._stream.send_columns(VIEW, index, rr.Transform3D.columns(translation=ahead))
@@ -64,7 +64,7 @@ class ModelScene:
             moved = rr.Transform3D.columns(
                 translation=places[:, body], quaternion=turns[:, body][:, [1, 2, 3, 0]]
             )
-            self._stream.send_columns(_body_path(puppet.model, body), index, moved)
+            self._stream.send_columns(_body_path(posed.model, body), index, moved)
 
 
 def _body_path(model: mujoco.MjModel, body: int) -> str:

@@ -78,7 +78,7 @@ class XYPlot:
         self._stream.log(head, dot, static=True)
         self._stream.send_columns(head, index, rr.Points2D.columns(positions=path))
 
-    def ghost(self, points: Floats, others: Floats | None = None) -> None:
+    def backdrop(self, points: Floats, others: Floats | None = None) -> None:
         """Draw the whole run (n, 2) faintly behind everything, with axes that fit it.
 
         Points (m, 2) of other runs have room, too.
@@ -87,7 +87,7 @@ class XYPlot:
         self.cover(points if others is None else np.concatenate([points, others]))
         strip = points.astype(np.float32)[None]
         whole = rr.LineStrips2D(strip, colors=[FAINT], radii=HAIR, draw_order=5)
-        self._stream.log(f"{self._spec.path}/data/ghost", whole, static=True)
+        self._stream.log(f"{self._spec.path}/data/backdrop", whole, static=True)
 
 
 def _widened(low: float, high: float, least: float, margin: float) -> Span:

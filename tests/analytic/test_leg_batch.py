@@ -13,7 +13,7 @@ from legbench.errors import ConfigError, PlantFault
 
 pytest.importorskip("heyoka")
 
-from legbench.analytic.lanes import Friction, Lanes
+from legbench.analytic.leg_batch import Friction, LegBatch
 from legbench.analytic.losses import Losses
 from legbench.analytic.many import ManyLegs, motion
 from legbench.analytic.parameters import COUPLING, DAMPING, INERTIA, MOMENT, STIFFNESS
@@ -51,7 +51,7 @@ def hanging(q: tuple[float, float]) -> LegState:
 @pytest.mark.parametrize("regime", [Regime.PINNED, Regime.HANGING])
 def test_each_leg_moves_as_if_it_were_alone(regime: Regime) -> None:
     models, motors = some_legs(), some_motors()
-    lanes = Lanes(models, regime)
+    lanes = LegBatch(models, regime)
     lanes.start(STARTS)
     found = STARTS
     for tick in range(1, 301):
@@ -69,7 +69,7 @@ def test_each_leg_moves_as_if_it_were_alone(regime: Regime) -> None:
 
 def test_a_path_is_what_its_ends_are() -> None:
     models, motors = some_legs(gravity=0.0), some_motors()
-    lanes, times = Lanes(models, Regime.HANGING, workers=2), np.linspace(0.0, 0.5, 6)
+    lanes, times = LegBatch(models, Regime.HANGING, workers=2), np.linspace(0.0, 0.5, 6)
     lanes.start(STARTS)
     path = lanes.path(times, motors)
     assert path.shape == (COUNT, 6, 4)
@@ -104,11 +104,11 @@ def test_derivatives_by_the_parameters_are_differences(rubbing: bool) -> None:
     friction = [Friction(torque=(0.02, 0.01))] if rubbing else None
 
     def end(leg: LegModel, rub: list[Friction] | None) -> np.ndarray:
-        lanes = Lanes([leg], Regime.PINNED, friction=rub)
+        lanes = LegBatch([leg], Regime.PINNED, friction=rub)
         lanes.start(STARTS[:1])
         return lanes.go(0.4, motors)[0]
 
-    lanes = Lanes([model], Regime.PINNED, friction=friction, derivatives=True)
+    lanes = LegBatch([model], Regime.PINNED, friction=friction, derivatives=True)
     lanes.start(STARTS[:1])
     assert np.allclose(lanes.go(0.4, motors)[0], end(model, friction), rtol=0.0, atol=1e-12)
     slopes = lanes.slopes[0]
@@ -131,7 +131,7 @@ def test_derivatives_by_the_parameters_are_differences(rubbing: bool) -> None:
 def test_friction_takes_energy() -> None:
     models = [LegModel.of(PROTOTYPE, undamped=True)] * 2
     none, some = Friction(torque=(0.0, 0.0)), Friction(torque=(0.05, 0.05))
-    lanes = Lanes(models, Regime.PINNED, friction=[none, some])
+    lanes = LegBatch(models, Regime.PINNED, friction=[none, some])
     lanes.start(STARTS[:2])
     path = lanes.path(np.linspace(0.0, 1.0, 101), np.array([[-0.7, 0.7]] * 2))
     assert np.ptp(path[1, 50:, 1]) < 0.8 * np.ptp(path[0, 50:, 1])
@@ -143,7 +143,7 @@ def test_a_guide_and_play_act_as_on_the_leg_alone() -> None:
     motor, q, count = (-0.42, 0.4), (-0.95, 0.9), 300
     state = standing(models[1], q, pinned=True)
     alone, _ = HybridLeg(models[1], FINE).advance(state, 0.001 * count, motor)
-    lanes = Lanes(models, Regime.PINNED, guide=[(0.0, 0.0), losses.guide])
+    lanes = LegBatch(models, Regime.PINNED, guide=[(0.0, 0.0), losses.guide])
     lanes.start(np.array([(*q, 0.0, 0.0)] * 2))
     found = lanes.go(0.001 * count, np.array([motor] * 2))
     assert np.allclose(found[1], alone.q + alone.v, rtol=0.0, atol=1e-9)
@@ -161,7 +161,7 @@ def test_a_guide_and_play_act_as_on_the_leg_alone() -> None:
 
 def test_a_leg_beyond_its_joints_is_named() -> None:
     models = some_legs()
-    lanes = Lanes(models, Regime.HANGING)
+    lanes = LegBatch(models, Regime.HANGING)
     starts = STARTS.copy()
     starts[3, 1] = -0.5
     lanes.start(starts)
@@ -171,9 +171,9 @@ def test_a_leg_beyond_its_joints_is_named() -> None:
 
 def test_bad_lanes_are_refused() -> None:
     with pytest.raises(ConfigError, match="no leg to follow"):
-        Lanes([], Regime.PINNED)
+        LegBatch([], Regime.PINNED)
     with pytest.raises(ConfigError, match="cannot be in 'stance', which ends by an event"):
-        Lanes(some_legs(), Regime.STANCE)
+        LegBatch(some_legs(), Regime.STANCE)
     with pytest.raises(ConfigError, match="friction torque is"):
         Friction(torque=(-1.0, 0.0))
     with pytest.raises(ConfigError, match="width is 0 rad/s"):
@@ -181,7 +181,7 @@ def test_bad_lanes_are_refused() -> None:
 
 
 def test_a_runaway_is_a_fault() -> None:
-    lanes = Lanes(some_legs(), Regime.PINNED)
+    lanes = LegBatch(some_legs(), Regime.PINNED)
     lanes.start(np.tile([-0.8, 0.8, 1e200, -1e200], (COUNT, 1)))
     with pytest.raises(PlantFault, match="a leg runs away"):
         lanes.go(1.0, some_motors())

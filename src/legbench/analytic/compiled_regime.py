@@ -24,7 +24,7 @@ OFF = (0.0, 1.0)
 
 
 @final
-class Watch:
+class CompiledRegime:
     """A compiled regime with the parameters of one leg.
 
     Attributes:

@@ -68,7 +68,7 @@ def other_of(recording: Recording, place: int, facts: Facts) -> Other:
 
 
 @final
-class Ghost:
+class Overlay:
     """Publishes the joints and the leg of another run."""
 
     def __init__(self, stream: rr.RecordingStream, other: Other) -> None:

@@ -1,10 +1,10 @@
 """Batch of legs, each with parameters of its own, that are integrated by the same instructions.
 
-    lanes = Lanes(models, Regime.PINNED, derivatives=True)
-    lanes.start(states)                  # (n, 4)
-    lanes.go(0.001, motors)              # one period of a sampled controller
-    lanes.states, lanes.slopes           # (n, 4), (n, 4, 9)
-    path = lanes.path(times, motors)     # or many times in one call, (n, len(times), 4)
+    batch = LegBatch(models, Regime.PINNED, derivatives=True)
+    batch.start(states)                  # (n, 4)
+    batch.go(0.001, motors)              # one period of a sampled controller
+    batch.states, batch.slopes           # (n, 4), (n, 4, 9)
+    path = batch.path(times, motors)     # or many times in one call, (n, len(times), 4)
 
 The legs are held by trunk or foot and stay within their joints' limits: a batch has neither events
 nor joint stops. `outside` says which legs were seen beyond a limit.
@@ -57,7 +57,7 @@ class Friction:
 
 
 @final
-class Lanes:
+class LegBatch:
     """Batch of held legs that move in step, without joint stops and events.
 
     A guide brakes the trunk of each leg over its pinned foot, forward and upward [N s/m].

@@ -1,0 +1,75 @@
+"""Frames that wait for the wire of an emulated bus, and the one of them that goes next."""
+
+from typing import NamedTuple, final
+
+from legbench.drives.emulated.station import Node, Station
+from legbench.drives.protocol.frame import Frame
+
+
+class Waiting(NamedTuple):
+    """A frame that waits for the wire."""
+
+    ready_ns: int
+    """Time from which it may be sent [ns]."""
+    cob_id: int
+    sequence: int
+    """Number of frames that were handed over before it."""
+    sender: Node
+    frame: Frame
+
+
+@final
+class SendQueue:
+    """Frames that wait for the wire: a drive's go by priority, a master's in their order.
+
+    Masters queue their frames, as SocketCAN and serial adapters do: one of a lower identifier waits
+    for those that were handed over before it.
+    """
+
+    def __init__(self) -> None:
+        self._waiting: list[Waiting] = []
+        self._count = 0
+
+    def __bool__(self) -> bool:
+        """Whether any frame waits."""
+        return bool(self._waiting)
+
+    @property
+    def earliest_ns(self) -> int:
+        """Time from which the first of the frames that wait may be sent [ns]."""
+        return min(self._waiting)[0]
+
+    def put(self, sender: Node, ready_ns: int, frame: Frame) -> int:
+        """Add a frame that may be sent from a time on [ns]; returns its number."""
+        self._count += 1
+        self._waiting.append(Waiting(ready_ns, frame.cob_id, self._count, sender, frame))
+        return self._count
+
+    def put_back(self, entry: Waiting, ready_ns: int) -> None:
+        """Return a frame that was destroyed on the wire to its place, to be sent again."""
+        self._waiting.insert(0, entry._replace(ready_ns=ready_ns))
+
+    def drop(self, sender: Node) -> None:
+        """Forget all frames of a node."""
+        self._waiting = [entry for entry in self._waiting if entry.sender is not sender]
+
+    def pop(self, now_ns: int) -> Waiting:
+        """Remove the frame that wins the arbitration at a time [ns], and return it.
+
+        Of the frames that are ready the one with the lowest identifier wins (ISO 11898-1).
+        """
+        winner = min(self._competing(now_ns), key=lambda entry: entry[1:3])
+        self._waiting.remove(winner)
+        return winner
+
+    def _competing(self, now_ns: int) -> list[Waiting]:
+        competing: list[Waiting] = []
+        queued: set[Node] = set()
+        for entry in self._waiting:
+            sender = entry[3]
+            if entry[0] > now_ns or sender in queued:
+                continue
+            if isinstance(sender, Station):
+                queued.add(sender)
+            competing.append(entry)
+        return competing
