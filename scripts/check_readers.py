@@ -13,6 +13,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -66,9 +67,8 @@ def main(arguments: list[str]) -> int:
         for kind in Format:
             export(recording, folder / f"run.{kind.value}", kind)
         shutil.copy(recording.path / "samples.parquet", folder)
-        np.savez(
-            folder / "run.npz", **{name: recording.columns[name] for name in recording.columns}
-        )
+        columns: dict[str, Any] = dict(recording.columns)
+        np.savez(folder / "run.npz", **columns)
         torn_streams(folder)
         command = [arguments[0], str(ROOT / "scripts/readers.py"), str(folder)]
         return subprocess.run(command, check=False).returncode

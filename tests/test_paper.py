@@ -63,8 +63,10 @@ def test_a_wrong_line_is_told(tmp_path: Path, rows: list[str], message: str) -> 
 
 def test_files_that_hold_no_numbers_are_refused(tmp_path: Path) -> None:
     file = tmp_path / "numbers.csv"
-    with pytest.raises(ConfigError, match="no published numbers can be read"):
+    with pytest.raises(ConfigError, match="no such file of published numbers"):
         published(file)
+    with pytest.raises(ConfigError, match="no published numbers can be read"):
+        published(tmp_path)
     file.write_text("key,value\n")
     with pytest.raises(ConfigError, match="line 1: the columns must be key,value,unit"):
         published(file)

@@ -88,7 +88,9 @@ def published(path: Path = PAPER) -> Mapping[str, Published]:
     """
     try:
         lines = read_file(path, LARGEST).decode("utf-8").splitlines()
-    except (FileNotFoundError, UnreadableError, UnicodeDecodeError) as error:
+    except FileNotFoundError as error:
+        raise ConfigError(f"{path}: no such file of published numbers") from error
+    except (UnreadableError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path}: no published numbers can be read: {error}") from error
     if not lines or tuple(lines[0].split(",")) != COLUMNS:
         raise ConfigError(f"{path}, line 1: the columns must be {','.join(COLUMNS)}")

@@ -119,7 +119,8 @@ def test_what_cannot_be_shown_is_refused_and_still_planned_for(
         (("ffs", "--noise-deg", "0"), "noise_deg is 0 deg"),
         (("ffs", "--sharpen", "k1"), "--sharpen says what a plan is for"),
         (("ffs", "--plan", "next.toml", "--sharpen", "B"), "--sharpen is B; it must be free"),
-        (("ffs", "--out", "nowhere/a.toml"), "there is no folder nowhere"),
+        (("ffs", "--out", "/dev/null/a.toml"), "cannot write /dev/null: "),
+        (("ffs", "--figure", "a.bmp"), "a figure cannot be written as 'a.bmp'"),
         (("ffs", "--held-out", "other"), "is of leg 'prototype' and"),
     ],
 )

@@ -118,11 +118,12 @@ def test_a_log_is_rated_drawn_and_resimulated(
         (["--plant", "sim"], ["--plant is what moves the leg"]),
         (["--design", OTHER], ["--design is another leg to move"]),
         (["--setup", "ffs"], ["--setup belongs to a log"]),
-        (["--bus", str(BUS)], ["--bus describes the drives of a log"]),
+        (["--bus", str(BUS)], ["--bus describes the drives of a log", "is a folder"]),
         (["--controller", "--resimulate", "motors"], ["two replays; ask for one"]),
         (["--speed", "0.5"], ["say how a run is played; add --view"]),
         (["--rrd", "x.rrd", "--from", "9"], ["nothing lies from 9", "lasts from 0 to 0.399 s"]),
         (["--rrd", "x.rrd", "--speed", "0"], ["speed is 0; it must be 0.001"]),
+        (["--controller", "--figure", "x.bmp"], ["cannot be written as 'x.bmp'", ".svg"]),
         (["--resimulate", "motors", "--beyond", "-1"], ["beyond is -1; it must be 0 or more"]),
         (["--controller", "--set", "servo.bandwidth=9"], ["this replay has controller, conv"]),
     ],
@@ -143,6 +144,6 @@ def test_a_log_needs_a_bus_file(
 ) -> None:
     called(capfd, "replay", drives / "bus.log").refused("is a log of raw frames; add --bus FILE")
     called(capfd, "replay", drives / "leg.xml").refused("is a file, no run folder")
-    called(capfd, "replay", tmp_path / "gone.log", "--bus", BUS).refused("--bus describes")
+    called(capfd, "replay", tmp_path / "gone.log", "--bus", BUS).refused("gone.log does not exist")
     called(capfd, "replay", tmp_path / "gone.log").refused("does not exist")
     called(capfd, "replay", drives / "bus.log", "--bus", "no.toml").refused("no.toml", "no such")

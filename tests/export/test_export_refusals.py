@@ -71,6 +71,7 @@ def test_a_missing_mcap_names_its_extra(
         ([], 2, "no format was chosen; choose one of --csv, --parquet, --mat, --mcap"),
         (["--csv", "--mat"], 2, "one file has one format; choose one of --csv"),
         (["--out", "run.xlsx"], 2, "no format was chosen"),
+        (["--csv", "--out", "run.mat"], 2, "--csv does not go with run.mat"),
         (["--csv", "--out", "/dev/null/run.csv"], 1, "cannot write /dev/null/run.csv"),
     ],
 )

@@ -3,8 +3,10 @@
 Its hidden parameters are found, and the identified design predicts a hop that no fit has seen.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from twins import PROTOTYPE
 
@@ -63,6 +65,26 @@ def test_a_twin_behind_emulated_drives_is_identified_and_its_hop_predicted(
     hop = repeat(recorded, identified)
     assert hop.good, hop.text
     assert not repeat(recorded, PROTOTYPE).good
+
+
+def test_an_answer_that_a_drive_owes_is_no_reading() -> None:
+    """An answer is taken away, as a lost frame takes it: the row repeats the one before."""
+    run = driven(PositionJumpConfig(z2=1.0, dz2=0.3, delay=0.05), SetupKind.VFTS, 0.3)
+    columns = {name: values.copy() for name, values in run.columns.items()}
+    row = int(np.argmax(np.abs(columns["joint_vel_1"])))
+    for name in ("motor_pos_1", "joint_pos_1", "joint_vel_1"):
+        columns[name][row] = columns[name][row - 1]
+    lost = replace(run, columns=columns)
+    free = parse_free(["springs", "dampers"])
+    asked = [question_of([each], free=free, starts=1) for each in (run, lost)]
+    whole, lossy = (each.trials[0] for each in asked)
+    assert set(lossy.left_out) == {*whole.left_out, row}
+    np.testing.assert_allclose(lossy.joint_pos[row], whole.joint_pos[row], atol=3e-4)
+    found = [identify(each) for each in asked]
+    assert found[1].left_out == (len(lossy.left_out),)
+    for one, other in zip(found[0].estimates, found[1].estimates, strict=True):
+        assert one.value == pytest.approx(other.value, abs=0.5 * one.error)
+    assert found[1].residuals[0].rms == pytest.approx(found[0].residuals[0].rms, rel=0.05)
 
 
 def test_only_a_hop_is_repeated() -> None:

@@ -1,5 +1,7 @@
 """States of the foot and the first action from roles and lateness, whatever controller ran."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -117,6 +119,16 @@ def test_a_guest_says_which_periods_count(counting: Counting, count: int) -> Non
     seen = summarise(swinging(acting, np.full(3000, 5), counting))
     assert len(seen.rating_periods) == count
     assert bool(seen.warnings) is (count == 0)
+
+
+def test_a_limit_of_zero_is_no_reason_why_nothing_was_rated() -> None:
+    acting = (PhaseInfo(code=5, name="sine", role=Role.ACTING),)
+    run = swinging(acting, np.full(3000, 5), Counting())
+    short = {name: values[:200] for name, values in run.columns.items()}
+    (told,) = summarise(replace(run, columns=short, time=run.time[:200])).warnings
+    assert told.endswith("did not turn back and forth once after the first control action")
+    (told,) = summarise(swinging(acting, np.full(3000, 5), Counting(smallest=0.3))).warnings
+    assert told.endswith(", or by less than the 0.3 rad that count")
 
 
 def test_a_run_in_which_nothing_is_commanded_says_so() -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 import pytest
 from campaign_tables import STEP, as_the_paper_says, periods
 from pyarrow import parquet
@@ -16,8 +17,9 @@ from legbench.cli import main
 from legbench.errors import CampaignError, ConfigError
 from legbench.experiment import experiment_hash
 from legbench.report import write_report
-from legbench.viz.print._matplotlib import Axes
+from legbench.viz.print._matplotlib import Axes, Figure
 from legbench.viz.print.inline import panel_svg
+from legbench.viz.print.ratings import PrintedRating, RatingPanel, draw_ratings, looks_of
 
 VOID = {"meta", "link", "img", "br"}
 LARGEST = 3_000_000
@@ -167,6 +169,16 @@ def test_the_same_panel_is_the_same_text_whatever_the_style_of_the_user() -> Non
     assert set(ids) <= set(used)
 
 
+def test_a_panel_without_a_run_says_so_and_shows_a_printed_level_as_a_line() -> None:
+    level = PrintedRating(first=4, last=None, rating=0.94)
+    content = RatingPanel(title="(f)", group="bang-bang", curves=(), printed=(level,))
+    panel = Figure().add_subplot()
+    draw_ratings(panel, content, looks_of([content]), "black")
+    assert [each.get_text() for each in panel.texts] == ["no run"]
+    (line,) = panel.get_lines()
+    assert np.ptp(np.asarray(line.get_xdata())) == 2.0
+
+
 def test_a_table_alone_is_reported_and_invalid_runs_are_flagged(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -208,3 +220,5 @@ def test_a_page_that_cannot_be_written_is_refused_at_once(
     told = capsys.readouterr()
     assert told.err.startswith(f"legbench: cannot write {tmp_path / 'file'}")
     assert told.err.count("\n") == 1
+    assert main(["report", str(folder), "--out", str(tmp_path / "page.png")]) == 1
+    assert "the page is a .html file" in capsys.readouterr().err

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pyarrow.parquet as pq
 import pytest
 
 from legbench.cli import main
@@ -71,6 +72,15 @@ def test_a_row_has_the_figures_and_the_settings(runs: Path) -> None:
     assert row["controller.settings.z2"] == BangBangConfig().z2
     assert row["design.thigh.mass"] == load(runs / "a").description.design.thigh.mass
     assert (row["rows"], row["torn"]) == (1000, None)
+
+
+def test_a_run_that_was_cut_short_lasts_as_long_as_it_did(recorded: Path, tmp_path: Path) -> None:
+    shutil.copytree(recorded, tmp_path / "short")
+    samples = tmp_path / "short" / "samples.parquet"
+    pq.write_table(pq.read_table(samples).slice(0, 400), samples)
+    (row,) = rows_of(tmp_path)
+    assert row["duration"] == summarise(load(tmp_path / "short")).duration
+    assert row["planned_duration"] == 1.0
 
 
 def test_what_is_known_is_not_measured_again(runs: Path, measured: list[str]) -> None:

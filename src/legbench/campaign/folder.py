@@ -122,8 +122,8 @@ def _begin(folder: Path, plan: Plan) -> None:
         if digest != plan.digest:
             raise CampaignError(
                 f"{folder} holds another campaign, '{name}' of {found.get('experiments')} "
-                f"experiments; this is '{plan.campaign.name}' of {len(plan.planned)}: name another "
-                "--out"
+                f"experiments; this is '{plan.campaign.name}' of {len(plan.planned)}, which are "
+                "others: name another --out"
             )
     elif any(folder.glob(f"{SHARDS}/*")) or (folder / "run.json").exists():
         raise CampaignError(

@@ -42,6 +42,8 @@ def main(arguments: list[str]) -> int:
         said = "one file has one format" if kinds else "no format was chosen"
         return wrong_usage("export", f"{said}; choose one of {flags}")
     (kind,) = kinds
+    if _named(chosen.out) not in (None, kind):
+        return wrong_usage("export", f"--{kind.value} does not go with {chosen.out}; name one")
     recording = load(chosen.run)
     if recording.torn is not None:
         note(f"legbench: {chosen.run} is torn ({recording.torn}); written as far as it goes")
@@ -58,5 +60,11 @@ def main(arguments: list[str]) -> int:
 def _formats(chosen: ExportArguments) -> list[Format]:
     """Formats that the flags ask for or, where none does, the suffix of the file."""
     asked = [kind for kind in Format if getattr(chosen, kind.value)]
-    suffix = "" if chosen.out is None else chosen.out.suffix.lower().lstrip(".")
-    return asked or [kind for kind in Format if kind.value == suffix]
+    named = _named(chosen.out)
+    return asked or ([] if named is None else [named])
+
+
+def _named(out: Path | None) -> Format | None:
+    """Format that the suffix of a file stands for, if any."""
+    suffix = "" if out is None else out.suffix.lower().lstrip(".")
+    return next((kind for kind in Format if kind.value == suffix), None)

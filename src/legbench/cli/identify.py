@@ -1,13 +1,14 @@
 """`legbench identify`: the parameters of a leg from its recordings."""
 
 import math
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from tyro.conf import Positional, UseAppendAction
 
-from legbench.cli.output import note, print_json
+from legbench.cli.output import note, print_json, results_in
 from legbench.cli.parse import parse
 from legbench.design import load_design
 from legbench.errors import ConfigError
@@ -59,9 +60,8 @@ class IdentifyArguments:
 
 def main(arguments: list[str]) -> int:
     """Run `legbench identify`."""
-    from legbench.identify import UnidentifiableError, identify, parse_free, question_of, read_runs
+    from legbench.identify import parse_free, question_of, read_runs
     from legbench.identify.asking import check_same_leg
-    from legbench.identify.words import content_of, lines_of
 
     flags = parse(IdentifyArguments, "identify", arguments)
     free = parse_free([word for word in flags.free.split(",") if word], start=not flags.at_rest)
@@ -80,6 +80,17 @@ def main(arguments: list[str]) -> int:
         starts=flags.starts,
     )
     _check(flags, question)
+    with ExitStack() as folders:
+        for path in filter(None, (flags.out, flags.plan, flags.figure)):
+            folders.enter_context(results_in(path.parent))
+        return _answer(flags, question, held_out)
+
+
+def _answer(flags: IdentifyArguments, question: Question, held_out: list[Recording]) -> int:
+    """Identify, print and write what was asked for; returns the exit status."""
+    from legbench.identify import UnidentifiableError, identify
+    from legbench.identify.words import content_of, lines_of
+
     try:
         outcome = identify(question, say=note)
     except UnidentifiableError as error:
@@ -122,9 +133,10 @@ def _check(flags: IdentifyArguments, question: Question) -> None:
         raise ConfigError(
             f"--sharpen is {flags.sharpen}; it must be free: {', '.join(question.free.names)}"
         )
-    for path in (flags.out, flags.plan, flags.figure):
-        if path is not None and not path.parent.is_dir():
-            raise ConfigError(f"cannot write {path}: there is no folder {path.parent}")
+    if flags.figure is not None:
+        from legbench.viz.print.save import check_suffix
+
+        check_suffix(flags.figure)
 
 
 def _hops(

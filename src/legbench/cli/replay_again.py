@@ -112,12 +112,13 @@ def print_again(again: Again) -> None:
         return
     print(f"{'differs':<17} first in {first}")
     for each in again.signals.deviations(again.beyond):
+        unit = "" if each.unit == "-" else f" {each.unit}"
         if not each.rows:
-            within = f"within {again.beyond:g} {each.unit}" if each.max else "identical"
+            within = f"within {again.beyond:g}{unit}" if each.max else "identical"
             print(f"{each.signal:<17} {within}")
             continue
         print(
-            f"{each.signal:<17} rms {each.rms:.3g}, max {each.max:.3g} {each.unit} at "
+            f"{each.signal:<17} rms {each.rms:.3g}, max {each.max:.3g}{unit} at "
             f"{each.max_time:.4g} s; beyond {again.beyond:g} in {each.rows} rows, first in cycle "
             f"{each.first_cycle} at {each.first_time:.4g} s"
         )

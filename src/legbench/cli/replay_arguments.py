@@ -17,7 +17,8 @@ class ReplayArguments:
     """Rate a recorded run again, from its file alone; show it, or let it happen again."""
 
     run: Annotated[Path, Positional]
-    """Run folder, which may be torn; with --bus a log of raw frames: .log, .asc, .blf or .trc."""
+    """Run folder, which may be torn; with --bus a log of raw frames: .log, .asc, .blf, .trc
+    or .csv, each also packed (.gz)."""
     against: UseAppendAction[tuple[Path, ...]] = ()
     """Another run to compare with and to draw over this one; may be repeated."""
     controller: bool = False
@@ -68,6 +69,10 @@ class ReplayArguments:
     def check(self) -> None:
         """Refuse flags that mean nothing together; raises ConfigError."""
         _ = self.playback.playback
+        if self.figure is not None:
+            from legbench.viz.print.save import check_suffix
+
+            check_suffix(self.figure)
         again = self.controller or self.resimulate is not None
         if self.controller and self.resimulate is not None:
             raise ConfigError("--controller and --resimulate are two replays; ask for one")

@@ -43,9 +43,7 @@ def source_of(chosen: ReplayArguments) -> Recording:
     if not is_log(chosen.run):
         chosen.check_pictures()
         if chosen.bus is not None:
-            raise ConfigError(
-                f"--bus describes the drives of a log; {chosen.run} is no .log, .asc, .blf or .trc"
-            )
+            raise ConfigError(f"--bus describes the drives of a log; {_why_no_log(chosen.run)}")
         return loaded(chosen.run)
     if chosen.bus is None:
         raise ConfigError(
@@ -53,6 +51,17 @@ def source_of(chosen: ReplayArguments) -> Recording:
             "says what drives are on that bus"
         )
     return _log(chosen, chosen.bus)
+
+
+def _why_no_log(path: Path) -> str:
+    """Say why something is not read as a log of raw frames."""
+    from legbench.replay.log_names import SUFFIXES
+
+    if not path.exists():
+        return f"{path} does not exist"
+    if path.is_dir():
+        return f"{path} is a folder"
+    return f"{path} has none of the suffixes {', '.join(SUFFIXES)}, nor one of them with .gz"
 
 
 def _log(chosen: ReplayArguments, bus: Path) -> Recording:

@@ -8,6 +8,7 @@ from tyro.conf import Positional
 
 from legbench.cli.output import note, print_json, progress, results_in
 from legbench.cli.parse import parse
+from legbench.errors import ConfigError
 
 MARKS = {True: "held", False: "not held", None: "not shown"}
 
@@ -39,6 +40,8 @@ def main(arguments: list[str]) -> int:
     folders = ((IDEAL, flags.campaign), (EXPLAINED, flags.explained), (BENCH, flags.bench))
     sources = [read_source(name, folder) for name, folder in folders if folder is not None]
     out = flags.campaign / "report.html" if flags.out is None else flags.out
+    if out.suffix.lower() not in (".html", ".htm"):
+        raise ConfigError(f"--out is {out}; the page is a .html file (figures: --figures png)")
     with results_in(out.parent):
         written = write_report(sources, out, suffixes=flags.figures, progress=progress)
     if flags.json:

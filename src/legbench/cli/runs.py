@@ -50,7 +50,8 @@ def main(arguments: list[str]) -> int:
         shown = [{name: row.get(name) for name in columns} if columns else row for row in found]
         print_json({"directory": str(chosen.directory), "known": len(rows), "runs": shown})
         return 0
-    print_rows(found, columns or _usual(names))
+    if found:
+        print_rows(found, columns or _usual(names))
     print(f"{len(found)} of {len(rows)} runs in {chosen.directory}")
     return 0
 

@@ -78,7 +78,7 @@ def residuals_of(misfit: Misfit, trials: Sequence[Trial]) -> list[Residual]:
                 Residual(
                     run=trial.name,
                     joint=joint + 1,
-                    rms=sigma * float(np.sqrt(np.mean(own**2))),
+                    rms=sigma * float(np.sqrt(np.mean(np.delete(own, trial.left_out) ** 2))),
                     sigma=sigma,
                     coloured=sigma * math.sqrt(max(0.0, square - chance)),
                     allowed=_explained(trial, rounding, joint),

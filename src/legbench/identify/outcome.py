@@ -38,6 +38,8 @@ class Outcome:
     runs: tuple[str, ...]
     findings: tuple[Finding, ...]
     """What is wrong with the data."""
+    left_out: tuple[int, ...] = ()
+    """Rows of each run that were left out because a drive had not answered [-]."""
     gate: Gate | None = None
     """How well the runs show what was free; none: the data were hopeless."""
     estimates: tuple[Estimate, ...] = ()

@@ -74,7 +74,8 @@ class Problem:
         residuals, jacobians, rounding = [], [], []
         for place, (trial, each) in enumerate(zip(self.trials, predicted, strict=True)):
             rows = len(each.links)
-            residuals.append((trial.joint_pos[:rows] - each.links) / trial.sigma)
+            left = (trial.joint_pos[:rows] - each.links) / trial.sigma
+            residuals.append(without_rows(left, trial))
             jacobians.append(self._slope(place, trial, each, guess))
             rounding.append(_rounding(trial, each))
         cost = float(sum(np.sum(each * each) for each in residuals))
@@ -91,7 +92,7 @@ class Problem:
         own = all_slopes(each, trial, guess.values)
         chosen = own[:, :, [INDEX[name] for name in self.freedom.names]]
         starts = np.zeros((len(own), 2, len(self._starts)))
-        scaled = each.by_start * START_SCALE / trial.sigma[:, np.newaxis]
+        scaled = without_rows(each.by_start * START_SCALE / trial.sigma[:, np.newaxis], trial)
         for column, (run, part) in enumerate(self._starts):
             if run == place:
                 starts[:, :, column] = scaled[:, :, part]
@@ -113,10 +114,16 @@ def _rounding(trial: Trial, each: Prediction) -> Floats:
     """Derivatives of one run's prediction by the rounding of both motors (n, 2, 2) [-]."""
     places = [INDEX["motor_zero1"], INDEX["motor_zero2"]]
     hidden = np.array([motor.count for motor in trial.motors]) / math.sqrt(12.0)
-    return each.by_values[:, :, places] * hidden / trial.sigma[:, np.newaxis]
+    return without_rows(each.by_values[:, :, places] * hidden / trial.sigma[:, np.newaxis], trial)
 
 
 def all_slopes(each: Prediction, trial: Trial, values: Floats) -> Floats:
     """Derivatives of one run's prediction by steps of every parameter (n, 2, p) [-]."""
     scales = np.array([steps_of(name, float(values[INDEX[name]])) for name in PARAMETERS])
-    return each.by_values * scales / trial.sigma[:, np.newaxis]
+    return without_rows(each.by_values * scales / trial.sigma[:, np.newaxis], trial)
+
+
+def without_rows(values: Floats, trial: Trial) -> Floats:
+    """Values of the first rows of a run (n, ...), with zeros where no drive has answered."""
+    values[trial.left_out[trial.left_out < len(values)]] = 0.0
+    return values

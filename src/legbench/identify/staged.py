@@ -85,11 +85,12 @@ def identify(question: Question, say: Say = lambda _: None) -> Outcome:
     """
     leg, trials = question.leg, question.trials
     runs = tuple(trial.name for trial in trials)
+    left_out = tuple(len(trial.left_out) for trial in trials)
     say("checking the data")
     findings = _findings(question, leg)
     if any(finding.hopeless for finding in findings):
         reasons = tuple(f"{each.run}: {each.text}" for each in findings)
-        return Outcome(runs=runs, findings=tuple(findings), reasons=reasons)
+        return Outcome(runs=runs, left_out=left_out, findings=tuple(findings), reasons=reasons)
     problem = Problem(trials, leg.reach, question.free)
     guess = Guess(values=leg.values, starts=nothing_moved(trials))
     gate = look(problem.misfit(guess), problem.names)
@@ -100,6 +101,7 @@ def identify(question: Question, say: Say = lambda _: None) -> Outcome:
     agreeing = [each for each in fits if each.misfit.cost <= best.misfit.cost * (1.0 + SAME)]
     outcome = Outcome(
         runs=runs,
+        left_out=left_out,
         findings=tuple(findings),
         starts=question.starts,
         agreeing=len(agreeing),

@@ -1,6 +1,6 @@
 """One recorded run as a fit uses it: what was measured, when, in which setup, how exactly."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -10,9 +10,10 @@ from legbench.design.setup import SetupKind
 from legbench.errors import ConfigError
 from legbench.identify.noise import Precision, precision_of
 from legbench.mjcf.fitting import fitted_bar_density
+from legbench.recording.answers import between_answers, unanswered
 from legbench.recording.description import BARS, RunDescription
 from legbench.recording.reader import Recording
-from legbench.signals import Floats
+from legbench.signals import Floats, Ints
 
 FIXED: Final = (SetupKind.HFTS, SetupKind.VFTS, SetupKind.FFS)
 """Setups without touchdown and lift-off, which a fit can follow."""
@@ -53,6 +54,8 @@ class Trial:
 
     moving: bool = False
     """Whether the leg moves in the first row already."""
+    left_out: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    """Rows (m,) that say nothing of the links, because a drive had not answered [-]."""
 
     @property
     def sigma(self) -> Floats:
@@ -107,6 +110,9 @@ def trial_of(recording: Recording, *, noise: float | None = None) -> Trial:
     motors = tuple(
         precision_of(motor_pos[:, joint]).counting(links[joint].count) for joint in (0, 1)
     )
+    # A drive that has not answered repeats itself: what it says is no reading of that row.
+    missing = unanswered(recording)
+    motor_pos, joint_pos = (between_answers(each, missing) for each in (motor_pos, joint_pos))
     return Trial(
         name=name,
         setup=run.setup.kind,
@@ -118,6 +124,7 @@ def trial_of(recording: Recording, *, noise: float | None = None) -> Trial:
         links=(links[0], links[1]),
         motors=(motors[0], motors[1]),
         moving=begins_in_motion(time, joint_pos, np.array([each.sigma for each in links])),
+        left_out=np.flatnonzero(missing.any(axis=1)).astype(np.int64),
     )
 
 

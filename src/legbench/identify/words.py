@@ -11,6 +11,8 @@ def lines_of(outcome: Outcome) -> list[str]:
     """Lines for people: verdict, data, estimates, residuals, held-out runs, reasons."""
     verdict = "trusted" if outcome.trusted else "not to be trusted"
     lines = [f"verdict           {verdict}", f"runs              {', '.join(outcome.runs)}"]
+    if rows := sum(outcome.left_out):
+        lines.append(f"left out          {rows} rows in which a drive had not answered")
     if outcome.estimates:
         lines += ["", *_fit_lines(outcome), "", *_estimate_lines(outcome)]
         lines += ["", *_residual_lines(outcome)]
@@ -63,6 +65,7 @@ def content_of(outcome: Outcome) -> dict[str, Any]:
         "trusted": outcome.trusted,
         "reasons": list(outcome.reasons),
         "runs": list(outcome.runs),
+        "left_out": list(outcome.left_out),
         "findings": [asdict(each) for each in outcome.findings],
         "estimates": {each.name: asdict(each) for each in outcome.estimates},
         "correlation": None if outcome.correlation is None else outcome.correlation.tolist(),

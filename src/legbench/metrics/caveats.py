@@ -39,14 +39,15 @@ def warnings_of(run: Analysis) -> list[str]:
             f" {described.controller} has the role stance or flight"
         )
     elif not (rated.stance or rated.flight or rated.periods):
-        what = (
-            _why_no_hop(run)
-            if described.jumps
-            else "z2 did not turn back and forth once after the first control action, or by less"
-            f" than the {described.counting.smallest:.3g} rad that count"
-        )
+        what = _why_no_hop(run) if described.jumps else _why_no_period(described.counting.smallest)
         found.append(f"nothing was rated: {what}")
     return found
+
+
+def _why_no_period(smallest: float) -> str:
+    """Say why a leg in a fixed setup has no period that counts, of an amplitude above one [rad]."""
+    less = f", or by less than the {smallest:.3g} rad that count" if smallest > 0.0 else ""
+    return f"z2 did not turn back and forth once after the first control action{less}"
 
 
 def _why_no_hop(run: Analysis) -> str:

@@ -135,4 +135,5 @@ def _plain(message: can.Message) -> bool:
 
 def _told(error: Exception) -> str:
     text = " ".join(str(error).split())
-    return f"{text[:80]}" if text else type(error).__name__
+    told = text[:80] if text else type(error).__name__
+    return f"what stands there has not the form of a frame ({told})"

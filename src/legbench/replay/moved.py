@@ -7,9 +7,9 @@ from typing import Final, final
 import numpy as np
 
 from legbench.errors import ConfigError, RecordingError
+from legbench.recording.answers import DRIVES, between_answers, unanswered
 from legbench.recording.reader import Recording
-from legbench.replay.observations import DRIVES
-from legbench.signals import Bools, Command, Floats
+from legbench.signals import Command, Floats
 
 STILL: Final = 1e-3
 """Way of a motor from its first position that ends the rest before a run's first action [rad]."""
@@ -59,8 +59,8 @@ class Moved:
                 f"{recording.path} does not know its {source.value} in every row: it cannot be "
                 "resimulated from them"
             )
-        self.stale = _stale(recording) if self.on_drives else np.zeros(needed.shape, dtype=np.bool_)
-        self._motor_pos = _between_answers(recording["motor_pos"], self.stale)
+        self.stale = unanswered(recording)
+        self._motor_pos = between_answers(recording["motor_pos"], self.stale)
         known = run.initial_state
         measured = self.on_drives and self._measured
         start = None if known is None or measured else np.array(known.motor_pos)
@@ -93,33 +93,3 @@ class Moved:
         away = np.any(np.abs(self._motor_pos - self._motor_pos[0]) > STILL, axis=1)
         rows = int(np.argmax(away)) if away.any() else len(away)
         return self._joint_pos[: min(rows, MOST_REST)]
-
-
-def _stale(recording: Recording) -> Bools:
-    """Rows in which a drive had not answered (n, 2).
-
-    Its positions and its velocity are those of the row before then; of a fresh answer the low-pass
-    of the velocity makes another number, unless the link stands.
-    """
-    found = np.zeros(recording["joint_pos"].shape, dtype=np.bool_)
-    velocity = recording["joint_vel"]
-    same = np.abs(velocity[1:]) > 0.0
-    for values in (velocity, recording["joint_pos"], recording["motor_pos"]):
-        same &= values[1:] == values[:-1]
-    found[1:] = same
-    return found
-
-
-def _between_answers(motor_pos: Floats, stale: Bools) -> Floats:
-    """Motor positions (n, 2) with those that were not told put on a line between their neighbours.
-
-    Args:
-        motor_pos: positions (n, 2) [rad].
-        stale: those that repeat the row before (n, 2).
-    """
-    found, rows = motor_pos.copy(), np.arange(len(motor_pos))
-    for axis in range(motor_pos.shape[1]):
-        told = ~stale[:, axis]
-        if not told.all():
-            found[:, axis] = np.interp(rows, rows[told], motor_pos[told, axis])
-    return found

@@ -5,12 +5,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from legbench.errors import RecordingError
+from legbench.recording.answers import DRIVES
 from legbench.recording.layout import TIME
 from legbench.recording.reader import Recording
 from legbench.signals import MEASURED, Floats, Observation, Truth
-
-DRIVES = "can"
-"""Kind of plant whose time is that of a clock: a tick without SYNC leaves a gap in it."""
 
 
 def require_every_row(recording: Recording) -> float:

@@ -16,6 +16,7 @@ from legbench.plant.backlash import rest_of
 from legbench.plant.opening import Leg, OpenPlant, PlantSettings, open_plant
 from legbench.plant.start import Start
 from legbench.plants import PLANTS, SimChoice
+from legbench.recording.answers import DRIVES
 from legbench.recording.format_1 import upgraded
 from legbench.recording.layout import COMPLETE, FAULT
 from legbench.recording.manifest import OWN_KEYS
@@ -23,7 +24,7 @@ from legbench.recording.memory import MemoryRun
 from legbench.recording.reader import Recording
 from legbench.replay.comparison import Replayed, columns_of
 from legbench.replay.moved import Moved, Source
-from legbench.replay.observations import DRIVES, exact_times, require_every_row
+from legbench.replay.observations import exact_times, require_every_row
 from legbench.replay.recorded import RecordedLeg
 from legbench.servo import ServoConfig
 from legbench.signals import Bools, Command, Floats

@@ -11,6 +11,7 @@ USUAL: Final = ("run", "setup", "controller", "z2", "dz2", "status", "duration",
 
 UNITS: Final = {
     "duration": "s",
+    "planned_duration": "s",
     "trunk_excursion": "m",
     "foot_clearance": "m",
     "drift": "m",

@@ -14,6 +14,8 @@ Cell = float | str | bool | None
 """Value of a column in one run; none where the run does not show it."""
 Row = dict[str, Cell]
 
+PLANNED = "duration"
+"""Setting that has the name of a figure, which it would hide."""
 UNREADABLE = "unreadable"
 """Status of a run that cannot be read; its cause says why."""
 
@@ -22,7 +24,8 @@ def measure(run: Path) -> Row:
     """Figures and settings of the run in a folder; one that cannot be read says so and no more.
 
     A list of ratings is its mean, the two largest changes by the limits their maximum. Settings
-    are those of the experiment, as its file names them.
+    are those of the experiment, as its file names them, but for the duration that was wished,
+    which is `planned_duration` beside the one that was reached.
     """
     try:
         recording = load(run)
@@ -38,6 +41,8 @@ def measure(run: Path) -> Row:
         "plant": described.plant,
     }
     settings = dict(_flat(described.experiment))
+    if PLANNED in settings:
+        settings[f"planned_{PLANNED}"] = settings.pop(PLANNED)
     row = null_for_nan(named | ending | figures | settings)
     return {name: _cell(value) for name, value in row.items()}
 

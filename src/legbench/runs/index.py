@@ -19,7 +19,7 @@ from legbench.writing import write_whole
 
 INDEX: Final = ".legbench-runs.json"
 """Name of the index in the folder of the runs."""
-FORMAT: Final = 1
+FORMAT: Final = 2
 LARGEST: Final = 1 << 30
 """Largest index that is read [bytes]; a run takes some 5 kB."""
 MANY: Final = 100

@@ -61,8 +61,10 @@ def aligned_figure(runs: Sequence[Analysis], found: SideBySide, span: float) -> 
             panel.margins(x=0.0)
         ratings.set_yscale("log")
         ratings.locator_params(axis="x", integer=True)
-        if ratings.get_legend_handles_labels()[1]:
-            ratings.legend(fontsize=7.5, framealpha=0.8)
+        marks, labels = ratings.get_legend_handles_labels()
+        kinds = dict(zip(labels, marks, strict=True))  # One mark for each kind.
+        if kinds:
+            ratings.legend(kinds.values(), kinds.keys(), fontsize=7.5, framealpha=0.8)
         handles, labels = radial.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False)
     return figure
@@ -122,5 +124,5 @@ def _draw_ratings(panel: Axes, found: SideBySide, place: int) -> None:
             markersize=3.5,
             linestyle="none",
             fillstyle="full" if place == 0 else "none",
-            label=kind if place == 0 else "_",
+            label=kind,
         )

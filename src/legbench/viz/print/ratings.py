@@ -16,6 +16,8 @@ Dashes = tuple[float, tuple[float, ...]] | Literal["solid"]
 
 WIDTH_INCH, ROW_INCH, LEGEND_INCH = 10.0, 2.7, 0.8
 """Width of the figure, heights of a row of panels and of the legend [inch]."""
+SHORTEST: Final = 6
+"""Fewest periods that an axis shows [-], those of the paper's step."""
 COLUMNS: Final = 3
 """Number of panels in a row: one for each setup."""
 GRAIN: Final = 0.02
@@ -137,12 +139,15 @@ def draw_ratings(panel: Axes, content: RatingPanel, looks: Looks, colour: str) -
             low, high = curve.mean - curve.spread, np.minimum(curve.mean + curve.spread, 1.0)
             band = scale.of(low), scale.of(high)
             panel.fill_between(periods, *band, color=ink, alpha=0.16, linewidth=0, zorder=1)
+    last = max(longest, *(each.first for each in content.printed), SHORTEST)
     for each in content.printed:
-        ends = [each.first, max(longest, each.first) if each.last is None else each.last]
+        ends = [each.first, last if each.last is None else each.last]
         look = "x" if each.first == each.last else "-"
         at = [scale.printed(each.rating)] * 2
         panel.plot(ends, at, look, color=colour, markersize=6, linewidth=1.4, zorder=4)
-    panel.set_xlim(0.5, max(longest, *(each.first for each in content.printed), 6) + 0.5)
+    if not content.curves:
+        panel.text(0.5, 0.5, "no run", transform=panel.transAxes, ha="center", color=colour)
+    panel.set_xlim(0.5, last + 0.5)
     if scale.lost:
         panel.set_yscale("log")
     else:
