@@ -149,7 +149,8 @@ def test_changes_replace_what_the_file_says(tmp_path: Path) -> None:
         ("list = [3]\n" + BASE, ("list: is [3]; it must be a list of tables",)),
         ('name = "a/b"\n' + BASE, ("name: is 'a/b'; it must be a text without '/'",)),
         ("a = ", ("not valid TOML",)),
-        ("", ("cells: design: is missing; controller: is missing",)),
+        ("", ("is empty; write it anew",)),
+        ("# nothing\n", ("cells: design: is missing; controller: is missing",)),
     ],
 )
 def test_what_makes_no_sense_is_told_in_one_line(

@@ -229,11 +229,11 @@ def test_a_design_inside_an_experiment_is_as_strict(
 @pytest.mark.parametrize(
     ("arguments", "status", "words"),
     [
-        ((), 2, "run what? jump, bang-bang, position-jump, path/to/mine.py:Class, an experiment"),
+        ((), 2, "run what? jump, bang-bang, position-jump, chirp, path/to/mine.py:Class"),
         (
             ("walk",),
             2,
-            "no controller 'walk'; there are jump, bang-bang, position-jump, or a class",
+            "no controller 'walk'; there are jump, bang-bang, position-jump, chirp, or a class",
         ),
         (("jump", "--plant", "horse"), 2, "no plant 'horse'; there are sim, analytic, can"),
         (("nowhere.toml",), 1, "nowhere.toml: no such experiment file"),

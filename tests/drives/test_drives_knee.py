@@ -134,7 +134,7 @@ def test_the_knee_is_the_designs_unless_the_file_is_tighter(tmp_path: Path) -> N
     design = experiment(JumpConfig()).design
     motors, links = knee_ranges(design)
     path = tmp_path / "limits.toml"
-    path.write_text("")
+    path.write_text("# no limit\n")
     limits = limits_for(path, design)
     assert (limits.motor_knee_range, limits.joint_knee_range) == (motors, links)
     assert motors == pytest.approx((0.2, 3.0))

@@ -170,8 +170,8 @@ def test_who_can_run_on_what() -> None:
     assert needs_of(PositionJumpConfig()) == {"motor_pos"}
     assert needs_of(Guest()) == set(MEASURED)
     assert needs_of(Modest()) == {"joint_pos"}
-    assert run_on(MEASURED) == ("jump", "bang-bang", "position-jump")
-    assert run_on(["motor_pos"]) == ("position-jump",)
+    assert run_on(MEASURED) == ("jump", "bang-bang", "position-jump", "chirp")
+    assert run_on(["motor_pos"]) == ("position-jump", "chirp")
     assert run_on(["joint_pos", "spring_torque"]) == ()
 
 
@@ -181,7 +181,7 @@ def test_controllers_that_read_the_springs_are_refused_without(
 ) -> None:
     words = (
         f"controller {controller.kind} needs spring_torque, which drive 'motor1' does not tell: "
-        "its one encoder is at the motor, and no torque_object .*position-jump can run"
+        "its one encoder is at the motor, and no torque_object .*position-jump, chirp can run"
     )
     with pytest.raises(ConfigError, match=words):
         ran(tmp_path, bus_text("motor", waived=True), controller)

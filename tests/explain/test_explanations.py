@@ -222,7 +222,7 @@ def test_the_command_writes_numbers_experiment_and_figures(
     ("flags", "words"),
     [
         (["--causes", "fricton"], "no cause 'fricton'; did you mean friction?"),
-        (["--against", "nowhere.csv"], "nowhere.csv: no published numbers can be read"),
+        (["--against", "nowhere.csv"], "nowhere.csv: no such file of published numbers"),
         (["--design", "nowhere.toml"], "nowhere.toml"),
     ],
 )
