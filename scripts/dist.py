@@ -95,7 +95,7 @@ def faults(python: Path, folder: Path) -> Iterator[str]:
     names = legbench(python, folder, ["-c", listing]).stdout.split()
     helps = [Job(words=(name, "--help"), prints="usage") for name in names]
     for job in (Job(words=("--help",), prints="usage"), *helps, *JOBS):
-        runs = sorted(folder.glob("runs/*"))
+        runs = sorted(folder.glob("runs/*_*"))
         eds = str(ROOT / "hardware" / "legbench-drive.eds")
         words = [word.format(run=runs[0] if runs else "", eds=eds) for word in job.words]
         done = legbench(python, folder, ["-W", "error", "-m", "legbench", *words])

@@ -4,7 +4,7 @@ import math
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import Positional, UseAppendAction
 
@@ -12,8 +12,10 @@ from legbench.cli.output import note, print_json, results_in
 from legbench.cli.parse import parse
 from legbench.design import load_design
 from legbench.errors import ConfigError
-from legbench.identify import Outcome, Question
 from legbench.recording.reader import Recording
+
+if TYPE_CHECKING:
+    from legbench.identify import Outcome, Question
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,10 +62,10 @@ class IdentifyArguments:
 
 def main(arguments: list[str]) -> int:
     """Run `legbench identify`."""
+    flags = parse(IdentifyArguments, "identify", arguments)
     from legbench.identify import parse_free, question_of, read_runs
     from legbench.identify.asking import check_same_leg
 
-    flags = parse(IdentifyArguments, "identify", arguments)
     free = parse_free([word for word in flags.free.split(",") if word], start=not flags.at_rest)
     noise = _noise(flags)
     runs = read_runs(flags.runs)
@@ -86,7 +88,7 @@ def main(arguments: list[str]) -> int:
         return _answer(flags, question, held_out)
 
 
-def _answer(flags: IdentifyArguments, question: Question, held_out: list[Recording]) -> int:
+def _answer(flags: IdentifyArguments, question: "Question", held_out: list[Recording]) -> int:
     """Identify, print and write what was asked for; returns the exit status."""
     from legbench.identify import UnidentifiableError, identify
     from legbench.identify.words import content_of, lines_of
@@ -125,7 +127,7 @@ def _noise(flags: IdentifyArguments) -> float | None:
     return math.radians(flags.noise_deg)
 
 
-def _check(flags: IdentifyArguments, question: Question) -> None:
+def _check(flags: IdentifyArguments, question: "Question") -> None:
     """Refuse what would only be found after the fit."""
     if flags.sharpen is not None and flags.plan is None:
         raise ConfigError("--sharpen says what a plan is for; give --plan, the file to write")
@@ -141,8 +143,8 @@ def _check(flags: IdentifyArguments, question: Question) -> None:
 
 def _hops(
     held_out: list[Recording],
-    question: Question,
-    outcome: Outcome,
+    question: "Question",
+    outcome: "Outcome",
     lines: list[str],
     content: dict[str, Any],
 ) -> bool:
@@ -169,8 +171,8 @@ def _hops(
 
 def _extras(
     flags: IdentifyArguments,
-    question: Question,
-    outcome: Outcome,
+    question: "Question",
+    outcome: "Outcome",
     lines: list[str],
     content: dict[str, Any],
 ) -> None:
@@ -201,8 +203,8 @@ def _extras(
 def _plan(
     path: Path,
     flags: IdentifyArguments,
-    question: Question,
-    outcome: Outcome | None,
+    question: "Question",
+    outcome: "Outcome | None",
     lines: list[str],
     content: dict[str, Any],
 ) -> None:
