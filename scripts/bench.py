@@ -399,6 +399,9 @@ BENCHES = {
 def main() -> int:
     """Measure and print; 1 if a target was missed."""
     missed = 0
+    if unknown := set(sys.argv[1:]) - BENCHES.keys():
+        print(f"no benchmark {', '.join(sorted(unknown))}; there are {', '.join(BENCHES)}")
+        return 2
     for name in sys.argv[1:] or BENCHES:
         result = BENCHES[name]()
         met = result.value <= result.bound

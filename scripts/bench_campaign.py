@@ -235,6 +235,9 @@ def main() -> int:
     """Measure and print; 1 if a target was missed."""
     missed = 0
     words = sys.argv[1:] or [name for name in BENCHES if name != "paper"]
+    if unknown := {word for word in words if not word.isdigit()} - BENCHES.keys():
+        print(f"no benchmark {', '.join(sorted(unknown))}; there are {', '.join(BENCHES)}")
+        return 2
     numbers = [int(word) for word in words if word.isdigit()]
     for name in (word for word in words if not word.isdigit()):
         bench = BENCHES[name]

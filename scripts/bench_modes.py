@@ -36,7 +36,7 @@ from legbench.analytic.taylor import MAP_TOLERANCE, TaylorLeg
 from legbench.control import JumpConfig
 from legbench.design import load_design
 from legbench.design.statics import Support, motor_holding
-from legbench.modes.basin import Axis, Question, map_basin
+from legbench.modes.basin import GridAxis, Question, map_basin
 from legbench.modes.drive import JumpLaw
 from legbench.modes.fixed_point import fixed_point
 from legbench.modes.hop import Apex, return_map, settle
@@ -226,8 +226,8 @@ def basin(points: int) -> float:
         motor=(0.0, 0.0),
         undamped=False,
         centre=centre,
-        across=Axis(name="z1", low=-0.3, high=0.3, count=points),
-        up=Axis(name="height", low=height - 0.08, high=height + 0.08, count=points),
+        across=GridAxis(name="z1", low=-0.3, high=0.3, count=points),
+        up=GridAxis(name="height", low=height - 0.08, high=height + 0.08, count=points),
     )
     with tempfile.TemporaryDirectory() as folder:
         began = time.perf_counter()

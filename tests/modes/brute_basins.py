@@ -11,7 +11,7 @@ from legbench.analytic.taylor import TaylorLeg
 from legbench.control import JumpConfig
 from legbench.design import LegDesign
 from legbench.errors import ConfigError
-from legbench.modes.basin import Axis, Fate, Question, fate_of
+from legbench.modes.basin import Fate, GridAxis, Question, fate_of
 from legbench.modes.drive import JumpLaw
 from legbench.modes.fixed_point import UNITS, fixed_point
 from legbench.modes.hop import NAMES, Apex, settle
@@ -34,7 +34,9 @@ def random_question(design: LegDesign, seed: int, points: int) -> Question:
     for place in (first, second):
         span = float(random.uniform(1.0, 6.0)) * float(UNITS[place])
         middle = float(centre.vector()[place] + random.uniform(-0.5, 0.5) * span)
-        axes.append(Axis(name=NAMES[place], low=middle - span, high=middle + span, count=points))
+        axes.append(
+            GridAxis(name=NAMES[place], low=middle - span, high=middle + span, count=points)
+        )
     return Question(
         design=design,
         jump=config,

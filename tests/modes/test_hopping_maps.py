@@ -23,7 +23,7 @@ from legbench.plant.start import Start
 pytest.importorskip("heyoka")
 
 from legbench.analytic.taylor import TaylorLeg
-from legbench.modes.basin import Axis, Fate, Question, map_basin
+from legbench.modes.basin import Fate, GridAxis, Question, map_basin
 from legbench.modes.drive import JumpLaw, Passive
 from legbench.modes.fixed_point import UNITS, FixedPoint, derivative, differences, fixed_point
 from legbench.modes.hop import Apex, Ending, apex_of, return_map, settle
@@ -243,8 +243,8 @@ def question(point: FixedPoint, count: int = 5) -> Question:
         motor=(0.0, 0.0),
         undamped=False,
         centre=point.apex,
-        across=Axis(name="z1", low=-0.2, high=0.2, count=count),
-        up=Axis(name="height", low=height - 0.08, high=height + 0.05, count=count),
+        across=GridAxis(name="z1", low=-0.2, high=0.2, count=count),
+        up=GridAxis(name="height", low=height - 0.08, high=height + 0.05, count=count),
     )
 
 
@@ -274,6 +274,6 @@ def test_two_processes_map_what_one_does(point: FixedPoint, tmp_path: Path) -> N
 
 def test_bad_axes_are_named() -> None:
     with pytest.raises(ConfigError, match="axis 'width' is unknown; an apex has height, speed"):
-        Axis(name="width", low=0.0, high=1.0, count=3)
+        GridAxis(name="width", low=0.0, high=1.0, count=3)
     with pytest.raises(ConfigError, match="runs from 1 to 0 in 3 points"):
-        Axis(name="z1", low=1.0, high=0.0, count=3)
+        GridAxis(name="z1", low=1.0, high=0.0, count=3)

@@ -4,7 +4,7 @@ import math
 from typing import TYPE_CHECKING
 
 from legbench.errors import ConfigError
-from legbench.modes.basin import Axis
+from legbench.modes.basin import GridAxis
 from legbench.modes.cycles import LONGEST
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ def check(flags: "HopArguments") -> None:
     if flags.height is not None and not 0.0 < flags.height < math.inf:
         raise ConfigError(f"height is {flags.height:g} m; an apex lies above the ground")
     for name, span in ((flags.across, flags.across_span), (flags.up, flags.up_span)):
-        Axis(name=name, low=-span, high=span, count=max(flags.basin, 2))
+        GridAxis(name=name, low=-span, high=span, count=max(flags.basin, 2))
     if flags.across == flags.up:
         raise ConfigError(f"both axes are {flags.up}; a map needs two different ones")
     if flags.period is not None and not 1 <= flags.period <= LONGEST:

@@ -19,7 +19,7 @@ from legbench.cli.hop_tables import (
 from legbench.cli.output import note, timed_progress
 from legbench.design import LegDesign
 from legbench.errors import ConfigError
-from legbench.modes.basin import Axis, Fate, Question, map_basin
+from legbench.modes.basin import Fate, GridAxis, Question, map_basin
 from legbench.modes.cycles import LONGEST, Cycle, end_of, find_cycle, repeats
 from legbench.modes.drive import JumpLaw
 from legbench.modes.hop import Apex, Ending, return_map, settle
@@ -169,9 +169,9 @@ def _plot_family(out: Path, design: LegDesign, family: HopFamily) -> None:
 def _basin(flags: "HopArguments", design: LegDesign, cycle: Cycle, out: Path) -> Ints:
     from legbench.viz.print.hops import plot_basin
 
-    def axis(name: str, span: float) -> Axis:
+    def axis(name: str, span: float) -> GridAxis:
         middle = getattr(cycle.apexes[0], name, 0.0)
-        return Axis(name=name, low=middle - span, high=middle + span, count=flags.basin)
+        return GridAxis(name=name, low=middle - span, high=middle + span, count=flags.basin)
 
     question = Question(
         design=design,

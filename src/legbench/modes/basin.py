@@ -53,8 +53,8 @@ ENDINGS = {Ending.STANDS: Fate.STANDS, Ending.FELL: Fate.FELL, Ending.FAULT: Fat
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Axis:
-    """Axis of the grid: a coordinate of the apex and its range.
+class GridAxis:
+    """GridAxis of the grid: a coordinate of the apex and its range.
 
     Raises:
         ConfigError: an unknown number of the apex, or an empty range.
@@ -96,8 +96,8 @@ class Question:
     undamped: bool
     centre: Apex
     """The periodic hop; starts differ from it along the axes only."""
-    across: Axis
-    up: Axis
+    across: GridAxis
+    up: GridAxis
     hops: int = 25
     """Number of hops after which a start counts as `Fate.WANDERS`."""
     tolerance: float = MAP_TOLERANCE
