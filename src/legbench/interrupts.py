@@ -153,17 +153,20 @@ def shielded() -> Shield:
 def children_without_interrupts() -> Iterator[None]:
     """Start processes in this block that ^C does not reach from their first instruction on.
 
-    A new process inherits which signals are blocked; here a ^C waits until the block has ended.
+    A new process inherits which signals are blocked. The system gives a ^C to a thread that does
+    not block it, and Python would raise it here all the same, in the middle of what a new process
+    is being told: it waits until the block has ended.
     """
     mask = getattr(signal, "pthread_sigmask", None)
-    if mask is None:  # Windows: the processes themselves ignore ^C, an instant later
-        yield
-        return
-    before = mask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        mask(signal.SIG_SETMASK, before)
+    with shielded():
+        if mask is None:  # Windows: the processes themselves ignore ^C, an instant later
+            yield
+            return
+        before = mask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            yield
+        finally:
+            mask(signal.SIG_SETMASK, before)
 
 
 def ignore_interrupts() -> None:
