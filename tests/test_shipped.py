@@ -6,6 +6,7 @@ import pytest
 
 from legbench import Experiment, JumpConfig, load_design
 from legbench.cli import main
+from legbench.cli.run_chosen import chosen_by
 from legbench.drives.setup.bus_file import load_bus
 from legbench.errors import ConfigError, DesignError
 from legbench.experiment.files import load_experiment
@@ -65,3 +66,11 @@ def test_limits_beside_a_bus_file_of_one_s_own_are_not_the_package_s(
     words = ["run", "jump", "--plant", "can", "--interface", "legbench", "--bus", str(own)]
     assert main(words) == 1
     assert "limits.toml: no such file" in capsys.readouterr().err
+
+
+def test_a_design_by_name_replaces_that_of_a_file_in_another_folder(tmp_path: Path) -> None:
+    path = tmp_path / "own" / "hop.toml"
+    path.parent.mkdir()
+    path.write_text("design = 'prototype'\n[controller]\nkind = 'jump'\n")
+    chosen = chosen_by([str(path), "--design", "optimal"])
+    assert chosen.experiment.design == load_design("optimal")

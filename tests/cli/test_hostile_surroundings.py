@@ -111,3 +111,10 @@ def test_a_handler_of_somebody_else_is_kept() -> None:
         assert mujoco.get_mju_user_warning() == handler
     finally:
         mujoco.set_mju_user_warning(before)
+
+
+def test_a_model_on_a_boom_that_is_too_short_is_refused(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    told = refused(capsys, "model", "--setup", "ffs", "--boom-radius", "0.01")
+    assert "shorter than the stretched leg, 0.266 m" in told

@@ -25,6 +25,7 @@ from legbench.guests import Registry
 from legbench.imperfections import Imperfections
 from legbench.plants import PLANTS
 from legbench.servo import ServoConfig
+from legbench.shipped import locate
 
 SCANNED = {"--setup": "setup.kind", "--linkage": "linkage.kind", "--plant": "plant.kind"}
 """Flags that choose a kind: they decide which other flags there are."""
@@ -80,8 +81,8 @@ class Tables:
         self.content = overlaid(self.content, key, value, self.folder)
 
     def here(self, path: Path) -> str:
-        """Path of the command line, which is relative to the present folder."""
-        return str(path) if self.folder == Path() else str(path.absolute())
+        """Path of the command line, which is relative to the present folder, or a shipped file."""
+        return str(path) if self.folder == Path() else str(locate(path).absolute())
 
     def here_guest(self, name: str) -> str:
         """Name of a kind on the command line; that of a file is relative to the present folder."""

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from legbench.choices import choose
+from legbench.design.leg import LegDesign
 from legbench.design.statics import Support
 from legbench.errors import ConfigError
 
@@ -51,6 +52,20 @@ class Setup:
         if not 0.0 < self.boom_radius < math.inf:
             raise ConfigError(
                 f"boom_radius is {self.boom_radius:g} m; it must be positive and finite"
+            )
+
+    def check_boom(self, design: LegDesign) -> None:
+        """Refuse a boom that a leg is too long for.
+
+        Raises:
+            ConfigError: the boom is shorter than the stretched leg.
+        """
+        reach = sum(design.lengths)
+        if self.boom_radius is not None and self.boom_radius < reach:
+            raise ConfigError(
+                f"setup.boom_radius is {self.boom_radius:g} m; a boom that is shorter than the "
+                f"stretched leg, {reach:.3g} m, cannot carry its trunk; take a longer one, or none "
+                "for a plane"
             )
 
     @property

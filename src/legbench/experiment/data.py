@@ -25,6 +25,12 @@ LONGEST: Final = 604_800.0
 """Longest run [s]: a week."""
 
 
+def check_seed(seed: int) -> None:
+    """Refuse what cannot be written as the source of randomness; raises ConfigError."""
+    if not 0 <= seed <= LARGEST_SEED:
+        raise ConfigError(f"seed is {seed}; it must be 0 to {LARGEST_SEED}")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Conventions:
     """How the paper's formulas are read."""
@@ -83,15 +89,9 @@ class Experiment:
                 f"duration is {self.duration:g} s; it must be at least one cycle of {PERIOD:g} s, "
                 f"and finite: at most {LONGEST:.0f} s, a week"
             )
-        if not 0 <= self.seed <= LARGEST_SEED:
-            raise ConfigError(f"seed is {self.seed}; it must be 0 to {LARGEST_SEED}")
+        check_seed(self.seed)
         built = self.imperfections.leg_of(self.design)
-        boom, reach = self.setup.boom_radius, sum(built.lengths)
-        if boom is not None and boom < reach:
-            raise ConfigError(
-                f"setup.boom_radius is {boom:g} m; a boom that is shorter than the stretched leg, "
-                f"{reach:.3g} m, cannot carry its trunk; take a longer one, or none for a plane"
-            )
+        self.setup.check_boom(built)
         self.options.built(self.imperfections)
         CONTROLLERS.check(type(self.controller))
         PLANTS.check(type(self.plant))

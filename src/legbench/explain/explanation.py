@@ -4,9 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from legbench.design import LegDesign
-from legbench.errors import ConfigError
 from legbench.experiment import Experiment
-from legbench.experiment.data import LARGEST_SEED
+from legbench.experiment.data import check_seed
 from legbench.explain.apart import Proposal, count_proposals, propose
 from legbench.explain.causes import Cause
 from legbench.explain.consistency import Check, checks_of, count_predictions, predict
@@ -117,8 +116,7 @@ class Scope:
     """Seed of the screening."""
 
     def __post_init__(self) -> None:
-        if not 0 <= self.seed <= LARGEST_SEED:
-            raise ConfigError(f"seed is {self.seed}; it must be 0 to {LARGEST_SEED}")
+        check_seed(self.seed)
 
 
 def explain(

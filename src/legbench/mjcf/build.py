@@ -29,8 +29,8 @@ def build_spec(design: LegDesign, options: BuildOptions) -> mujoco.MjSpec:
     `motor_1`, `motor_2` take motor positions [rad] and act through the series springs.
 
     Raises:
-        ConfigError: the bars outweigh the trunk, no step or bar suits the leg, or MuJoCo refuses a
-            mass or an inertia.
+        ConfigError: the bars outweigh the trunk, no step, bar or boom suits the leg, or MuJoCo
+            refuses a mass or an inertia.
     """
     spec = _assembled(design, options, dry=any(options.friction), seen=True)
     model = _compiled(spec, design)
@@ -59,6 +59,7 @@ def bare_model(
 
 def _assembled(design: LegDesign, options: BuildOptions, *, dry: bool, seen: bool) -> mujoco.MjSpec:
     setup, numerics = options.setup, options.numerics.fitted([design], options.linkage)
+    setup.check_boom(design)
     spec = mujoco.MjSpec()
     spec.modelname = f"{design.name}_{setup.kind}_{options.linkage.kind}"
     spec.compiler.degree = False

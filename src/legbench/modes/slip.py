@@ -7,6 +7,7 @@ from legbench.analytic.contact import switch
 from legbench.analytic.model import LegModel
 from legbench.analytic.state import LegState, Regime
 from legbench.analytic.taylor import Levels, TaylorLeg, Watched
+from legbench.design.statics import GRAVITY
 from legbench.errors import ConfigError
 from legbench.modes.drive import Passive
 from legbench.modes.hop import CALLS, HORIZON, Apex, return_map
@@ -26,7 +27,7 @@ class Slip:
     """Stiffness of the spring [N/m]."""
     length: float
     """Length of the relaxed spring [m]."""
-    gravity: float = 9.81
+    gravity: float = GRAVITY
     """Acceleration of gravity [m/s^2]."""
 
     def __post_init__(self) -> None:

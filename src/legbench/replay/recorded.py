@@ -10,7 +10,7 @@ from legbench.control.abstract import AbstractController
 from legbench.design import LegDesign
 from legbench.design.setup import Setup
 from legbench.errors import ConfigError
-from legbench.experiment.data import LARGEST_SEED, Conventions
+from legbench.experiment.data import Conventions, check_seed
 from legbench.experiment.format_1 import upgraded
 from legbench.experiment.overrides import overlaid
 from legbench.experiment.reading import REGISTRY, placed
@@ -50,8 +50,7 @@ class RecordedLeg:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if not 0 <= self.seed <= LARGEST_SEED:
-            raise ConfigError(f"seed is {self.seed}; it must be 0 to {LARGEST_SEED}")
+        check_seed(self.seed)
         self.imperfections.leg_of(self.design)
         self.options.built(self.imperfections)
 

@@ -7,29 +7,10 @@ import numpy as np
 
 from legbench.metrics.source import Recorded
 from legbench.metrics.summary import summarise
+from legbench.metrics.units import UNITS
 
-UNITS: Final = {
-    "duration": "s",
-    "trunk_excursion": "m",
-    "foot_clearance": "m",
-    "drift": "m",
-    "foot_travel": "m",
-    "hop_freq": "Hz",
-    "flight_time": "s",
-    "stance_time": "s",
-    "polar_max": "rad",
-    "apex_change": "m",
-    "loop_gap_max": "m",
-    "energy_residual": "1",
-    "motor_work": "J",
-    "damper_loss": "J",
-    "impact_loss": "J",
-    "stop_loss": "J",
-    "contact_loss": "J",
-    "other_loss": "J",
-    "real_time_factor": "1",
-}
-"""Figure of a summary -> its unit."""
+RATIOS: Final = ("energy_residual", "real_time_factor", "jumps", "limited_cycles")
+"""Figures of a summary that are ratios or counts."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,14 +34,14 @@ def kpis(run: Recorded) -> dict[str, Kpi]:
     """
     found: dict[str, Kpi] = {}
     for name, value in asdict(summarise(run)).items():
-        if name in ("jumps", "limited_cycles"):
+        if name in RATIOS:
             found[name] = Kpi(value=float(value), unit="1")
-        elif name in UNITS:
-            found[name] = Kpi(value=value, unit=UNITS[name])
         elif name.startswith("rating_") and isinstance(value, list):
             found |= _listed(name, value, "1")
         elif name == "periods":
-            found |= _listed("period", value, "s")
+            found |= _listed("period", value, UNITS[name])
+        elif name in UNITS and not isinstance(value, list):
+            found[name] = Kpi(value=value, unit=UNITS[name])
     return found
 
 

@@ -5,32 +5,13 @@ from difflib import get_close_matches
 from typing import Any, Final
 
 from legbench.errors import ConfigError
+from legbench.metrics.units import UNITS as FIGURES
 
 USUAL: Final = ("run", "setup", "controller", "z2", "dz2", "status", "duration", "rating", "jumps")
 """Columns that are shown unless others are asked for."""
 
-UNITS: Final = {
-    "duration": "s",
+UNITS: Final = FIGURES | {
     "planned_duration": "s",
-    "trunk_excursion": "m",
-    "foot_clearance": "m",
-    "drift": "m",
-    "foot_travel": "m",
-    "foot_travel_in_hip": "m",
-    "hop_freq": "Hz",
-    "flight_time": "s",
-    "stance_time": "s",
-    "apex_change": "m",
-    "polar_max": "rad",
-    "loop_gap_max": "m",
-    "limited_max": "rad",
-    "periods": "s",
-    "motor_work": "J",
-    "damper_loss": "J",
-    "impact_loss": "J",
-    "stop_loss": "J",
-    "contact_loss": "J",
-    "other_loss": "J",
     "controller.settings.z2": "rad",
     "controller.settings.dz2": "rad",
 }

@@ -5,6 +5,7 @@ from typing import Final
 
 import numpy as np
 
+from legbench.design.statics import GRAVITY
 from legbench.signals import Bools, Floats
 
 SHARE: Final = 99.0
@@ -13,8 +14,6 @@ ROOM: Final = 1.3
 """Length of the axis over that force [-]."""
 LIVE_WEIGHTS: Final = 5.0
 """Largest force shown while a run goes on, whose stances are yet to come, over the weight [-]."""
-GRAVITY: Final = 9.81
-"""Acceleration of gravity that makes a mass a weight [m/s^2]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

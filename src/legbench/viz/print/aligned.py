@@ -1,5 +1,6 @@
 """Print figure of runs laid over each other at an event: motion over time, phase plane, ratings."""
 
+import math
 from collections.abc import Sequence
 from typing import Any, Final
 
@@ -61,6 +62,8 @@ def aligned_figure(runs: Sequence[Analysis], found: SideBySide, span: float) -> 
             panel.margins(x=0.0)
         ratings.set_yscale("log")
         ratings.locator_params(axis="x", integer=True)
+        if math.isfinite(last := ratings.dataLim.x1):
+            ratings.set_xlim(0.5, last + 0.5)
         marks, labels = ratings.get_legend_handles_labels()
         kinds = dict(zip(labels, marks, strict=True))  # One mark for each kind.
         if kinds:
