@@ -192,9 +192,12 @@ def _alone(
     else:
         plant = AnalyticPlant(bench.design, chosen.setup, start, servo)
     controller = make_controller(chosen.controller, targets_of(chosen))
-    part, drive = (Part.JAMMED, 0) if death is None else (death.part, death.drive)
-    broken = BrokenPlant(plant, np.asarray(bench.design.stiffness), part, drive)
-    limited = LimitedPlant(broken, bench.limits, delay_cycles=servo.delay_cycles)
+    delay = servo.delay_cycles
+    if death is None:
+        limited = LimitedPlant(plant, bench.limits, delay_cycles=delay)
+        return _Stage(limited, controller, lambda: None, lambda: 0.0)
+    broken = BrokenPlant(plant, np.asarray(bench.design.stiffness), death.part, death.drive)
+    limited = LimitedPlant(broken, bench.limits, delay_cycles=delay)
     return _Stage(limited, controller, broken.break_part, lambda: broken.contradiction)
 
 
