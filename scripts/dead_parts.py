@@ -14,15 +14,8 @@ from multiprocessing import get_context
 from pathlib import Path
 
 from legbench.commissioning.broken_plant import Part
-from legbench.commissioning.dead_parts import (
-    BOUND,
-    DRIFT_BOUND,
-    Bench,
-    Death,
-    Emulation,
-    TrialOutcome,
-    try_dead_part,
-)
+from legbench.commissioning.dead_part_stage import Bench, Death, Emulation
+from legbench.commissioning.dead_parts import BOUND, DRIFT_BOUND, TrialOutcome, try_dead_part
 from legbench.design import load_design
 from legbench.servo import ServoConfig
 

@@ -23,7 +23,8 @@ from itertools import product
 from pathlib import Path
 from typing import NamedTuple
 
-from legbench.commissioning.dead_parts import CONTROLLERS, Bench, Emulation, watch_healthy
+from legbench.commissioning.dead_part_stage import CONTROLLERS, Bench, Emulation
+from legbench.commissioning.dead_parts import watch_healthy
 from legbench.design import load_design
 from legbench.servo import ServoConfig
 

@@ -24,6 +24,9 @@ SWAY_MEMORY = 5.0
 """Time constant in which a sway is forgotten: a dozen hops, each of which may swing it on [s]."""
 SWAY_GROWTH = 1.5
 """A leg that sways may sway so much more, relative to what it did [-]."""
+HIDDEN = 0.1
+"""Bound of a sway from which on a drift may hide in it [rad]: a leg with this bound sways by 0.03
+rad, and 1 rad/s takes 0.13 s to both together."""
 POLAR_GAIN = 10.0
 """What a command along the polar mode may cause there, relative to it, in resonance [-]."""
 
@@ -136,6 +139,11 @@ class LinkWatch:
     def start(self) -> None:
         """Begin anew with whatever is shown next."""
         self._restart()
+
+    @property
+    def hides_drift(self) -> bool:
+        """Whether the leg may sway so far that a drift of an encoder would be found too late."""
+        return self._bounds.sway + self._widening > HIDDEN
 
     def see(
         self,
