@@ -6,7 +6,8 @@ from typing import final
 
 from legbench.errors import PlantFault
 from legbench.limits.knee import knee_of, project
-from legbench.limits.momentum import LegMomentum, MomentumWatch, Reading
+from legbench.limits.momentum import LegMomentum, Reading
+from legbench.limits.momentum_watch import MomentumWatch
 from legbench.limits.plausibility import Doubt, LinkWatch, MotorWatch
 from legbench.limits.safety import START_TOLERANCE, UNLIMITED, SafetyLimits
 from legbench.limits.shortfall import Shortfall
@@ -284,4 +285,5 @@ class Guard:
             return None
         motor_1, motor_2 = motor_pos
         joint_1, joint_2 = joint_pos
-        return watch.see(Reading(interval, (motor_1, motor_2), (joint_1, joint_2)))
+        reading = Reading(interval, (motor_1, motor_2), (joint_1, joint_2))
+        return watch.see(reading, stands=self._links.stands)

@@ -1,4 +1,4 @@
-"""Whether link encoders agree with the springs: balance of the leg's angular momentum; pure.
+"""Balance of a leg's angular momentum, which tells what its springs do not explain; pure.
 
 A leg that sways by 0.2 rad from hop to hop hides an encoder that drifts by as much. But however it
 sways, the angular momentum of its links about a point changes by the torques of springs, damping
@@ -8,23 +8,14 @@ times that angle, and this torque is then unexplained about each of these points
 """
 
 import math
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, final
+from typing import NamedTuple
 
 from legbench.limits.knee import Range
-from legbench.limits.plausibility import Doubt
 
 AVERAGE_TIME = 0.006
 """Shortest time of each of the three moving averages [s]; coarse encoders need a longer one."""
-CONTACT_TIME = 0.02
-"""Time in which a touchdown or a lift-off is over; the foot of the paper's leg may bounce [s]."""
-RUBBER = 0.01
-"""Distance from a stop of rubber at which it may push already [rad]."""
-WEIGHT_SHARE = 0.2
-"""Torque on the knee that rules a support out, relative to what the weight can do there [-]: in the
-middle of a stance the springs carry twice the weight, in flight they carry nothing."""
 
 Pair = tuple[float, float]
 
@@ -39,6 +30,21 @@ class Support:
     """Coupling of the two inertias at q1 = q2 [kg m^2]."""
     moment: Pair
     """Moments of gravity about q1 and q2 at sin(q) = 1 [N m]."""
+
+    def average_cycles(self, link_step: float, torque: float, period: float) -> int:
+        """Return over how many cycles to average, so that rounding leaves less than a torque.
+
+        Second differences of readings that are rounded to steps `s`, averaged three times over n
+        cycles T, scatter by `sqrt(12 / n^5) (s / sqrt(12)) / T^2` on two joints.
+
+        Args:
+            link_step: smallest step that the encoders can show [rad].
+            torque: standard deviation that rounding may leave [N m].
+            period: of the cycles [s].
+        """
+        heaviest = max(self.inertia) + abs(self.coupling)
+        needed = (heaviest * link_step / (torque * period**2)) ** 0.4
+        return max(2, round(AVERAGE_TIME / period), math.ceil(needed))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,20 +63,6 @@ class LegMomentum:
     """Range of q2 - q1 between its stops [rad]."""
     link_step: float = 0.0
     """Smallest step that the link encoders can show [rad]."""
-
-    def average_cycles(self, torque: float, period: float) -> int:
-        """Return over how many cycles to average, so that rounding leaves less than a torque.
-
-        Second differences of readings that are rounded to steps `s`, averaged three times over n
-        cycles T, scatter by `sqrt(12 / n^5) (s / sqrt(12)) / T^2` on two joints.
-
-        Args:
-            torque: standard deviation that rounding may leave [N m].
-            period: of the cycles [s].
-        """
-        heaviest = max(max(one.inertia) + abs(one.coupling) for one in self.supports)
-        needed = (heaviest * self.link_step / (torque * period**2)) ** 0.4
-        return max(2, round(AVERAGE_TIME / period), math.ceil(needed))
 
 
 class Reading(NamedTuple):
@@ -122,106 +114,3 @@ def unexplained(leg: LegMomentum, support: Support, readings: Sequence[Reading])
         polar=(gain_1 + gain_2) / interval - torque_1 - torque_2,
         knee=(part_2 - part_1) / interval - torque_2 + torque_1 - whirl,
     )
-
-
-@final
-class _Average:
-    """Three moving averages over so many cycles, one after the other."""
-
-    def __init__(self, cycles: int) -> None:
-        self._stages = [deque([0.0] * cycles, maxlen=cycles) for _ in range(3)]
-        self._sums = [0.0, 0.0, 0.0]
-        self._share = 1.0 / cycles
-
-    def after(self, value: float) -> float:
-        """Take one more value; return the average."""
-        for place, stage in enumerate(self._stages):
-            self._sums[place] += value - stage[0]
-            stage.append(value)
-            value = self._share * self._sums[place]
-        return value
-
-
-@final
-class MomentumWatch:
-    """Looks for torque that no support of the leg explains.
-
-    While the averages reach from the ground into the air, no support explains all of it. So the
-    torque must last for longer than their reach and a touchdown together.
-
-    Attributes:
-        residual: smallest torque along q1 + q2 that a support leaves unexplained, of those that the
-            knee does not rule out; infinite if it rules out all, none while averages fill [N m].
-    """
-
-    def __init__(self, leg: LegMomentum, link_error: float, period: float) -> None:
-        """Watch over a leg.
-
-        Args:
-            leg: what its momentum obeys.
-            link_error: angle by which a link encoder may be wrong [rad].
-            period: of the cycles [s].
-        """
-        self._leg, self._link_error, self._period = leg, link_error, period
-        self._torque = link_error * min(leg.stiffness)
-        weight = max(sum(map(abs, support.moment)) for support in leg.supports)
-        # A leg that is always supported alike needs nothing to be ruled out.
-        self._knee_torque = WEIGHT_SHARE * weight if len(leg.supports) > 1 else math.inf
-        self._cycles = leg.average_cycles(self._torque, period)
-        self._reach = 3 * self._cycles
-        self._patience = self._reach + round(CONTACT_TIME / period)
-        self.restart()
-
-    def restart(self) -> None:
-        """Begin anew with whatever is shown next."""
-        self.residual: float | None = None
-        self._readings = deque[Reading](maxlen=3)
-        self._averages = [
-            (_Average(self._cycles), _Average(self._cycles)) for _ in self._leg.supports
-        ]
-        self._seen = self._age = self._pushed = 0
-
-    def see(self, reading: Reading) -> Doubt | None:
-        """Look at one more cycle, in which every drive has told something new."""
-        if not (self._regular(reading) and _inside(reading.joint[0], self._leg.hip_range)):
-            self.restart()
-            return None
-        self._readings.append(reading)
-        if len(self._readings) < 3:
-            return None
-        knee = reading.joint[1] - reading.joint[0]
-        free = _inside(knee, self._leg.knee_range)
-        self._pushed = max(0, self._pushed - 1) if free else self._reach + 2
-        residual = self._smallest()
-        self._seen += 1
-        if self._seen < self._reach:
-            return None
-        self.residual = residual
-        self._age = self._age + 1 if residual > self._torque else 0
-        if self._age <= self._patience:
-            return None
-        return Doubt(
-            "joint encoder",
-            "the springs' torques contradict the motion of the links, on the ground and in the air "
-            f"alike, by more than {self._torque:.3f} N m for {self._age} cycles; the limit is a "
-            f"link_error of {self._link_error:g} rad: look at the link encoders, at the springs' "
-            "stiffness, and whether the foot slides",
-        )
-
-    def _smallest(self) -> float:
-        """Smallest unexplained torque along q1 + q2 of the supports that are not ruled out."""
-        smallest = math.inf
-        for support, (polar, knee) in zip(self._leg.supports, self._averages, strict=True):
-            torque = unexplained(self._leg, support, self._readings)
-            on_polar, on_knee = abs(polar.after(torque.polar)), abs(knee.after(torque.knee))
-            if self._pushed or on_knee <= self._knee_torque:
-                smallest = min(smallest, on_polar)
-        return smallest
-
-    def _regular(self, reading: Reading) -> bool:
-        """Whether a reading came about a period after the one before."""
-        return 0.5 * self._period < reading.interval < 1.5 * self._period
-
-
-def _inside(angle: float, between: Range) -> bool:
-    return between[0] + RUBBER < angle < between[1] - RUBBER
