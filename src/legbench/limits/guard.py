@@ -70,7 +70,7 @@ class Guard:
             watch.start_at(value)
         self._links.start()
         if self._momentum is not None:
-            self._momentum.restart()
+            self._momentum.start()
         self.shortfall.restart()
 
     def restart_from_applied(self) -> None:

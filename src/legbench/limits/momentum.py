@@ -83,6 +83,8 @@ class Unexplained(NamedTuple):
     """On q1 and q2 together [N m]."""
     knee: float
     """On q2 less on q1; the push of a knee stop is part of it [N m]."""
+    wound: float
+    """Torque of spring 2 less that of spring 1 [N m]."""
 
 
 def unexplained(leg: LegMomentum, support: Support, readings: Sequence[Reading]) -> Unexplained:
@@ -102,8 +104,9 @@ def unexplained(leg: LegMomentum, support: Support, readings: Sequence[Reading])
     c_back = mixed * math.cos(0.5 * (p1 + q1 - p2 - q2))
     c_on = mixed * math.cos(0.5 * (q1 + n1 - q2 - n2))
     v1, v2 = 0.5 * (back_1 + on_1), 0.5 * (back_2 + on_2)
-    torque_1 = k1 * (at.motor[0] - q1) - d1 * v1 - m1 * math.sin(q1)
-    torque_2 = k2 * (at.motor[1] - q2) - d2 * v2 - m2 * math.sin(q2)
+    spring_1, spring_2 = k1 * (at.motor[0] - q1), k2 * (at.motor[1] - q2)
+    torque_1 = spring_1 - d1 * v1 - m1 * math.sin(q1)
+    torque_2 = spring_2 - d2 * v2 - m2 * math.sin(q2)
     whirl = 2.0 * mixed * math.sin(q1 - q2) * v1 * v2
     gain_1 = (i1 + c_on) * on_1 - (i1 + c_back) * back_1
     gain_2 = (i2 + c_on) * on_2 - (i2 + c_back) * back_2
@@ -113,4 +116,5 @@ def unexplained(leg: LegMomentum, support: Support, readings: Sequence[Reading])
     return Unexplained(
         polar=(gain_1 + gain_2) / interval - torque_1 - torque_2,
         knee=(part_2 - part_1) / interval - torque_2 + torque_1 - whirl,
+        wound=spring_2 - spring_1,
     )

@@ -16,6 +16,11 @@ RUBBER = 0.01
 STANDING_TIME = 0.005
 """Time that unexplained torque must last while a link stands and the other one swings [s]: a link
 that is thrown onto the ground, or off it, does not stand."""
+LEARNING_TIME = 1.0
+"""Time constant in which the mismatch of the springs is learned, and first time for it: two hops. A
+leg that has only begun to sway is still watched by its sway [s]."""
+MISMATCH = 0.06
+"""Largest share by which both springs may differ from the design, each to another side [-]."""
 WEIGHT_SHARE = 0.2
 """Torque on the knee that rules a support out, relative to what the weight can do there [-]: in the
 middle of a stance the springs carry twice the weight, in flight they carry nothing."""
@@ -55,14 +60,47 @@ class _SupportWatch:
 
     def restart(self) -> None:
         """Begin to average anew."""
-        self._polar, self._knee = _Average(self._cycles), _Average(self._cycles)
+        self._averages = [_Average(self._cycles) for _ in Unexplained._fields]
 
     def after(self, readings: Sequence[Reading]) -> Unexplained:
-        """Take three readings; return the average without its signs."""
+        """Take three readings; return the average."""
         torque = unexplained(self._leg, self._support, readings)
-        return Unexplained(
-            polar=abs(self._polar.after(torque.polar)), knee=abs(self._knee.after(torque.knee))
-        )
+        both = zip(self._averages, torque, strict=True)
+        return Unexplained(*[average.after(value) for average, value in both])
+
+
+@final
+class _Mismatch:
+    """Springs that are stiffer or softer than the design says, as far as they differ.
+
+    Torque that is unexplained in proportion to how far the springs are wound, for seconds, is
+    theirs; an encoder that dies leaves a torque of its own. Least squares that forget.
+
+    Attributes:
+        share: unexplained torque per torque by which the springs are wound [-].
+    """
+
+    def __init__(self, torque: float, period: float) -> None:
+        """Begin with springs as designed; those wound by less than a torque [N m] tell little."""
+        self._memory, self._least = round(LEARNING_TIME / period), torque * torque
+        self._seen, self._product, self._square = 0, 0.0, 0.0
+        self.share = 0.0
+
+    @property
+    def known(self) -> bool:
+        """Whether it has been learned for long enough."""
+        return self._seen >= self._memory
+
+    def learn(self, torque: Unexplained | None) -> None:
+        """Take what the likeliest support leaves unexplained; none if the knee rules out all."""
+        self._seen = min(self._seen + 1, self._memory)
+        if torque is None:
+            return
+        gain = 1.0 / self._seen
+        self._product += gain * (torque.polar * torque.wound - self._product)
+        self._square += gain * (torque.wound * torque.wound - self._square)
+        share = self._product / (self._square + self._least)
+        self.share = min(max(share, -MISMATCH), MISMATCH)
 
 
 @final
@@ -100,6 +138,11 @@ class MomentumWatch:
             for one in self._supports
         ]
         self._standing_patience = round(STANDING_TIME / period)
+        self.start()
+
+    def start(self) -> None:
+        """Begin anew with whatever is shown next, and forget the leg's springs."""
+        self._mismatch = _Mismatch(self._torque, self._period)
         self.restart()
 
     def restart(self) -> None:
@@ -126,7 +169,7 @@ class MomentumWatch:
             return None
         free = _inside(reading.joint[1] - reading.joint[0], self._leg.knee_range)
         self._pushed = max(0, self._pushed - 1) if free else self._reach + 2
-        left = [self._left(support) for support in self._supports]
+        left = self._left()
         self._seen += 1
         if self._seen < self._reach:
             return None
@@ -136,8 +179,24 @@ class MomentumWatch:
             self._age = 0
             each = zip(left, self._patiences, strict=True)
             self._patience = max(cycles for torque, cycles in each if torque <= self._torque)
-        if self._age <= (self._standing_patience if stands else self._patience):
-            return None
+        lasts = self._age > (self._standing_patience if stands else self._patience)
+        return self._doubt() if lasts and self._mismatch.known else None
+
+    def _left(self) -> list[float]:
+        """Torques along q1 + q2 that the supports leave; infinite where the knee rules one out."""
+        torques = [support.after(self._readings) for support in self._supports]
+        share, most = self._mismatch.share, math.inf if self._pushed else self._knee_torque
+        left = [
+            abs(torque.polar - share * torque.wound) if abs(torque.knee) <= most else math.inf
+            for torque in torques
+        ]
+        likeliest = min(left)
+        if self._seen >= self._reach:
+            explains = likeliest < math.inf
+            self._mismatch.learn(torques[left.index(likeliest)] if explains else None)
+        return left
+
+    def _doubt(self) -> Doubt:
         return Doubt(
             "joint encoder",
             "the springs' torques contradict the motion of the links, on the ground and in the air "
@@ -145,11 +204,6 @@ class MomentumWatch:
             f"link_error of {self._link_error:g} rad: look at the link encoders, at the springs' "
             "stiffness, and whether the foot slides",
         )
-
-    def _left(self, support: _SupportWatch) -> float:
-        """Torque along q1 + q2 that a support leaves; infinite if the knee rules it out [N m]."""
-        torque = support.after(self._readings)
-        return torque.polar if self._pushed or torque.knee <= self._knee_torque else math.inf
 
     def _regular(self, reading: Reading) -> bool:
         """Whether a reading came about a period after the one before."""
