@@ -82,7 +82,7 @@ class _Mismatch:
 
     def __init__(self, torque: float, period: float) -> None:
         """Begin with springs as designed; those wound by less than a torque [N m] tell little."""
-        self._memory, self._least = round(LEARNING_TIME / period), torque * torque
+        self._memory, self._torque = round(LEARNING_TIME / period), torque
         self._seen, self._product, self._square = 0, 0.0, 0.0
         self.share = 0.0
 
@@ -94,12 +94,12 @@ class _Mismatch:
     def learn(self, torque: Unexplained | None) -> None:
         """Take what the likeliest support leaves unexplained; none if the knee rules out all."""
         self._seen = min(self._seen + 1, self._memory)
-        if torque is None:
-            return
+        if torque is None or abs(torque.polar) > self._torque + MISMATCH * abs(torque.wound):
+            return  # That much is no spring's.
         gain = 1.0 / self._seen
         self._product += gain * (torque.polar * torque.wound - self._product)
         self._square += gain * (torque.wound * torque.wound - self._square)
-        share = self._product / (self._square + self._least)
+        share = self._product / (self._square + self._torque**2)
         self.share = min(max(share, -MISMATCH), MISMATCH)
 
 
