@@ -1,7 +1,7 @@
 """Let motors and encoders die in mid-run, and print how soon each death is found.
 
-Every part dies on both drives, in jump, bang-bang, and a jump that sways, at seeded moments. Exit status 1 if one is
-found too late, or not at all. Healthy legs that must be left alone: `scripts/false_alarms.py`.
+Every part dies on both drives, in jump, bang-bang, and a jump that sways, at seeded moments. Exit
+status 1 if one is found too late, or not at all. `scripts/false_alarms.py` tries healthy legs.
 """
 
 import argparse
@@ -28,11 +28,11 @@ BANDWIDTHS = (None, 30.0, 15.0)
 COUNTS = (4096, 1 << 20)
 """Of the encoders, in a turn."""
 LEAN = 0.08
-"""Angle of a leg that leans as it starts and then sways as others after minutes of hopping [rad]."""
+"""Angle by which a leg leans as it starts; it then sways as others do after minutes [rad]."""
 SWAYING_EARLIEST, SWAYING_LATEST = 1.1, 2.5
 """When a part of a leg that sways dies, while it still does and has done so for a second [s]."""
 SWAYING_COUNTS = (1 << 16, 1 << 20)
-"""Of its encoders: with 4 096 in a turn, which are rounded too coarsely, a drift may take 0.18 s."""
+"""Of its encoders; 4 096 in a turn are so coarse that a drift may take 0.2 s to be found."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
