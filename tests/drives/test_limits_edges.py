@@ -43,6 +43,7 @@ def test_a_limit_that_is_left_out_does_not_act_and_counts_have_their_numbers() -
         **dict.fromkeys(GIVEN, INF),
         "following_cycles": 5,
         "servo_bandwidth": 15.0,
+        "link_error": None,
         "temperature": INF,
         "overrun_cycles": 3,
         "lost_frames": 3,
@@ -57,7 +58,7 @@ def test_real_drives_are_led_with_all_seven_limits_and_not_without_any(name: str
     assert told == (f"limits leave out {name}; real drives are not led without: give each a value")
 
 
-@pytest.mark.parametrize("name", [*GIVEN, "temperature", "servo_bandwidth"])
+@pytest.mark.parametrize("name", [*GIVEN, "link_error", "temperature", "servo_bandwidth"])
 @pytest.mark.parametrize("value", [0.0, -1.0, math.nan])
 def test_a_limit_is_above_zero(name: str, value: float) -> None:
     told = refusal(SafetyLimits, **{name: value})

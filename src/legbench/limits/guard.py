@@ -57,7 +57,7 @@ class Guard:
         self._links = LinkWatch(bounds)
         self._period = period
         self._momentum = None
-        if momentum is not None and math.isfinite(limits.link_error):
+        if momentum is not None and limits.link_error is not None:
             self._momentum = MomentumWatch(momentum, limits.link_error, period)
         self.applied: tuple[float, ...] = ()
         self.shortfall = Shortfall(period)

@@ -80,9 +80,9 @@ class Unexplained(NamedTuple):
     """Torque that neither springs nor damping nor weight explain."""
 
     polar: float
-    """On q1 and q2 together [N m]."""
+    """Part that turns q1 and q2 together [N m]."""
     knee: float
-    """On q2 less on q1; the push of a knee stop is part of it [N m]."""
+    """Part that turns q2 against q1; the push of a knee stop belongs to it [N m]."""
     wound: float
     """Torque of spring 2 less that of spring 1 [N m]."""
 

@@ -68,15 +68,15 @@ class SafetyLimits:
     sway: float = math.inf
     """Motion of q1 + q2 that nobody has commanded, besides what the leg did in the seconds before;
     beyond it the run ends [rad]."""
-    link_error: float = math.inf
-    """Angle by which a link encoder may contradict spring torques and momentum of a leg that sways
-    too much for `sway`; beyond it the run ends [rad]."""
     temperature: float = math.inf
     """Highest temperature of a drive that reports it; beyond it the run ends [deg C]."""
     overrun_cycles: int = 3
     """Consecutive missed ticks that end the run."""
     lost_frames: int = 3
     """Consecutive cycles without a drive's process data that end the run."""
+    link_error: float | None = None
+    """Angle by which a link encoder may contradict spring torques and momentum of a leg that sways
+    too much for `sway`; beyond it the run ends [rad]."""
     waive: tuple[str, ...] = ()
     """Limits that may exceed their usual upper end, by name; every run says so."""
 
@@ -106,7 +106,7 @@ class SafetyLimits:
             ("joint_speed", self.joint_speed, "rad/s"),
             ("standing", self.standing, "rad"),
             ("sway", self.sway, "rad"),
-            ("link_error", self.link_error, "rad"),
+            ("link_error", math.inf if self.link_error is None else self.link_error, "rad"),
             ("temperature", self.temperature, "deg C"),
             ("following_cycles", self.following_cycles, "cycles"),
             ("overrun_cycles", self.overrun_cycles, "cycles"),
