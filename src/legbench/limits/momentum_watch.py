@@ -13,9 +13,9 @@ CONTACT_TIME = 0.02
 """Time in which a touchdown or a lift-off is over; the foot of the paper's leg may bounce [s]."""
 RUBBER = 0.01
 """Distance from a stop of rubber at which it may push already [rad]."""
-STANDING_TIME = 0.005
-"""Time that unexplained torque must last while a link stands and the other one swings [s]: a link
-that is thrown onto the ground, or off it, does not stand."""
+NOISE_SHARE = 0.5
+"""Share of the limit that rounded encoders may leave as noise [-]; it lasts for less than the
+averages reach."""
 LEARNING_TIME = 1.0
 """Time constant in which the mismatch of the springs is learned, and first time for it: two hops. A
 leg that has only begun to sway is still watched by its sway [s]."""
@@ -54,7 +54,7 @@ class _SupportWatch:
 
     def __init__(self, leg: LegMomentum, support: Support, torque: float, period: float) -> None:
         self._leg, self._support = leg, support
-        self._cycles = support.average_cycles(leg.link_step, torque, period)
+        self._cycles = support.average_cycles(leg.link_step, NOISE_SHARE * torque, period)
         self.reach = 3 * self._cycles
         self.restart()
 
@@ -125,19 +125,19 @@ class MomentumWatch:
         """
         self._leg, self._link_error, self._period = leg, link_error, period
         self._torque = link_error * min(leg.stiffness)
+        only = len(leg.supports) == 1
         weight = max(sum(map(abs, support.moment)) for support in leg.supports)
         # A leg that is always supported alike needs nothing to be ruled out.
-        self._knee_torque = WEIGHT_SHARE * weight if len(leg.supports) > 1 else math.inf
+        self._knee_torque = math.inf if only else WEIGHT_SHARE * weight
         self._supports = [
             _SupportWatch(leg, support, self._torque, period) for support in leg.supports
         ]
         self._reach = max(one.reach for one in self._supports)
         contact = round(CONTACT_TIME / period)
         self._patiences = [
-            contact + max((other.reach for other in self._supports if other is not one), default=0)
+            contact + max(other.reach for other in self._supports if other is not one or only)
             for one in self._supports
         ]
-        self._standing_patience = round(STANDING_TIME / period)
         self.start()
 
     def start(self) -> None:
@@ -179,7 +179,8 @@ class MomentumWatch:
             self._age = 0
             each = zip(left, self._patiences, strict=True)
             self._patience = max(cycles for torque, cycles in each if torque <= self._torque)
-        lasts = self._age > (self._standing_patience if stands else self._patience)
+        # A link that is thrown onto the ground, or off it, does not stand.
+        lasts = self._age > (self._reach if stands else self._patience)
         return self._doubt() if lasts and self._mismatch.known else None
 
     def _left(self) -> list[float]:
