@@ -56,10 +56,14 @@ def bench(*, sways: bool) -> Bench:
     )
 
 
-def rows(emulations: list[Emulation], onsets: int, seed: int) -> Iterator[Row]:
-    """Yield the trials of all lines."""
+LEGS = (("jump", False), ("bang-bang", False), ("jump", True))
+"""Controllers, and whether the leg sways."""
+
+
+def rows(emulations: list[Emulation], onsets: int, seed: int, *, all_legs: bool) -> Iterator[Row]:
+    """Yield the trials of all lines, or of those of a leg that sways."""
     dice = random.Random(seed)
-    legs = (("jump", False), ("bang-bang", False), ("jump", True))
+    legs = LEGS if all_legs else LEGS[-1:]
     for emulation, (controller, sways), part, drive in product(emulations, legs, Part, (0, 1)):
         yield Row(
             part=part,
@@ -123,6 +127,7 @@ def arguments() -> argparse.Namespace:
         action="append",
         help="only this one; may be given again",
     )
+    parser.add_argument("--sways", action="store_true", help="only the leg that sways")
     return parser.parse_args()
 
 
@@ -130,7 +135,8 @@ def main() -> int:
     """Print the table; 1 if a part is missed."""
     chosen = arguments()
     failed = 0
-    lines = list(rows(chosen.emulation or list(Emulation), chosen.onsets, chosen.seed))
+    emulations = chosen.emulation or list(Emulation)
+    lines = list(rows(emulations, chosen.onsets, chosen.seed, all_legs=not chosen.sways))
     with ProcessPoolExecutor(chosen.jobs, mp_context=get_context("spawn")) as pool:
         print(
             "| part | drive | controller | emulation | deaths | worst [ms] | since death [ms]"
