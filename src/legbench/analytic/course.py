@@ -30,6 +30,7 @@ from legbench.analytic.event_detector import (
     CONTACT,
     KINDS,
     NEVER,
+    RECOVER,
     SEEN,
     SILENT,
     TIE,
@@ -52,6 +53,10 @@ one any number."""
 TIME_LIMIT = int(hy.taylor_outcome.time_limit)
 EVENTS = len(Event)
 """Number of events that an integrator may watch [-]."""
+LAST_LIMIT = int(Event.HIP_HIGH)
+"""Number of the last event in which a joint meets or leaves a limit."""
+TOUCHED, TURNED = Watched.CONTACT, Watched.TURN
+"""Members that are asked for at every event; the enumeration itself takes longer to find them."""
 
 
 @final
@@ -91,6 +96,7 @@ class Course:
         self._tolerance, self._min_phase = tolerance, min_phase
         self._arm = foot_from_centre(model)
         self._regimes: dict[tuple[Regime, bool], CompiledRegime] = {}
+        self._terms = {regime: terms_of(self.plain, regime) for regime in Regime}
         self._variation = Variation(tolerance) if model.ops is DUAL else None
         self.detector = EventDetector(self, self.plain, min_phase)
         self.motor: Pair = (0.0, 0.0)
@@ -214,22 +220,22 @@ class Course:
 
     def _piece(self, until: float) -> int | None:
         """Integrate to `until` or to the next event."""
-        integrator = self.compiled.integrator
+        compiled = self.compiled
         # max_steps is passed by position: a keyword costs a fifth of a short call.
-        outcome = int(integrator.propagate_until(float(until - self.began), MAX_STEPS)[0])
+        outcome = int(compiled.run(float(until - self.began), MAX_STEPS)[0])
         event = None if outcome == TIME_LIMIT else -outcome - 1
         if event is not None and not 0 <= event < EVENTS:
-            at = self.began + float(integrator.time)
+            at = self.began + float(compiled.integrator.time)
             why = f"integration failed at t = {at:.6f} s: the state runs away"
             raise PlantFault("integration failed", why)
-        q1, q2, v1, v2 = self.compiled.state.tolist()
+        q1, q2, v1, v2 = compiled.state.tolist()
         self.plain_q, self.plain_v = (q1, q2), (v1, v2)
         if self._variation is not None:
             self._variation.carry(self, self.plain_q, self.plain_v, until, event)
             return event
         self.q, self.v = self.plain_q, self.plain_v
         # Exactly `until`, since a time that is short of it by rounding would never be reached.
-        self.time = until if event is None else self.began + float(integrator.time)
+        self.time = until if event is None else self.began + compiled.integrator.time
         return event
 
     def _meaning(self, event: int) -> Watched | None:
@@ -239,19 +245,19 @@ class Course:
             return SEEN[event]
         if event == TURN:
             self.detector.turned()
-            return Watched.TURN
-        if event <= Event.HIP_HIGH:
+            return TURNED
+        if event <= LAST_LIMIT:
             self.stop_switches.cross(event)
             self.stop_switches.lay(compiled)
             self.stop_switches.decide(
                 self.compiled, self.terms, self.plain_motor, self.plain_q, self.plain_v
             )
-        elif event == Event.RECOVER:
+        elif event == RECOVER:
             self._load(held=False)
         elif event != CONTACT:
             self.stop_switches.flip(compiled, event)
         elif compiled.flies or compiled.held or self.detector.released() > -TIE:
-            return Watched.CONTACT
+            return TOUCHED
         else:
             self._load(held=True)
         return None
@@ -267,7 +273,7 @@ class Course:
     def _enter(self, regime: Regime) -> None:
         """Begin a regime at the present time."""
         self.regime, self.told = regime, None
-        self.terms = terms_of(self.plain, regime)
+        self.terms = self._terms[regime]
         self.detector.enter(regime, self.since)
         self._load(held=False)
 
@@ -277,10 +283,7 @@ class Course:
         self.plain_q, self.plain_v = floats(self.q), floats(self.v)
         self.plain_motor = floats(self.motor)
         self.began = self.time
-        compiled.integrator.time = 0.0
-        compiled.integrator.reset_cooldowns()
-        compiled.state[:] = (*self.plain_q, *self.plain_v)
-        compiled.pars[MOTOR : MOTOR + 2] = self.plain_motor
+        compiled.put(self.plain_q, self.plain_v, self.plain_motor)
         if compiled.flies:
             compiled.pars[HEIGHT], compiled.pars[SPEED] = self.point[1], self.drift[1]
         self.detector.move_to(compiled)

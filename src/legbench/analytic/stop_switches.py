@@ -7,9 +7,10 @@ and by its own event otherwise, never by the sign of a number that is zero up to
 stop can pull.
 """
 
+import math
 from typing import final
 
-from legbench.analytic.compiled_regime import OFF, CompiledRegime
+from legbench.analytic.compiled_regime import NUDGE, OFF, CompiledRegime
 from legbench.analytic.equations import SCALAR, Ops, Pair, Term, pair_acceleration, pair_share
 from legbench.analytic.model import LegModel
 from legbench.analytic.parameters import FREE_PUSHES, PUSHES, Event
@@ -39,6 +40,13 @@ class StopSwitches:
         self._acting: list[Stop | None] = [None, None]
         """Stop that acts on each joint, or none within the limits."""
         self.touched, self._version = False, 0
+        ends = [stop.limit + stop.sign * NUDGE for stop in model.stops]
+        self._ends = tuple(ends) or (-math.inf, math.inf) * 2
+
+    def clear(self, knee: float, hip: float) -> bool:
+        """Whether no joint at these angles [rad] is at a limit or beyond one."""
+        knee_low, knee_high, hip_low, hip_high = self._ends
+        return not self.touched and knee_low < knee < knee_high and hip_low < hip < hip_high
 
     def find(self, q: Pair, v: Pair) -> None:
         """Determine by the law which limits a joint is beyond, for a leg set to a new state."""
