@@ -57,6 +57,7 @@ class CompiledRegime:
         self.pars[:] = values[: len(self.pars)]
         self._state, self._pars = memoryview(self.state), memoryview(self.pars)
         self.gain, self.level = [0.0] * len(Event), [1.0] * len(Event)
+        self._laid = list(self.level)
         self.moved: list[int] = []
         self.version = -1
 
@@ -73,8 +74,9 @@ class CompiledRegime:
         """Set an event to the rise of `gain * reading` through a level."""
         self.gain[event], self.level[event] = gain, level
         self._pars[GAIN + event] = gain
-        lowered = gain < 0.0 and event <= LAST_LOWERED
-        self._pars[LEVEL + event] = level + BACK if lowered else level
+        if gain < 0.0 and event <= LAST_LOWERED:
+            level += BACK
+        self._pars[LEVEL + event] = self._laid[event] = level
 
     def lay_bounds(self, fall: int, rise: int, lower: float, upper: float, never: float) -> None:
         """Set two events: a reading falls through `lower`, and rises through `upper`.
@@ -96,7 +98,7 @@ class CompiledRegime:
     def restore(self) -> None:
         """Restore the levels that the guard has moved."""
         for event in self.moved:
-            self.lay(event, self.gain[event], self.level[event])
+            self._pars[LEVEL + event] = self._laid[event]
         self.moved.clear()
 
     def guard(self, event: int, reading: float) -> bool:

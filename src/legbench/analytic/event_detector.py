@@ -32,9 +32,8 @@ TIE = 1e-7
 """Tolerance of acceleration over gravity and of force over weight when the foot is released [-]: on
 the radial mode both vanish together, and rounding decides their signs."""
 RISE, FALL, TURN, FELL, FELL_BACK = range(Event.RISE, Event.FELL_BACK + 1)
+KNEE_LOW, KNEE_HIGH, HIP_LOW, HIP_HIGH = range(Event.KNEE_LOW, Event.HIP_HIGH + 1)
 CONTACT, RECOVER = int(Event.CONTACT), int(Event.RECOVER)
-ANGLES = (RISE, FALL, FELL, FELL_BACK, *range(Event.KNEE_LOW, Event.HIP_HIGH + 1))
-"""Events whose readings are angles: two of the probe, of q1 + q2, of the knee, and of q1 each."""
 SEEN = {
     RISE: Watched.RISE,
     FALL: Watched.FALL,
@@ -127,23 +126,24 @@ class EventDetector:
         """Guard the events of angles, and return one whose condition holds already, or None."""
         course = self._course
         (p1, p2), (q1, q2) = course.probe, course.plain_q
-        reading, lean, knee = p1 * q1 + p2 * q2, q1 + q2, q2 - q1
-        if (
-            self._below < reading < self._above
-            and abs(lean) < self.lean - NUDGE
-            and course.stop_switches.clear(knee, q1)
-        ):
-            return None
-        return self._guard_angles((reading, reading, lean, lean, knee, knee, q1, q1))
+        reading, lean = p1 * q1 + p2 * q2, q1 + q2
+        due = None
+        if not self._below < reading < self._above:
+            due = self._guard_two(RISE, FALL, reading)
+        if abs(lean) > self.lean - NUDGE:
+            fell = self._guard_two(FELL, FELL_BACK, lean)
+            due = fell if due is None else due
+        if not course.stop_switches.clear(q2 - q1, q1):
+            self._guard_two(KNEE_LOW, KNEE_HIGH, q2 - q1)
+            self._guard_two(HIP_LOW, HIP_HIGH, q1)
+        return due
 
-    def _guard_angles(self, values: tuple[float, ...]) -> int | None:
-        """Guard those events of angles that are near, and return one that holds already."""
+    def _guard_two(self, first: int, second: int, value: float) -> int | None:
+        """Guard two events of an angle, and return the one whose condition holds already."""
         compiled, due = self._compiled, None
-        for event, value in zip(ANGLES, values, strict=True):
-            if compiled.gain[event] * value - compiled.level[event] > -NUDGE:
-                beyond = compiled.guard(event, value)
-                if beyond and due is None and event in SEEN:
-                    due = event
+        for event in (first, second):
+            if compiled.guard(event, value) and due is None:
+                due = event
         return due
 
     def _contact(self) -> int | None:

@@ -8,6 +8,7 @@ stop can pull.
 """
 
 import math
+from operator import is_
 from typing import final
 
 from legbench.analytic.compiled_regime import NUDGE, OFF, CompiledRegime
@@ -40,6 +41,9 @@ class StopSwitches:
         self._acting: list[Stop | None] = [None, None]
         """Stop that acts on each joint, or none within the limits."""
         self.touched, self._version = False, 0
+        self._asked_at: tuple[PairTerms, Pair, Pair, Pair] | None = None
+        """Objects for which `_answer` has been computed."""
+        self._answer: list[float] = [0.0, 0.0]
         ends = [stop.limit + stop.sign * NUDGE for stop in model.stops]
         self._ends = tuple(ends) or (-math.inf, math.inf) * 2
 
@@ -80,6 +84,7 @@ class StopSwitches:
                 self._acting[index // 2] = stop
         self.touched = True in self._touched
         self._version += 1
+        self._asked_at = None
 
     def decide(
         self, compiled: CompiledRegime, terms: PairTerms, motor: Pair, q: Pair, v: Pair
@@ -115,12 +120,15 @@ class StopSwitches:
         for first, inertia, pushing in found:
             asked = self._asked(inertia, motor, q, v)
             for joint in (0, 1):
-                stop = self._acting[joint]
+                stop, event = self._acting[joint], first + joint
                 if stop is None:
-                    compiled.lay(first + joint, *OFF)
+                    if compiled.gain[event] != 0.0:
+                        compiled.lay(event, *OFF)
                     continue
-                compiled.lay(first + joint, -stop.sign if pushing[joint] else stop.sign, 0.0)
-                compiled.guard(first + joint, stop.sign * asked[joint])
+                gain = -stop.sign if pushing[joint] else stop.sign
+                if compiled.gain[event] != gain:
+                    compiled.lay(event, gain, 0.0)
+                compiled.guard(event, stop.sign * asked[joint])
 
     def _silence(self, compiled: CompiledRegime) -> None:
         """Switch all pushes and their events off, as no joint is beyond a limit."""
@@ -159,8 +167,11 @@ class StopSwitches:
 
     def _asked(self, terms: PairTerms, motor: Pair, q: Pair, v: Pair) -> list[float]:
         """Readings of the events of each joint's stop where every stop acts that would push."""
-        torque = self._model.torque(motor, q, v)
-        return self._turns(SCALAR, terms, torque, q, v, None)[0]
+        at = (terms, motor, q, v)
+        if self._asked_at is None or not all(map(is_, at, self._asked_at)):
+            torque = self._model.torque(motor, q, v)
+            self._asked_at, self._answer = at, self._turns(SCALAR, terms, torque, q, v, None)[0]
+        return self._answer
 
     def _turns(
         self,
