@@ -39,6 +39,7 @@ class CompiledRegime:
         run: its integration to a time, or to the first event.
         state: view of its state (4,).
         pars: view of its parameters (n,).
+        slots: view of them into which single numbers are written in half the time.
         gain: gain of each event.
         level: level of each event, before the guard moves it.
         moved: events whose levels the guard has moved.
@@ -55,7 +56,7 @@ class CompiledRegime:
         self.state: Floats = self.integrator.state
         self.pars: Floats = self.integrator.pars
         self.pars[:] = values[: len(self.pars)]
-        self._state, self._pars = memoryview(self.state), memoryview(self.pars)
+        self._state, self.slots = _slots(self.state), _slots(self.pars)
         self.gain, self.level = [0.0] * len(Event), [1.0] * len(Event)
         self._laid = list(self.level)
         self.moved: list[int] = []
@@ -63,20 +64,24 @@ class CompiledRegime:
 
     def put(self, q: Pair, v: Pair, motor: Pair) -> None:
         """Set angles [rad], rates [rad/s] and motors [rad] at time zero of the integrator."""
-        state, pars = self._state, self._pars
+        state = self._state
         state[0], state[1] = q
         state[2], state[3] = v
-        pars[MOTOR], pars[MOTOR + 1] = motor
+        self.hold(motor)
         self.integrator.time = 0.0
         self.integrator.reset_cooldowns()
+
+    def hold(self, motor: Pair) -> None:
+        """Set the motor positions [rad]."""
+        self.slots[MOTOR], self.slots[MOTOR + 1] = motor
 
     def lay(self, event: int, gain: float, level: float) -> None:
         """Set an event to the rise of `gain * reading` through a level."""
         self.gain[event], self.level[event] = gain, level
-        self._pars[GAIN + event] = gain
+        self.slots[GAIN + event] = gain
         if gain < 0.0 and event <= LAST_LOWERED:
             level += BACK
-        self._pars[LEVEL + event] = self._laid[event] = level
+        self.slots[LEVEL + event] = self._laid[event] = level
 
     def lay_bounds(self, fall: int, rise: int, lower: float, upper: float, never: float) -> None:
         """Set two events: a reading falls through `lower`, and rises through `upper`.
@@ -98,7 +103,7 @@ class CompiledRegime:
     def restore(self) -> None:
         """Restore the levels that the guard has moved."""
         for event in self.moved:
-            self._pars[LEVEL + event] = self._laid[event]
+            self.slots[LEVEL + event] = self._laid[event]
         self.moved.clear()
 
     def guard(self, event: int, reading: float) -> bool:
@@ -106,6 +111,11 @@ class CompiledRegime:
         ahead = self.gain[event] * reading - self.level[event]
         if ahead <= -NUDGE:
             return False
-        self._pars[LEVEL + event] = self.gain[event] * reading + NUDGE
+        self.slots[LEVEL + event] = self.gain[event] * reading + NUDGE
         self.moved.append(event)
         return ahead > NUDGE
+
+
+def _slots(values: Floats) -> "memoryview[float]":
+    """View of an array of floats into which single ones are written fast."""
+    return values.data.cast("B").cast("d")

@@ -28,6 +28,7 @@ from legbench.analytic.dual import DUAL, floats, without_gradients
 from legbench.analytic.equations import Pair, sweep, sweep_rate, touchdown_rates
 from legbench.analytic.event_detector import (
     CONTACT,
+    HIP_HIGH,
     KINDS,
     NEVER,
     RECOVER,
@@ -39,7 +40,7 @@ from legbench.analytic.event_detector import (
     Levels,
 )
 from legbench.analytic.model import LegModel
-from legbench.analytic.parameters import HEIGHT, MOTOR, SPEED, Event, Kind, Watched
+from legbench.analytic.parameters import HEIGHT, SPEED, Event, Kind, Watched
 from legbench.analytic.state import LegState, Regime
 from legbench.analytic.stop_switches import StopSwitches
 from legbench.analytic.variation import Variation
@@ -53,10 +54,7 @@ one any number."""
 TIME_LIMIT = int(hy.taylor_outcome.time_limit)
 EVENTS = len(Event)
 """Number of events that an integrator may watch [-]."""
-LAST_LIMIT = int(Event.HIP_HIGH)
-"""Number of the last event in which a joint meets or leaves a limit."""
 TOUCHED, TURNED = Watched.CONTACT, Watched.TURN
-"""Members that are asked for at every event; the enumeration itself takes longer to find them."""
 
 
 @final
@@ -157,11 +155,8 @@ class Course:
         """Set the motor positions, which are held until the next call [rad]."""
         if motor != self.motor:
             self.motor, self.plain_motor = motor, floats(motor)
-            self.compiled.pars[MOTOR : MOTOR + 2] = motor
-            if self.stop_switches.touched:
-                self.stop_switches.decide(
-                    self.compiled, self.terms, self.plain_motor, self.plain_q, self.plain_v
-                )
+            self.compiled.hold(self.plain_motor)
+            self._decide()
 
     def switch(self) -> None:
         """Apply a touchdown or lift-off: change the regime, and the rates by eq. (12)."""
@@ -188,12 +183,13 @@ class Course:
             PlantFault: the integration failed.
         """
         self.told = None
-        if levels is not self.detector.levels:
-            self.detector.lay(levels)
+        detector = self.detector
+        if levels is not detector.levels:
+            detector.lay(levels)
         for _ in range(MAX_EVENTS):
-            event = self.detector.due()
+            event = detector.due()
             if event is None:
-                end = min(self.detector.blind, until) if self.time < self.detector.blind else until
+                end = detector.blind if self.time < detector.blind < until else until
                 if end > self.time:
                     event = self._piece(end)
             if event is not None:
@@ -246,12 +242,10 @@ class Course:
         if event == TURN:
             self.detector.turned()
             return TURNED
-        if event <= LAST_LIMIT:
+        if event <= HIP_HIGH:
             self.stop_switches.cross(event)
             self.stop_switches.lay(compiled)
-            self.stop_switches.decide(
-                self.compiled, self.terms, self.plain_motor, self.plain_q, self.plain_v
-            )
+            self._decide()
         elif event == RECOVER:
             self._load(held=False)
         elif event != CONTACT:
@@ -280,16 +274,22 @@ class Course:
     def _load(self, *, held: bool) -> None:
         """Load the present state into the integrator of the regime."""
         compiled = self.compiled = self._compiled_for(held=held)
-        self.plain_q, self.plain_v = floats(self.q), floats(self.v)
-        self.plain_motor = floats(self.motor)
+        self.plain_q, self.plain_v, self.plain_motor = self.q, self.v, self.motor
+        if self._variation is not None:
+            self.plain_q, self.plain_v = floats(self.q), floats(self.v)
+            self.plain_motor = floats(self.motor)
         self.began = self.time
         compiled.put(self.plain_q, self.plain_v, self.plain_motor)
         if compiled.flies:
-            compiled.pars[HEIGHT], compiled.pars[SPEED] = self.point[1], self.drift[1]
+            compiled.slots[HEIGHT], compiled.slots[SPEED] = self.point[1], self.drift[1]
         self.detector.move_to(compiled)
-        self.stop_switches.decide(
-            self.compiled, self.terms, self.plain_motor, self.plain_q, self.plain_v
-        )
+        self._decide()
+
+    def _decide(self) -> None:
+        """Decide which stops push, after something has jumped."""
+        switches, compiled = self.stop_switches, self.compiled
+        if switches.touched or compiled.pushed:
+            switches.decide(compiled, self.terms, self.plain_motor, self.plain_q, self.plain_v)
 
     def _compiled_for(self, *, held: bool) -> CompiledRegime:
         found = self._regimes.get((self.regime, held))

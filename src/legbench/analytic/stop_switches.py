@@ -22,6 +22,8 @@ AT_LIMIT = 1e-12
 """Largest depth that may be rounding; the speed then says whether the stop is touched [rad]."""
 FIRST = int(Event.KNEE_LOW)
 """Number of the first of the four events in which a joint meets or leaves a limit."""
+KNEE_PUSH, KNEE_FREE = int(Event.KNEE_PUSH), int(Event.KNEE_FREE)
+"""Numbers of the events of the knee's stop; those of the hip's come next."""
 
 
 @final
@@ -67,10 +69,10 @@ class StopSwitches:
         if compiled.version == self._version:
             return
         compiled.version = self._version
-        for index, (stop, beyond) in enumerate(zip(self._stops, self._touched, strict=True)):
+        for event, (stop, beyond) in enumerate(zip(self._stops, self._touched, strict=True), FIRST):
             gain = stop.sign if beyond else -stop.sign
-            if compiled.gain[FIRST + index] != gain:
-                compiled.lay(FIRST + index, gain, gain * stop.limit)
+            if compiled.gain[event] != gain:
+                compiled.lay(event, gain, gain * stop.limit)
 
     def cross(self, event: int) -> None:
         """Note that a joint has gone beyond a limit, or has come back."""
@@ -104,19 +106,19 @@ class StopSwitches:
 
     def flip(self, compiled: CompiledRegime, event: int) -> None:
         """Note that a stop begins or ends to push, or would if the foot were released."""
-        if event >= Event.KNEE_FREE:
-            self._free[event - Event.KNEE_FREE] ^= True
+        if event >= KNEE_FREE:
+            self._free[event - KNEE_FREE] ^= True
         else:
-            self._pushing[event - Event.KNEE_PUSH] ^= True
+            self._pushing[event - KNEE_PUSH] ^= True
         self._switch(compiled)
 
     def guard(
         self, compiled: CompiledRegime, terms: PairTerms, motor: Pair, q: Pair, v: Pair
     ) -> None:
         """Set and guard the events of the pushes, for the joints that are beyond a limit."""
-        found = [(Event.KNEE_PUSH, terms, self._pushing)]
+        found = [(KNEE_PUSH, terms, self._pushing)]
         if compiled.held:
-            found.append((Event.KNEE_FREE, self._model.falling, self._free))
+            found.append((KNEE_FREE, self._model.falling, self._free))
         for first, inertia, pushing in found:
             asked = self._asked(inertia, motor, q, v)
             for joint in (0, 1):
@@ -133,22 +135,22 @@ class StopSwitches:
     def _silence(self, compiled: CompiledRegime) -> None:
         """Switch all pushes and their events off, as no joint is beyond a limit."""
         compiled.pushed = False
-        compiled.pars[PUSHES : PUSHES + 4 : 2] = 0.0
-        for event in (Event.KNEE_PUSH, Event.HIP_PUSH):
+        compiled.slots[PUSHES] = compiled.slots[PUSHES + 2] = 0.0
+        for event in (KNEE_PUSH, KNEE_PUSH + 1):
             compiled.lay(event, *OFF)
         if compiled.held:
-            compiled.pars[FREE_PUSHES : FREE_PUSHES + 2] = 0.0
-            for event in (Event.KNEE_FREE, Event.HIP_FREE):
+            compiled.slots[FREE_PUSHES] = compiled.slots[FREE_PUSHES + 1] = 0.0
+            for event in (KNEE_FREE, KNEE_FREE + 1):
                 compiled.lay(event, *OFF)
 
     def _switch(self, compiled: CompiledRegime) -> None:
         for joint in (0, 1):
             stop = self._acting[joint]
             place = PUSHES + 2 * joint
-            compiled.pars[place] = float(stop is not None and self._pushing[joint])
-            compiled.pars[place + 1] = 0.0 if stop is None else stop.limit
+            compiled.slots[place] = float(stop is not None and self._pushing[joint])
+            compiled.slots[place + 1] = 0.0 if stop is None else stop.limit
             if compiled.held:
-                compiled.pars[FREE_PUSHES + joint] = float(stop is not None and self._free[joint])
+                compiled.slots[FREE_PUSHES + joint] = float(stop is not None and self._free[joint])
 
     def turns(
         self, ops: Ops, terms: PairTerms, torque: Pair, q: Pair, v: Pair, *, free: bool = False
