@@ -12,6 +12,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from enum import IntEnum
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -171,25 +172,25 @@ def attraction_in(question: Question) -> Attraction | None:
     return find_attraction(leg, exact, drive, question.centre, question.near, question.hops)
 
 
-_worker: tuple[Question, Attraction | None, TaylorLeg, AbstractDrive] | None = None
+_worker: tuple[Question, TaylorLeg, AbstractDrive] | None = None
 
 
-def _start_worker(question: Question, attraction: Attraction | None) -> None:
+def _start_worker(question: Question) -> None:
     global _worker
-    _worker = (question, attraction, *question.tools())
+    _worker = (question, *question.tools())
 
 
-def _start_process(question: Question, attraction: Attraction | None) -> None:
+def _start_process(question: Question) -> None:
     # ^C goes to the whole group; a worker that dies of it takes the queue's lock along, and the
     # one who tidies up waits for ever.
     ignore_interrupts()
-    _start_worker(question, attraction)
+    _start_worker(question)
 
 
-def _row(index: int) -> tuple[int, list[int]]:
+def _row(attraction: Attraction | None, index: int) -> tuple[int, list[int]]:
     if _worker is None:
         raise RuntimeError("the worker was not started")
-    question, attraction, leg, drive = _worker
+    question, leg, drive = _worker
     places = {name: NAMES.index(name) for name in (question.across.name, question.up.name)}
     vector = question.centre.vector()
     vector[places[question.up.name]] = question.up.values()[index]
@@ -255,28 +256,29 @@ def _rows(question: Question, todo: list[int], workers: int) -> Iterator[tuple[i
     if not todo:
         return
     large = len(todo) * question.across.count >= LARGE
-    attraction = attraction_in(question) if large else None
     if workers == 1:
-        _start_worker(question, attraction)
-        yield from map(_row, todo)
+        _start_worker(question)
+        yield from map(partial(_row, attraction_in(question) if large else None), todo)
         return
-    with _pool(question, attraction, workers) as pool:
-        # The first submission starts all workers; one that ^C reached while it loads its modules
-        # would die before it could ignore it.
+    with _pool(question, workers) as pool:
+        # A submission starts a worker if none is idle; one that ^C reached while it loads its
+        # modules would die before it could ignore it. They load while the neighbourhood is sought.
         with children_without_interrupts():
-            futures = [pool.submit(_row, index) for index in todo]
+            for _ in range(workers):
+                pool.submit(int)
+        row = partial(_row, attraction_in(question) if large else None)
+        with children_without_interrupts():
+            futures = [pool.submit(row, index) for index in todo]
         for future in as_completed(futures):
             yield future.result()
 
 
 @contextmanager
-def _pool(
-    question: Question, attraction: Attraction | None, workers: int
-) -> Iterator[ProcessPoolExecutor]:
+def _pool(question: Question, workers: int) -> Iterator[ProcessPoolExecutor]:
     """Pool of new processes; they are not forked, since a compiled leg does not survive a fork."""
     context: Any = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(
-        workers, mp_context=context, initializer=_start_process, initargs=(question, attraction)
+        workers, mp_context=context, initializer=_start_process, initargs=(question,)
     )
     try:
         yield pool
