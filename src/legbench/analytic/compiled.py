@@ -65,6 +65,11 @@ def varied_integrator(tolerance: float = TOLERANCE) -> Any:
     return copy.deepcopy(_varied(tolerance))
 
 
+def free_integrator(tolerance: float = TOLERANCE) -> Any:
+    """New integrator of one leg without stops, events and derivatives."""
+    return copy.deepcopy(_free(tolerance))
+
+
 def smooth_integrator(
     tolerance: float, *, varied: bool, friction: bool, guide: bool = False
 ) -> Any:
@@ -119,6 +124,18 @@ def _varied(tolerance: float) -> Any:
         )
 
     return kept(f"varied {tolerance!r} {system} {seeds}", build)
+
+
+@cache
+def _free(tolerance: float) -> Any:
+    system = smooth_system(friction=False)
+
+    def build() -> Any:
+        return hy.taylor_adaptive(
+            system, [0.0] * len(system), tol=tolerance, fast_math=True, opt_level=OPTIMISED
+        )
+
+    return kept(f"free {tolerance!r} {system}", build)
 
 
 @cache
