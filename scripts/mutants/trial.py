@@ -284,7 +284,7 @@ class Trials:
     def _import_and_run(self, fault: Fault) -> int:
         sys.meta_path.insert(0, _Planted(fault.path, fault.changed))
         files = dict.fromkeys(test.name.split("::")[0] for test in fault.tests)
-        status = _pytest(self._folder / "again", files, _Select(self._failed, fault.tests), "-x")
+        status = _pytest(self._folder, files, _Select(self._failed, fault.tests), "-x")
         # A module that cannot be imported is noticed, and pytest calls that a wrong usage.
         return pytest.ExitCode.TESTS_FAILED if status == pytest.ExitCode.USAGE_ERROR else status
 
