@@ -17,7 +17,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "src" / "legbench"
 CACHE = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "legbench-mutants"
-TIMES = 300
+TIMES = 100
 """A function is followed line by line until so many of its calls in one test showed nothing new."""
 
 
