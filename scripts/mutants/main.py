@@ -54,7 +54,7 @@ STRICT = (
 """Files of the package that a stop depends on: 97 % must be noticed there, 93 % elsewhere."""
 STRICT_BOUND, BOUND = 0.97, 0.93
 ROOMS = ("limits", "drives", "commissioning", "recording", "metrics")
-BUDGET = 6.0
+BUDGET = 4.0
 """Tests that run a changed line are tried for so long, timed under the trace [s]."""
 IMPORTING_FILES = 8
 """A fault that an import runs is tried with the tests of so many files."""

@@ -76,7 +76,7 @@ class LineTrace:
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self) -> Any:
         """Trace one test with its fixtures."""
-        self._lines, self._calls, self._began = {}, {}, time.process_time()
+        self._lines, self._calls, self._began = {}, {}, _processor_time()
         threading.settrace(self._on_call)
         sys.settrace(self._on_call)
         try:
@@ -94,9 +94,15 @@ class LineTrace:
             _add(ran, self._lines)
             _add(ran, self._prepared)
             lines = {_module(name): _bits(ran[name]) for name in sorted(ran)}
-            seconds = time.process_time() - self._began
+            seconds = _processor_time() - self._began
             test = {"name": report.nodeid, "seconds": seconds, "lines": lines}
             self.passed.append(test)
+
+
+def _processor_time() -> float:
+    """Time of the processor that this process and those that it has waited for took [s]."""
+    children = os.times()
+    return time.process_time() + children.children_user + children.children_system
 
 
 def _add(total: dict[str, set[int]], lines: dict[str, set[int]]) -> None:
