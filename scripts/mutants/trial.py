@@ -217,10 +217,9 @@ def _trace_and_save(file: Path, items: Sequence[pytest.Item]) -> Callable[[], in
 
 def _pytest(folder: Path, files: Iterable[str], plugin: object, *more: str) -> int:
     os.chdir(ROOT)
-    # Hypothesis is imported before pytest can rewrite its assertions, and that is no matter.
-    silent = ["-q", "-W", "ignore::pytest.PytestAssertRewriteWarning", "-p", "no:cacheprovider"]
-    usual = [*silent, f"--basetemp={folder / 't'}", *more]
-    return pytest.main([*usual, *files], plugins=[plugin])
+    # A failure is not explained, only noticed: that takes ten times as long as to find it.
+    usual = ["-q", "--assert=plain", "--tb=native", "-p", "no:cacheprovider", *more]
+    return pytest.main([*usual, f"--basetemp={folder / 't'}", *files], plugins=[plugin])
 
 
 class Trials:
