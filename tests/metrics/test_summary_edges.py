@@ -85,6 +85,11 @@ def test_each_caveat_is_told_where_it_holds_and_only_there() -> None:
     assert told == UNRATED
     (told,) = warnings_of(Analysis(short.real()))
     assert told == UNRATED
+    stays = np.ones(len(short.signals()["time"]), dtype=np.bool_)
+    (told,) = warnings_of(Analysis(short.recording(contact=stays)))
+    assert told == (
+        "nothing was rated: the leg never leaves the ground; push harder (a larger dz2)"
+    )
 
 
 def test_what_an_analysis_has_read_cannot_be_changed_and_the_recording_stays_as_it_was() -> None:
