@@ -112,6 +112,16 @@ def test_each_stop_acts_from_its_margin_on(at: Callable[[float], Floats]) -> Non
     assert left_out(-0.1) == [2, 3, 4, 5]
 
 
+@pytest.mark.parametrize("height", [0.0, -1e-9])
+def test_a_foot_on_the_ground_is_down_with_or_without_a_contact(height: float) -> None:
+    joint_pos, foot_pos = np.tile(posture(*FREE), (9, 1)), np.full((9, 2), 0.25)
+    for contact, row in ((np.arange(9) == 4, 0.25), (np.zeros(9), height), (np.zeros(9), 1e-9)):
+        foot_pos[4, 1] = row
+        run = recording(clock(9), joint_pos=joint_pos, foot_pos=foot_pos, contact=contact)
+        down = [] if row == 1e-9 else [2, 3, 4, 5]
+        assert np.flatnonzero(~clean_intervals(run)).tolist() == down
+
+
 def test_the_residual_is_the_worst_drift_within_one_clean_stretch() -> None:
     """Losses at a stop count for nothing, and what is lost before it is no part of what follows."""
     joint_pos = np.tile(posture(*FREE), (20, 1))
