@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType
+from types import MappingProxyType, SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from legbench.kinematics import modal_to_joint
 from legbench.metrics import Analysis, compare, summarise
 from legbench.metrics.events import CommonEvent, common_event, event_time, event_times
 from legbench.metrics.side_by_side import side_by_side
+from legbench.metrics.stance import MINIMUM_PHASE
 from legbench.phases import PhaseInfo, Role
 from legbench.recording.reader import Recording
 
@@ -43,6 +44,22 @@ def test_touchdowns_and_liftoffs_are_those_of_the_closed_form() -> None:
     assert event_time(run, CommonEvent.TOUCHDOWN, 2) == down[1]
     assert event_time(run, CommonEvent.TOUCHDOWN, -1) == down[-1]
     assert event_time(run, CommonEvent.CLOCK) == 0.0
+
+
+def test_a_leg_that_is_put_down_in_its_first_rows_does_not_land() -> None:
+    at = 1.0 + MINIMUM_PHASE
+    later = float(np.nextafter(at, 2.0))
+    ends = np.array([1.0, at, later, 1.5])
+    phases = SimpleNamespace(start=ends, end=ends)
+    run: Any = SimpleNamespace(
+        time=np.array([1.0, 1.25]), gait=SimpleNamespace(stance=phases, flight=phases)
+    )
+    for event in (CommonEvent.TOUCHDOWN, CommonEvent.LIFTOFF):
+        assert event_times(run, event).tolist() == [later, 1.5]
+    nothing = Analysis(recording(np.zeros(0), manifest()))
+    assert event_times(nothing, CommonEvent.TOUCHDOWN).tolist() == []
+    # Time zero is there once, and always.
+    assert event_times(nothing, CommonEvent.CLOCK).tolist() == [0.0]
 
 
 def test_switches_lie_between_acting_phases() -> None:
