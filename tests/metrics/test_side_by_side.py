@@ -110,6 +110,17 @@ def test_a_known_distance_is_measured_in_each_coordinate() -> None:
     assert second.duration == pytest.approx(0.999)
 
 
+def test_runs_are_compared_from_50_ms_before_to_1_s_after_their_first_event() -> None:
+    entries = manifest(setup={"kind": "ffs"}, controller={"kind": "position-jump", "dz2": 0.1})
+    run = Analysis(recording(clock(3000) - 1.0, entries))
+    (apart,) = side_by_side([run, run], event=CommonEvent.CLOCK).apart
+    assert apart.duration == pytest.approx(1.049, abs=1e-9)
+    hop = Analysis(HOP.recording())
+    found = side_by_side([hop, hop])
+    assert (found.event, found.number) == (CommonEvent.TOUCHDOWN, 1)
+    assert found.times[0] == pytest.approx(HOP.touchdown(0), abs=1e-4)
+
+
 def test_different_legs_are_told_from_different_settings() -> None:
     run = HOP.recording()
     optimal = remade(run, manifest(load_design(MODELS / "optimal.toml")))
@@ -138,5 +149,6 @@ def test_events_that_are_not_there_are_refused() -> None:
         with pytest.raises(RecordingError, match=rf"has {count} events of kind touchdown, so none"):
             side_by_side([run, run], event=CommonEvent.TOUCHDOWN, number=number)
     early = Analysis(replace(HOP.recording(), time=HOP.recording().time + 9.0))
-    with pytest.raises(RecordingError, match="no rows around their event"):
-        side_by_side([early, early], event=CommonEvent.CLOCK, span=0.5)
+    for runs in ([early, early], [run, early], [early, run]):
+        with pytest.raises(RecordingError, match="no rows around their event"):
+            side_by_side(runs, event=CommonEvent.CLOCK, span=0.5)
