@@ -66,6 +66,12 @@ def test_as_many_signals_are_kept_as_fit_and_the_one_asked_for_longest_ago_goes(
     assert list(run._signals) == ["joint_pos", "joint_vel"]
 
 
+def test_windows_are_four_minutes_long_and_one_is_there_without_rows() -> None:
+    assert list(spans(300_000)) == [(0, 262_144), (262_144, 300_000)]
+    assert list(spans(0, 1)) == [(0, 0)]
+    assert list(spans(1, 1)) == [(0, 1)]
+
+
 def test_windows_cover_the_rows_once() -> None:
     for count in (0, 1, 5, 6):
         rows = [row for first, stop in spans(count, 3) for row in range(first, stop)]
