@@ -220,7 +220,8 @@ def test_the_excess_of_commands_is_the_largest_of_range_and_step(
 ) -> None:
     limits = SafetyLimits(motor_range=((-0.25, 0.5), (-0.25, 0.5)), command_speed=20.0)
     log = tmp_path / "bus.log"
-    lines = [_command(place, angle) for angle in angles]
+    # A command may carry more behind its target.
+    lines = [_command(place, angle) + "0102" for angle in angles]
     # Those to a drive that is not enabled do not count, nor do frames of another kind.
     lines.insert(1, _command(place, 3.0, "0600"))
     lines.insert(1, f"18{place + 1}#0F00FFFFFF7F0000")
@@ -234,3 +235,6 @@ def test_a_log_without_commands_has_no_excess(tmp_path: Path) -> None:
     log = tmp_path / "bus.log"
     log.write_text("(0.0) can0 080#\n")
     assert excess_of(log, config(), SafetyLimits()) == -1.0
+    one = SafetyLimits(motor_range=((-1.0, 1.0),))
+    with pytest.raises(ValueError, match="zip"):
+        excess_of(log, config(), one)

@@ -32,7 +32,9 @@ class Wire:
         self.network.advance(self.network.now_ns + MS)
 
 
-def served(monkeypatch: pytest.MonkeyPatch, polls: int, *, fails: bool = False) -> Any:
+def served(
+    monkeypatch: pytest.MonkeyPatch, polls: int, *, fails: bool = False, **patience: int
+) -> Any:
     """Drives that were served for some polls, and all that happened."""
     seen = SimpleNamespace(wires=[], ready=[], told=[], asked=[])
     monkeypatch.setattr(emulate, "ask", lambda **kwargs: seen.asked.append(kwargs))
@@ -47,7 +49,7 @@ def served(monkeypatch: pytest.MonkeyPatch, polls: int, *, fails: bool = False) 
         BENCH,
         lambda network: cast(Any, seen.wires.append(Wire(network)) or seen.wires[0]),
         start_pos=START,
-        patience=7,
+        **patience,
         report=report,
         ready=seen.ready.append,
         stop=lambda: seen.wires[0].polls >= polls,
@@ -78,13 +80,28 @@ def test_every_change_of_a_state_is_reported_once_and_the_end_is_when_it_is_aske
 def test_drives_start_where_they_are_told_reply_at_once_and_are_as_patient(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    (wire,) = served(monkeypatch, 10).wires
+    (wire,) = served(monkeypatch, 10, patience=7).wires
     behaviours = [drive._behaviour for drive in wire.network.drives]
     assert [how.start_pos for how in behaviours] == list(START)
     assert [how.reply_delay_us for how in behaviours] == [(0, 0), (0, 0)]
     assert [(how.missing_limit, how.sync_loss_periods) for how in behaviours] == [(7, 7)] * 2
     for drive, node, start in zip(wire.network.drives, BENCH.nodes, START, strict=True):
         assert node.motor.to_rad(drive._values[0x6064, 0]) == pytest.approx(start, abs=1e-4)
+
+
+def test_drives_are_patient_for_five_periods_and_their_leg_moves_every_millisecond(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    (wire,) = served(monkeypatch, 10).wires
+    behaviours = [drive._behaviour for drive in wire.network.drives]
+    assert [(how.missing_limit, how.sync_loss_periods) for how in behaviours] == [(5, 5)] * 2
+    assert wire.network._body_period_ns == MS
+
+
+def test_every_drive_starts_somewhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(globals(), "START", (0.25,))
+    with pytest.raises(ValueError, match="zip"):
+        served(monkeypatch, 10)
 
 
 def test_a_report_that_fails_takes_no_drives_from_their_master(
