@@ -235,6 +235,5 @@ def test_a_log_without_commands_has_no_excess(tmp_path: Path) -> None:
     log = tmp_path / "bus.log"
     log.write_text("(0.0) can0 080#\n")
     assert excess_of(log, config(), SafetyLimits()) == -1.0
-    one = SafetyLimits(motor_range=((-1.0, 1.0),))
     with pytest.raises(ValueError, match="zip"):
-        excess_of(log, config(), one)
+        excess_of(log, config(nodes=(node(0),)), SafetyLimits())
