@@ -6,9 +6,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from can_rig import LIMITS
 from service_rig import BENCH, MS, alone, on, opened, serial, written
 
 from legbench.commissioning import configure
+from legbench.commissioning.home import home
+from legbench.commissioning.jog import jog
+from legbench.commissioning.node_id import set_node_id
+from legbench.commissioning.reset import reset
+from legbench.commissioning.store import store
+from legbench.commissioning.zero import measure
 from legbench.drives.emulated.build import emulate, on_bench
 from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.emulated.network import Network
@@ -16,6 +23,7 @@ from legbench.drives.errors import BusError, DriveError
 from legbench.drives.master.bring_up import BringUp
 from legbench.drives.master.session import Session
 from legbench.drives.protocol.frame import Frame
+from legbench.drives.setup.bus_file import load_limits
 from legbench.drives.transport.lock import ChannelLock
 from legbench.errors import PlantFault
 
@@ -45,30 +53,47 @@ def test_drives_are_pre_operational_before_the_first_object_is_written() -> None
     assert done.held == frozenset()
 
 
-@pytest.mark.parametrize("act", [configure.write, configure.differences])
+LEG = load_limits(LIMITS)
+WRITING: dict[str, Callable[[Session], object]] = {
+    "configure": configure.write,
+    "home": lambda session: home(session, session.config.nodes[0], 37),
+    "reset": lambda session: reset(session, session.config.nodes),
+    "store": lambda session: store(session, session.config.nodes),
+    "node-id": lambda session: set_node_id(session, 42),
+    "jog": lambda session: jog(session, LEG, (4.0, 5.0), "motor1", by=-0.1, speed=0.5, back=False),
+}
+"""Commands that write to drives."""
+ASKING = WRITING | {
+    "compare": configure.differences,
+    "zero": lambda session: measure(session, (0.0, 0.0)),
+}
+
+
+@pytest.mark.parametrize("name", [name for name in ASKING if name != "node-id"])
 @pytest.mark.parametrize("place", [0, 1])
-def test_another_drive_is_neither_compared_nor_written(
-    act: Callable[[Session], object], place: int
-) -> None:
+def test_another_drive_than_the_bus_file_means_is_told_nothing(name: str, place: int) -> None:
     nodes = list(BENCH.nodes)
     nodes[place] = serial(nodes[place], 77)
     session, network = alone(*nodes)
     with session, pytest.raises(DriveError, match="serial"):
-        act(session)
+        ASKING[name](session)
     assert written(network) == []
 
 
-def test_a_channel_that_has_a_master_is_not_configured(tmp_path: Path) -> None:
-    network = emulate(BENCH, keep_log=True)
+@pytest.mark.parametrize("name", WRITING)
+def test_drives_on_a_channel_that_has_a_master_are_told_nothing(name: str, tmp_path: Path) -> None:
+    nodes = BENCH.nodes[:1] if name == "node-id" else BENCH.nodes
+    bus = replace(BENCH, nodes=nodes)
+    network = emulate(bus, [on_bench(node, 0.2 * node.node_id) for node in nodes], keep_log=True)
     network.advance(20 * MS)
-    name = str(tmp_path / "channel")
-    other = ChannelLock(name)
+    channel = str(tmp_path / "channel")
+    other = ChannelLock(channel)
     other.acquire()
-    session = Session(LockstepBus("leg", network=network), BENCH, lock=ChannelLock(name))
-    with session, pytest.raises(BusError, match="master"):
-        configure.write(session)
-    other.release()
+    session = Session(LockstepBus("leg", network=network), bus, lock=ChannelLock(channel))
+    with session, pytest.raises(BusError, match="already has a master"):
+        WRITING[name](session)
     assert written(network) == []
+    other.release()
 
 
 def test_frames_that_wait_are_looked_at_before_the_first_order(

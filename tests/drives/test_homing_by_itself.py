@@ -128,3 +128,12 @@ def test_a_drive_is_looked_at_twice_a_heartbeat_and_every_5_ms_at_least(
     with session:
         master = home_module._Master(session, session.bring_up(), session.config.nodes[0])
         assert master._rest_ns == 1000 * rest_us
+
+
+@pytest.mark.parametrize("timeout", [0.0, -1.0, 600.1, math.nan])
+def test_a_homing_has_some_time_and_ten_minutes_at_most(timeout: float) -> None:
+    session, network = opened()
+    with session, pytest.raises(ConfigError, match=f"timeout is {timeout:g} s"):
+        home(session, session.config.nodes[0], 37, timeout=timeout)
+    assert written(network) == []
+    home_module._check_asked(node(0), 37, 600.0)
