@@ -21,7 +21,7 @@ import random
 import re
 import sys
 import tomllib
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -72,9 +72,9 @@ def _span(tree: ast.Module, line: int) -> tuple[int, int]:
     return first, last
 
 
-def _affordable(tests: Iterable[Timed]) -> list[Timed]:
-    """The fastest of some tests, as many as the budget allows."""
-    reached = sorted(tests, key=lambda test: test.seconds)
+def _affordable(tests: Iterable[Timed], before: Collection[str] = ()) -> list[Timed]:
+    """The fastest of some tests, those of some files before all others, for a budget's time."""
+    reached = sorted(tests, key=lambda test: (_file_of(test) not in before, test.seconds))
     spent = itertools.accumulate(test.seconds for test in reached)
     kept = [test for test, so_far in zip(reached, spent, strict=True) if so_far <= BUDGET]
     # Tests of one speed and file stay together, so that their fixtures are made once.
@@ -87,17 +87,26 @@ def _in_function(tests: Sequence[Passed], module: str, first: int, last: int) ->
     return _affordable(passed.test for passed in tests if passed.runs(module, first, last))
 
 
-def _at_import(tests: Sequence[Passed], module: str) -> list[Timed]:
-    """Tests that use a module, of those files first that import it."""
+def _at_import(tests: Sequence[Passed], module: str, name: str) -> list[Timed]:
+    """Tests of a module, of those files first that say the name that is changed, or import it."""
     seconds: dict[str, float] = {}
     for passed in tests:
         if module in passed.lines:
             file = _file_of(passed.test)
             seconds[file] = seconds.get(file, 0.0) + passed.test.seconds
-    near = {file for file in {_file_of(p.test) for p in tests} if _imports(ROOT / file, module)}
-    files = sorted(near | seconds.keys(), key=lambda f: (f not in near, seconds.get(f, 0.0)))
-    chosen = set(files[:IMPORTING_FILES])
-    return _affordable(p.test for p in tests if _file_of(p.test) in chosen)
+    every = {_file_of(passed.test) for passed in tests}
+    near = {file for file in every if _imports(ROOT / file, module)}
+    named = {file for file in near | seconds.keys() if _says(ROOT / file, name)}
+
+    def order(file: str) -> tuple[bool, bool, float]:
+        return file not in named, file not in near, seconds.get(file, 0.0)
+
+    chosen = sorted(near | seconds.keys(), key=order)[:IMPORTING_FILES]
+    return _affordable((p.test for p in tests if _file_of(p.test) in chosen), named)
+
+
+def _says(file: Path, name: str) -> bool:
+    return re.search(rf"\b{re.escape(name)}\b", file.read_text()) is not None
 
 
 def _file_of(test: Timed) -> str:
@@ -135,12 +144,16 @@ def _sample(path: Path, seed: int, count: int) -> list[Mutation]:
 
 def _faults(path: Path, edits: Sequence[Mutation], tests: Sequence[Passed]) -> list[Fault]:
     source, module = path.read_text(), path.relative_to(PACKAGE).as_posix()
-    tree, anew = ast.parse(source), _at_import(tests, module)
+    tree = ast.parse(source)
     faults: list[Fault] = []
     for edit in edits:
         line = edit.line_number(source)
         before, after = edit.lines(source)
-        inside = [] if edit.at_import else _in_function(tests, module, *_span(tree, line))
+        if edit.at_import:
+            # The constant, field or member that a line begins with.
+            chosen = _at_import(tests, module, before.split(maxsplit=1)[0].rstrip(":,"))
+        else:
+            chosen = _in_function(tests, module, *_span(tree, line))
         place = f"{path.relative_to(ROOT)}:{line} {edit.scope}"
         fault = Fault(
             path=path,
@@ -148,7 +161,7 @@ def _faults(path: Path, edits: Sequence[Mutation], tests: Sequence[Passed]) -> l
             scope="" if edit.at_import else edit.scope,
             line=line,
             text=f"{place}\n  - {before}\n  + {after}",
-            tests=anew if edit.at_import else inside,
+            tests=chosen,
         )
         faults.append(fault)
     return faults
