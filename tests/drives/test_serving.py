@@ -33,7 +33,7 @@ class Wire:
 
 
 def served(
-    monkeypatch: pytest.MonkeyPatch, polls: int, *, fails: bool = False, **patience: int
+    monkeypatch: pytest.MonkeyPatch, polls: int, *, fails: bool = False, **patience: Any
 ) -> Any:
     """Drives that were served for some polls, and all that happened."""
     seen = SimpleNamespace(wires=[], ready=[], told=[], asked=[])

@@ -57,7 +57,8 @@ def test_energy_from_nowhere_is_judged_where_every_cycle_has_its_row(
     energy[1:, 0] += 0.5
     entries = manifest(setup={"kind": "hfts"}, period=period)
     free = np.tile([-0.6, 0.6], (rows, 1))
-    run = recording(step * np.arange(rows), entries, energy=energy, joint_pos=free, motor_pos=free)
+    time = step * np.arange(rows, dtype=np.float64)
+    run = recording(time, entries, energy=energy, joint_pos=free, motor_pos=free)
     assert summarise(run).numerics == verdict
 
 
