@@ -137,3 +137,15 @@ def test_the_residual_is_the_worst_drift_within_one_clean_stretch() -> None:
     assert np.flatnonzero(~clean_intervals(run)).tolist() == [7, 8, 9, 10]
     # 0.3 J before the stop and 0.25 J after it, over 2 J of kinetic energy.
     assert energy_residual(run, flows) == pytest.approx(0.3 / 2.0, abs=1e-12)
+
+
+@pytest.mark.parametrize(("share", "moves"), [(0.9e-6, False), (1.1e-6, True)])
+def test_a_leg_moves_from_a_millionth_of_its_weight_times_its_length_on(
+    share: float, moves: bool
+) -> None:
+    free = np.tile(posture(*FREE), (9, 1))
+    energy = np.ones((9, 2))
+    energy[:, 1] = 0.0
+    energy[4, 1] = share * 9.81 * PROTOTYPE.total_mass * PROTOTYPE.shank.length
+    run = recording(clock(9), HFTS, joint_pos=free, motor_pos=free, energy=energy)
+    assert np.isfinite(energy_residual(run, energy_flows(run))) == moves
