@@ -39,8 +39,14 @@ def served(
     seen = SimpleNamespace(wires=[], ready=[], told=[], asked=[])
     monkeypatch.setattr(emulate, "ask", lambda **kwargs: seen.asked.append(kwargs))
 
+    def now() -> float:
+        """A clock that shows 100 s at the beginning, and a second more with every poll."""
+        return 100.0 + sum(wire.polls for wire in seen.wires)
+
+    monkeypatch.setattr(emulate, "time", SimpleNamespace(monotonic=now))
+
     def report(at: float, node: str, state: str) -> None:
-        assert at >= 0.0
+        assert at == seen.wires[0].polls
         seen.told.append((seen.wires[0].polls, node, state))
         if fails:
             raise OSError("closed")
