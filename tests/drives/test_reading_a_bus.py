@@ -17,7 +17,7 @@ from legbench.commissioning.status import status
 from legbench.drives.emulated.drive import UNDER_VOLTAGE
 from legbench.drives.errors import BusError
 from legbench.drives.protocol.cia402 import DriveState
-from legbench.drives.setup.pdos import STATUSWORD, packed
+from legbench.drives.setup.pdos import STATUSWORD, PdoConfig, packed
 from legbench.limits.safety import SafetyLimits
 
 
@@ -67,6 +67,28 @@ def test_a_drive_with_one_encoder_shows_one() -> None:
     hip = MonitoredNode(replace(node(0), link=None, tpdos=plain))
     hip.take(frame(0x181, "3712" + QUARTER[:8]))
     assert hip.line().startswith("hip      silent           motor +1.5708 rad, 1237h: operation")
+
+
+def test_a_node_with_two_frames_of_process_data_is_shown_once_both_are_there() -> None:
+    entries = (STATUSWORD, node(0).motor_object, node(0).link_object)
+    two = (PdoConfig(number=1, objects=entries[:2]), PdoConfig(number=2, objects=entries[2:]))
+    hip = MonitoredNode(replace(node(0), tpdos=two))
+    hip.take(frame(0x181, "3712" + QUARTER[:8]))
+    hip.take(frame(0x281, QUARTER[8:]))
+    assert "motor +1.5708 rad, link +1.5708 rad, 1237h" in hip.line()
+
+
+def test_a_monitor_hears_drives_and_counts_error_frames_in_its_last_line() -> None:
+    session, _ = opened()
+    with session:
+        for one in BENCH.nodes:
+            session.bring_up().configure(one)  # From now on they send heartbeats.
+        port = session.port()
+        session.port = lambda: port
+        port.error_frames = 3
+        ((_, lines),) = monitor(session, seconds=0.05, every=0.05)
+    assert [line[:24] for line in lines] == ["motor1   pre operational", "motor2   pre operational"]
+    assert ["3 error frames" in line for line in lines] == [False, True]
 
 
 def test_a_monitor_tells_in_equal_times_until_its_end_and_sends_nothing() -> None:
@@ -138,6 +160,13 @@ def test_a_drive_in_fault_is_a_trouble_with_its_error(place: int) -> None:
     assert found.startswith(f"motor{place + 1} is in fault, 3220h under-voltage (0208h: fault")
 
 
+def test_a_mode_is_told_in_words() -> None:
+    session, _ = opened()
+    with session:
+        session.bring_up().configure(BENCH.nodes[1])
+        assert [one.mode for one in status(session)] == ["none", "cyclic synchronous position"]
+
+
 def test_a_drive_that_must_be_homed_and_is_not_is_a_trouble() -> None:
     nodes = (BENCH.nodes[0], replace(BENCH.nodes[1], homed=HOMED))
     session, _ = opened(replace(BENCH, nodes=nodes))
@@ -172,6 +201,22 @@ def test_a_scan_says_how_each_drive_fits_the_bus_file() -> None:
         # The profile of CiA 402 is in the lower word of 1000h.
         assert {one.device_type & 0xFFFF for one in found} == {0x0192}
         assert written(network) == []
+
+
+def test_a_scan_ends_with_its_last_node_and_one_that_answers_is_enough() -> None:
+    session, _ = alone(*BENCH.nodes)
+    port = session.port()
+    session.port = lambda: port
+    port.error_frames = 3
+    with session:
+        assert [one.node_id for one in scan(session, 1)] == [1]
+
+
+def test_two_drives_with_one_node_id_are_counted() -> None:
+    session, _ = alone(BENCH.nodes[0], serial(BENCH.nodes[0], 9))
+    with session:
+        (found,) = scan(session, 2)
+    assert (found.answers, found.verdict) == (2, "2 drives answer with this node id")
 
 
 def test_another_vendor_or_product_is_another_drive() -> None:
