@@ -126,10 +126,7 @@ def bench_shard() -> Result:
 
 
 def bench_memory() -> Result:
-    """Memory that a leg of a batch of distinct legs keeps once it is set up.
-
-    While it is set up each model is an object of MuJoCo's bindings, whose arrays take 100 KiB.
-    """
+    """Memory that a leg of a batch of distinct legs keeps once it is set up."""
     first = planned(PAPER).planned[0].experiment
     chosen = [
         replace(first, imperfections=Imperfections(stiffness_error=(1e-4 * leg, 0.0)))
