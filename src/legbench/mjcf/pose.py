@@ -4,10 +4,11 @@ import mujoco
 import numpy as np
 
 from legbench.design import LegDesign
+from legbench.design.rig import BOOM_BEND
 from legbench.kinematics import leg_points
 from legbench.signals import Floats
 
-BENT = np.array([-0.6, 0.6])
+BENT = np.array([-BOOM_BEND, BOOM_BEND])
 """Posture of the keyframe `bent` [rad]; qpos0 is the straight leg, where the loops are singular."""
 
 
