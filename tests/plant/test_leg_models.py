@@ -29,7 +29,8 @@ def test_each_leg_of_a_batch_runs_on_the_numbers_of_its_own_model(options: Build
     legs = [(each, options) for each in designs]
     legs[1] = designs[1], replace(options, friction=(0.02, 0.03))
     posture = standing(designs).joint_pos
-    made, start = batch_of(legs, designs, posture, threads=1)
+    made, model, start = batch_of(legs, designs, posture, threads=1)
+    assert np.array_equal(model.body_mass, bare_model(*legs[0]).body_mass)
     for place, (design, its) in enumerate(legs):
         wanted, found = bare_model(design, its, dry=True), made.get_model(place)
         for name in batch.MODEL_FIELDS:

@@ -79,8 +79,9 @@ class BatchPlant(AbstractPlant):
         options = replace(options, numerics=options.numerics.fitted(built, options.linkage))
         legs = [(leg, options.built(each)) for leg, each in zip(built, flaws, strict=True)]
         self.threads = threads or os.cpu_count() or 1
-        self._batch, self._start_qpos = batch_of(legs, designs, start.joint_pos, self.threads)
-        self.model = self._batch.model
+        self._batch, self.model, self._start_qpos = batch_of(
+            legs, designs, start.joint_pos, self.threads
+        )
         self._start = start
         self._servo = Servo(servo, PERIOD, flaws)
         self._errors, self._backlash = EncoderErrors(flaws, chosen), Backlash(flaws)

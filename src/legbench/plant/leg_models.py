@@ -17,8 +17,8 @@ Built = tuple[LegDesign, BuildOptions]
 
 def batch_of(
     built: Sequence[Built], designs: Sequence[LegDesign], joint_pos: Floats, threads: int
-) -> tuple[batch.Batch, Floats]:
-    """Make a batch of legs and the coordinates (n, nq) that put each at rest in its posture.
+) -> tuple[batch.Batch, mujoco.MjModel, Floats]:
+    """Make a batch of legs, with the first one's model and each one's coordinates at rest (n, nq).
 
     MuJoCo's bindings spend 95 KiB of arrays on a model, and a leg's own numbers are 1.5 KiB, so
     models are compiled one after another and only what differs from the first is kept.
@@ -43,7 +43,7 @@ def batch_of(
         _set_fields(made, legs, other, fields)
         for leg in legs:
             start[leg] = rest_qpos(other, designs[leg], joint_pos[leg])
-    return made, start
+    return made, model, start
 
 
 def _compiled(built: Sequence[Built]) -> Iterator[tuple[list[int], mujoco.MjModel]]:
