@@ -56,29 +56,28 @@ def _compiled(built: Sequence[Built]) -> Iterator[tuple[list[int], mujoco.MjMode
         yield legs, bare_model(*leg, dry=dry)
 
 
-def _filled_fields(model: mujoco.MjModel) -> dict[str, tuple[tuple[int, ...], bytes]]:
-    """Shape and content of every array of a model that holds something.
+def _filled_fields(model: mujoco.MjModel) -> dict[str, bytes]:
+    """Content of every array of a model that holds something.
 
     Names are no array, and the statistics take no part in the motion: solvers scale their
     tolerance by the inertia of the moment, not by the mean one (MuJoCo 4.0, `statistic`).
     """
     arrays = {name: getattr(model, name) for name in sorted(batch.MODEL_FIELDS) if "." not in name}
-    return {name: (array.shape, array.tobytes()) for name, array in arrays.items() if array.size}
+    return {name: array.tobytes() for name, array in arrays.items() if array.size}
 
 
 def _set_fields(
-    made: batch.Batch,
-    legs: Sequence[int],
-    model: mujoco.MjModel,
-    fields: dict[str, tuple[tuple[int, ...], bytes]],
+    made: batch.Batch, legs: Sequence[int], model: mujoco.MjModel, fields: dict[str, bytes]
 ) -> None:
-    """Give some legs of a batch the numbers of their model."""
-    for name, (shape, content) in fields.items():
+    """Give some legs of a batch the numbers in which their model differs from the first."""
+    for name, first in fields.items():
         array = getattr(model, name)
-        if array.shape != shape:
+        content = array.tobytes()
+        if content == first:
+            continue
+        if len(content) != len(first):
             raise ConfigError(
-                f"leg {legs[0]} of the batch has other parts than leg 0: MuJoCo's {name} has shape "
-                f"{array.shape} for {shape}; run it alone"
+                f"leg {legs[0]} of the batch has other parts than leg 0: MuJoCo's {name} takes "
+                f"{len(content)} bytes for {len(first)}; run it alone"
             )
-        if array.tobytes() != content:
-            made.expand(name)[legs] = array
+        made.expand(name)[legs] = array
