@@ -1,7 +1,7 @@
 """Three causes at once: what `legbench explain` does not search, over a bounded set of them.
 
-    scripts/explain_triples.py text       the step from 1.7 to 1.4 rad; two to four minutes of CPU
-    scripts/explain_triples.py caption    the step from 0.7 to 1.0 rad
+    scripts/explain_triples.py text       the step from 1.7 to 1.4 rad
+    scripts/explain_triples.py caption    the step from 0.7 to 1.0 rad; a minute of CPU
 
 Each triple joins a cause that couples the modes, one that lets the radial motion die faster or
 turn out another one, and any third. It is fitted to the six ratings and, unlike a pair, to the
