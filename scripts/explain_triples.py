@@ -2,6 +2,7 @@
 
     scripts/explain_triples.py text       the step from 1.7 to 1.4 rad
     scripts/explain_triples.py caption    the step from 0.7 to 1.0 rad; a minute of CPU
+    scripts/explain_triples.py flights    what small imperfections alone leave of the jump's ratings
 
 Each triple joins a cause that couples the modes, one that lets the radial motion die faster or
 turn out another one, and any third. It is fitted to the six ratings and, unlike a pair, to the
@@ -18,7 +19,7 @@ import numpy as np
 
 from legbench.design import LegDesign, load_design
 from legbench.design.setup import SetupKind
-from legbench.explain.causes import CAUSES, Cause
+from legbench.explain.causes import CAUSES, Cause, combined
 from legbench.explain.consistency import checks_of, only_counted, predict
 from legbench.explain.engine import rate_many
 from legbench.explain.fitting import DIFFERENCE, Fit, leg_of, rate
@@ -48,6 +49,19 @@ MARGIN = 0.005
 """Least distance that a fit seeks between two setups of which the paper rates one over [-]."""
 JUMPING, JUDGED = 40, 6
 """Numbers of fits that jump, and of those that are tried against everything."""
+
+SMALL: tuple[dict[str, float], ...] = (
+    {"stiffness-apart": 0.01},
+    {"stiffness-apart": -0.01},
+    {"stiffness-apart": 0.055},
+    {"damping": 0.5},
+    {"damping-apart": 0.3},
+    {"damping-apart": 1.0, "stiffness-apart": 0.055},
+    {"link-zero-polar": 0.002},
+    {"motor-zero-polar": 0.002},
+    {"shank-com": -0.01, "stiffness-apart": 0.055},
+)
+"""Sizes by cause, of legs that jump in `flights`."""
 
 Triple = tuple[Cause, ...]
 
@@ -136,8 +150,22 @@ def lowest(hop: Hop) -> float:
     return float(np.nan_to_num(min(hop.stance - 0.99, hop.flight - 0.97), nan=-1.0))
 
 
+def flights() -> int:
+    """Print the worst stance and flight of a jump of legs that are small ways from perfect."""
+    design = load_design(MODELS / "prototype.toml")
+    groups = [([CAUSES[name] for name in sizes], list(sizes.values())) for sizes in SMALL]
+    hops = hop_of(design, [combined(*group) for group in groups])
+    for (causes, sizes), hop in zip(groups, hops, strict=True):
+        named = zip(causes, sizes, strict=True)
+        words = " and ".join(f"{cause.words} ({cause.shown(size)})" for cause, size in named)
+        print(f"stance {hop.stance:.3f} flight {hop.flight:.3f}  {words}")
+    return 0
+
+
 def main() -> int:
     """Search and print."""
+    if sys.argv[1:] == ["flights"]:
+        return flights()
     if len(sys.argv) != 2 or sys.argv[1] not in ("text", "caption"):
         print(__doc__, file=sys.stderr)
         return 2
