@@ -1,0 +1,336 @@
+"""Hops of many legs by brute force: from an apex of the centre of mass to the next one.
+
+All hops of a batch take their steps together. Every step is looked at on its dense output, all
+conditions at ten places; a condition that may rise above zero and fall back between two looks is
+followed to its largest value. The earliest event of each hop ends its piece there.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from legbench.control import JumpConfig
+from legbench.design import LegDesign
+from legbench.signals import Floats, Ints
+from reference.conditions import (
+    CONTACT,
+    FALL,
+    FELL,
+    FELL_BACK,
+    LIMIT,
+    PUSH,
+    RISE,
+    TURN,
+    Conditions,
+)
+from reference.dop853 import Accuracy, Dense, attempt, dense
+from reference.lanes import Lanes
+from reference.law import NEVER, SCALE, Law, Settings, probes
+from reference.legs import GRAVITY, Legs, depth, foot, landed
+from reference.roots import largest, rising_roots
+
+BLIND = 2e-4
+"""Shortest stance or flight after an event [s]."""
+HORIZON = 2.0
+"""Time after which a leg without an apex stands [s]."""
+MOST_EVENTS = 400
+"""Largest number of events of ground and controller in a hop [-]."""
+SHORTEST = 1e-13
+"""Step below which the integration has failed [s]."""
+LONGEST, LONGEST_TOUCHED = 4e-3, 1e-3
+"""Longest steps, and those of a leg on a stop, whose time constant is 10 ms [s]."""
+SHARES = np.array([0.0, 0.02, *np.arange(1, 8) / 8.0, 0.98, 1.0])
+"""Places of a step that are looked at, close to its ends too, where an extreme may hide [-]."""
+DUE = 1e-12
+"""Value above which a condition holds already when a piece begins [rad]."""
+
+
+@dataclass(slots=True)
+class Story:
+    """What happened in a hop, in order."""
+
+    events: list[tuple[str, float]] = field(default_factory=list)
+    """Name and time [s] of every event of ground and controller."""
+    ending: str = ""
+    """One of `apex`, `stands`, `fell` and `fault`."""
+    apex: tuple[float, ...] = ()
+    """Height [m], speed [m/s], z1, z2 [rad] and their rates [rad/s] at the end of the hop; height
+    and speed are zero if the leg stands."""
+    pieces: int = 0
+    """Number of pieces of the hop [-]."""
+
+
+class Hops:
+    """A batch of hops.
+
+    Args:
+        designs: one for each hop.
+        settings: of the controllers.
+        starts: apexes (6, n): height [m], speed [m/s], z1, z2 [rad], dz1, dz2 [rad/s].
+        accuracy: tolerances of the integration.
+        longest: factor on the longest steps [-].
+    """
+
+    def __init__(
+        self,
+        designs: Sequence[LegDesign],
+        settings: Sequence[JumpConfig],
+        starts: Floats,
+        accuracy: Accuracy | None = None,
+        longest: float = 1.0,
+    ) -> None:
+        self.accuracy, self.longest = accuracy or Accuracy(), longest
+        found = [Settings.of(*pair) for pair in zip(settings, designs, strict=True)]
+        self.laws = [Law(each) for each in found]
+        self.stories = [Story() for _ in designs]
+        self.steps = 0
+        self._open = np.ones(len(designs), dtype=bool)
+        self.lanes = _launch(Legs.of(designs), probes(found), starts)
+        everyone = np.arange(len(designs))
+        for lane in everyone.tolist():
+            self._obey(lane)
+        self._begin(everyone)
+
+    def run(self) -> list[Story]:
+        """Follow all hops to their ends."""
+        while True:
+            open_ = self._open[self.lanes.number]
+            if not open_.any():
+                return self.stories
+            if np.count_nonzero(open_) < 0.8 * open_.size:
+                self.lanes = self.lanes.take(open_)
+            self._step()
+
+    def _step(self) -> None:
+        """Take one step of every hop, up to its first event."""
+        lanes = self.lanes
+        self.steps += lanes.number.size
+        end = self._ends()
+        limit = np.where(lanes.touched.any(axis=0), LONGEST_TOUCHED, LONGEST) * self.longest
+        step = np.minimum(np.minimum(lanes.step, limit), end - lanes.time)
+        whole = step >= end - lanes.time
+        tried = attempt(lanes.rates, lanes.y, step, self.accuracy)
+        factor = np.where(lanes.rejected & tried.accepted, np.minimum(tried.factor, 1.0), 1.0)
+        factor = np.where(factor < 1.0, factor, np.nan_to_num(tried.factor, nan=0.2))
+        cut = tried.accepted & (step < lanes.step)
+        inside = dense(lanes.rates, lanes.y, step, tried)
+        lane, what, share = self._events(inside, step, tried.accepted)
+        happens = np.zeros(step.size, dtype=bool)
+        happens[lane] = True
+        time = np.where(whole, end, lanes.time + step)
+        lanes.y = np.where(tried.accepted, tried.reached, lanes.y)
+        if lane.size:
+            lanes.y[:, lane] = inside.take(lane).at(share)
+            time[lane] = lanes.time[lane] + step[lane] * share
+        lanes.time = np.where(tried.accepted, time, lanes.time)
+        lanes.step = np.where(cut, np.maximum(lanes.step, step * factor), step * factor)
+        lanes.rejected = ~tried.accepted
+        arrived = np.flatnonzero(tried.accepted & whole & ~happens)
+        self._go_on(lane, what, arrived)
+        for failed in np.flatnonzero(lanes.rejected & (step < SHORTEST)).tolist():
+            self._finish(failed, "fault")
+
+    def _ends(self) -> Floats:
+        """Times at which the pieces end at the latest [s]."""
+        lanes = self.lanes
+        end = np.minimum(lanes.alarm, HORIZON)
+        end = np.where(lanes.time < lanes.blind, np.minimum(end, lanes.blind), end)
+        apex = self._apexes()
+        return np.where(apex >= lanes.time, np.minimum(end, apex), end)
+
+    def _apexes(self) -> Floats:
+        """Times at which the centre of mass is highest in a flight after lift-off [s]."""
+        lanes = self.lanes
+        return np.where(
+            lanes.flies & lanes.left, lanes.began + lanes.centre[1] / GRAVITY, -NEVER
+        )
+
+    def _events(self, inside: Dense, step: Floats, accepted: Floats) -> tuple[Ints, Ints, Floats]:
+        """First event of each lane that has one: lane, condition, share of the step."""
+        lanes = self.lanes
+        times = lanes.time + SHARES[:, np.newaxis] * step
+        seen = Conditions(lanes).at(inside.looks(SHARES), times)
+        before, after = seen[:, :-1], seen[:, 1:]
+        what, place, lane = np.nonzero((after > 0.0) & (before <= 0.0) & accepted)
+        low, high = SHARES[place], SHARES[place + 1]
+        left, middle, right = seen[:, :-2], seen[:, 1:-1], seen[:, 2:]
+        drop = middle - np.minimum(left, right)
+        peak = (middle >= left) & (middle >= right) & (middle <= 0.0) & (middle + drop > 0.0)
+        hidden = np.nonzero(peak & accepted)
+        if hidden[0].size:
+            more, began = hidden[2], SHARES[hidden[1]]
+            function = self._condition(inside, step, more, hidden[0])
+            top, value = largest(function, began, SHARES[hidden[1] + 2])
+            comes = value > 0.0
+            what = np.concatenate([what, hidden[0][comes]])
+            lane = np.concatenate([lane, more[comes]])
+            low, high = (
+                np.concatenate([low, began[comes]]),
+                np.concatenate([high, top[comes]]),
+            )
+        if not lane.size:
+            return lane, what, low
+        share = rising_roots(self._condition(inside, step, lane, what), low, high)
+        order = np.lexsort((what, share, lane))
+        first = order[np.unique(lane[order], return_index=True)[1]]
+        return lane[first], what[first], share[first]
+
+    def _condition(self, inside: Dense, step: Floats, lane: Ints, what: Ints):
+        """One condition of each of some lanes, as a function of the share of the step."""
+        lanes, part, step = self.lanes.take(lane), inside.take(lane), step[lane]
+        conditions, every = Conditions(lanes, what), np.arange(lane.size)
+
+        def at(share: Floats) -> Floats:
+            return conditions.at(part.at(share), lanes.time + share * step)[what, every]
+
+        return at
+
+    def _go_on(self, lane: Ints, what: Ints, arrived: Ints) -> None:
+        """Let happen what ends the pieces, and begin the next ones."""
+        self._switch(lane[what == CONTACT])
+        for one, condition in zip(lane.tolist(), what.tolist(), strict=True):
+            self._happen(one, condition)
+        for one in arrived.tolist():
+            self._arrive(one)
+        flipped = lane[what >= PUSH]
+        self._begin(np.concatenate([lane, arrived]), kept=flipped)
+
+    def _begin(self, some: Ints, kept: Ints | None = None) -> None:
+        """Begin pieces; what is due already happens at once. Stops of `kept` stay as switched."""
+        while some.size:
+            some = some[self._open[self.lanes.number[some]]]
+            self._decide(some if kept is None else np.setdiff1d(some, kept))
+            lanes = self.lanes.take(some)
+            seen = Conditions(lanes).at(lanes.y, lanes.time)
+            due = [seen[RISE] > DUE, seen[FALL] > DUE, seen[FELL] > DUE, seen[FELL_BACK] > DUE]
+            what = np.select(due, [RISE, FALL, FELL, FELL_BACK], -1)
+            contact = (what < 0) & (seen[CONTACT] >= 0.0)
+            rising = contact & lanes.flies & ~lanes.sinking()
+            self.lanes.blind[some[rising]] = lanes.time[rising] + BLIND
+            contact &= ~rising & (lanes.flies | (seen[CONTACT] > 0.0))
+            what = np.where(contact, CONTACT, what)
+            for one, condition in zip(some.tolist(), what.tolist(), strict=True):
+                if 0 <= condition != CONTACT:
+                    self._happen(one, condition)
+            self._switch(some[contact])
+            some, kept = some[what >= 0], None
+
+    def _decide(self, some: Ints) -> None:
+        """Let the law of the stops say which of them push."""
+        some = some[self.lanes.touched[:, some].any(axis=0)]
+        lanes = self.lanes.take(some)
+        self.lanes.pushing[:, some] = lanes.touched & (lanes.asked(lanes.y, by_law=True) > 0.0)
+
+    def _happen(self, lane: int, what: int) -> None:
+        """Handle one event of a lane, except its contact."""
+        lanes = self.lanes
+        number, time = int(lanes.number[lane]), float(lanes.time[lane])
+        law, story = self.laws[number], self.stories[number]
+        story.pieces += 1
+        y = self._reading(lane)
+        if what in (FELL, FELL_BACK):
+            self._finish(lane, "fell")
+        elif what == RISE:
+            self._note(lane, law.rise(time))
+        elif what == FALL:
+            self._note(lane, law.fall(time, y))
+        elif what == TURN:
+            law.extreme(y)
+            self._obey(lane)
+        elif LIMIT <= what < CONTACT:
+            lanes.touched[what - LIMIT, lane] ^= True
+        elif what >= PUSH:
+            lanes.pushing[what - PUSH, lane] ^= True
+
+    def _arrive(self, lane: int) -> None:
+        """Handle the end of a piece by time: alarm, apex, horizon, or the end of blindness."""
+        lanes, law = self.lanes, self.laws[self.lanes.number[lane]]
+        time = lanes.time[lane]
+        if time >= law.alarm:
+            self._note(lane, law.wake(self._reading(lane)))
+        elif time == self._apexes()[lane]:
+            self._finish(lane, "apex" if law.settled else "fault")
+        elif time >= HORIZON:
+            self._finish(lane, "stands")
+
+    def _note(self, lane: int, name: str) -> None:
+        """Add an event to the story, and do what the controller says."""
+        story = self.stories[self.lanes.number[lane]]
+        story.events.append((name, float(self.lanes.time[lane])))
+        if len(story.events) > MOST_EVENTS:
+            self._finish(lane, "fault")
+        self._obey(lane)
+
+    def _obey(self, lane: int) -> None:
+        lanes, law = self.lanes, self.laws[self.lanes.number[lane]]
+        lanes.upper[lane], lanes.lower[lane] = law.upper, law.lower
+        lanes.turning[lane], lanes.alarm[lane] = law.turning, law.alarm
+        lanes.motor[:, lane] = law.motor
+
+    def _reading(self, lane: int) -> float:
+        return float(self.lanes.probe[:, lane] @ self.lanes.y[:2, lane])
+
+    def _switch(self, some: Ints) -> None:
+        """Touchdown or lift-off of some lanes."""
+        if not some.size:
+            return
+        lanes = self.lanes
+        part = lanes.take(some)
+        height, forward, up = foot(part.legs, part.y)
+        speed = part.centre[1] - GRAVITY * (part.time - part.began)
+        after = landed(part.legs, part.y, np.array([part.centre[2], speed]))
+        lanes.y[2:, some] = np.where(part.flies, after, part.y[2:])
+        lanes.centre[:, some] = np.where(part.flies, part.centre, [-height, -up, -forward])
+        lanes.began[some] = np.where(part.flies, part.began, part.time)
+        lanes.left[some] |= ~part.flies
+        lanes.flies[some] = ~part.flies
+        lanes.blind[some] = part.time + BLIND
+        for entry, new in zip(lanes.form, part.legs.form(~part.flies), strict=True):
+            entry[some] = new
+        for lane, flew in zip(some.tolist(), part.flies.tolist(), strict=True):
+            self._note(lane, "touchdown" if flew else "liftoff")
+
+    def _finish(self, lane: int, ending: str) -> None:
+        lanes, story = self.lanes, self.stories[self.lanes.number[lane]]
+        q1, q2, v1, v2 = lanes.y[:, lane].tolist()
+        modal = (SCALE * x for x in (q1 + q2, q2 - q1, v1 + v2, v2 - v1))
+        height = speed = 0.0
+        if lanes.flies[lane]:
+            z, up, speed = lanes.centre[:, lane].tolist()
+            elapsed = float(lanes.time[lane] - lanes.began[lane])
+            height = z + (up - 0.5 * GRAVITY * elapsed) * elapsed
+        story.ending, story.apex = ending, (height, speed, *modal)
+        self._open[lanes.number[lane]] = False
+
+
+def _launch(legs: Legs, probe: Floats, starts: Floats) -> Lanes:
+    """Lanes at their first apexes."""
+    height, speed, z1, z2, dz1, dz2 = starts
+    size, none = height.size, np.zeros_like(height)
+    y = SCALE * np.array([z1 - z2, z1 + z2, dz1 - dz2, dz1 + dz2])
+    flies = np.ones(size, dtype=bool)
+    touched = np.array([depth(legs, stop, y) > 0.0 for stop in range(4)])
+    return Lanes(
+        number=np.arange(size),
+        legs=legs,
+        form=legs.form(flies),
+        probe=probe,
+        y=y,
+        time=none.copy(),
+        step=np.full(size, 1e-3),
+        rejected=~flies,
+        flies=flies,
+        left=~flies,
+        blind=np.full(size, -math.inf),
+        began=none.copy(),
+        centre=np.array([height, none, speed]),
+        touched=touched,
+        pushing=np.zeros_like(touched),
+        upper=none.copy(),
+        lower=none.copy(),
+        turning=np.zeros(size, dtype=np.int64),
+        alarm=none.copy(),
+        motor=np.zeros((2, size)),
+    )

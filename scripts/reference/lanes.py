@@ -1,0 +1,107 @@
+"""State of many hops that advance together.
+
+A lane is one hop. A piece of a hop runs from one event to the next; within it motors, regime and
+the switches of the stops stand still, so that the motion is smooth.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+
+from legbench.signals import Bools, Floats, Ints
+from reference.legs import GRAVITY, Form, Legs, acceleration, foot, rise, stopped
+
+
+
+@dataclass(slots=True, kw_only=True)
+class Lanes:
+    """Arrays of n lanes, which are the last axis of each."""
+
+    number: Ints
+    """Number of the hop in its batch [-]."""
+    legs: Legs
+    form: Form
+    """Inertia and gravity of the regime in which each leg is."""
+    probe: Floats
+    """Factors of the angles in y (2, n) [-]."""
+    y: Floats
+    """Angles and rates (4, n) [rad, rad/s]."""
+    time: Floats
+    """Time since the first apex [s]."""
+    step: Floats
+    """Length of the next step, before anything cuts it [s]."""
+    rejected: Bools
+    """Whether the last step was rejected."""
+    flies: Bools
+    """Whether the leg is in the air."""
+    left: Bools
+    """Whether the leg has lifted off since its first apex."""
+    blind: Floats
+    """Time until which touchdown and lift-off are not looked at [s]."""
+    began: Floats
+    """Time at which the flight began [s]."""
+    centre: Floats
+    """Height [m], upward and forward speed [m/s] of the centre of mass there (3, n)."""
+    touched: Bools
+    """Whether a joint is beyond a limit, in the order of `STOPS` (4, n)."""
+    pushing: Bools
+    """Whether the stop pushes (4, n)."""
+    upper: Floats
+    lower: Floats
+    """Levels of y [rad]."""
+    turning: Ints
+    """Kind of the extreme of y that is waited for: 1 minimum, -1 maximum, 0 none [-]."""
+    alarm: Floats
+    """Time at which the controller goes on by itself [s]."""
+    motor: Floats
+    """Motor positions (2, n) [rad]."""
+
+    def take(self, columns: Ints | Bools) -> Self:
+        """Some of the lanes, copied."""
+        return type(self)(**{name: _take(getattr(self, name), columns) for name in self.__slots__})
+
+    def rates(self, y: Floats) -> Floats:
+        """Time derivative of the states (4, n)."""
+        a = np.array(acceleration(self.legs, self.form, self.motor, y))
+        some = np.flatnonzero((self.touched & self.pushing).any(axis=0))
+        if some.size:
+            form = Form(*(entry[some] for entry in self.form))
+            legs, touched, acts = self.legs.take(some), self.touched[:, some], self.pushing[:, some]
+            _, pushed = stopped(legs, form, y[:, some], (a[0, some], a[1, some]), acts, touched)
+            a[:, some] = pushed
+        return np.concatenate([y[2:], a])
+
+    def height(self, y: Floats, time: Floats) -> Floats:
+        """Height of the foot in flight [m]."""
+        elapsed = time - self.began
+        z, up, _ = self.centre
+        return z + (up - 0.5 * GRAVITY * elapsed) * elapsed + foot(self.legs, y)[0]
+
+    def sinking(self) -> Bools:
+        """Whether the foot of a leg in flight goes down at present."""
+        speed = self.centre[1] - GRAVITY * (self.time - self.began)
+        return speed + foot(self.legs, self.y)[2] < 0.0
+
+    def pull(self, y: Floats) -> Floats:
+        """Condition of lift-off: the ground pulls, and the released foot would rise [m/s^2]."""
+        legs, along = self.legs, self.legs.arm()
+        bare = acceleration(legs, self.form, self.motor, y)
+        _, held = stopped(legs, self.form, y, bare, self.pushing, self.touched)
+        air = legs.air()
+        free = acceleration(legs, air, self.motor, y)
+        _, free = stopped(legs, air, y, free, None, self.touched)
+        return np.minimum(rise(along, y, held) - GRAVITY, rise(along, y, free) - GRAVITY)
+
+    def asked(self, y: Floats, *, by_law: bool = False) -> Floats:
+        """What each stop adds (4, ...); others act as switched, or by the law [rad/s^2]."""
+        bare = acceleration(self.legs, self.form, self.motor, y)
+        acts = None if by_law else self.pushing
+        return stopped(self.legs, self.form, y, bare, acts, self.touched)[0]
+
+
+def _take(value: Any, columns: Ints | Bools) -> Any:
+    """Columns of an array, or of each array of a tuple."""
+    if isinstance(value, tuple):
+        return type(value)(*(entry[..., columns] for entry in value))
+    return value[..., columns]
