@@ -111,4 +111,3 @@ def dense(rates: Rates, state: Floats, step: Floats, tried: Attempt) -> Dense:
     terms[:3] = change, first - change, 2.0 * change - (last + first)
     terms[3:] = (D @ flat).reshape(4, count, size) * step
     return Dense(state, terms)
-

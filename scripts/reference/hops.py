@@ -1,7 +1,7 @@
 """Hops of many legs by brute force: from an apex of the centre of mass to the next one.
 
 All hops of a batch take their steps together. Every step is looked at on its dense output, all
-conditions at ten places; a condition that may rise above zero and fall back between two looks is
+conditions at eight places; a condition that may rise above zero and fall back between two looks is
 followed to its largest value. The earliest event of each hop ends its piece there.
 """
 
@@ -41,7 +41,7 @@ SHORTEST = 1e-13
 """Step below which the integration has failed [s]."""
 LONGEST, LONGEST_TOUCHED = 4e-3, 1e-3
 """Longest steps, and those of a leg on a stop, whose time constant is 10 ms [s]."""
-SHARES = np.array([0.0, 0.02, *np.arange(1, 8) / 8.0, 0.98, 1.0])
+SHARES = np.array([0.0, 0.02, 0.2, 0.4, 0.6, 0.8, 0.98, 1.0])
 """Places of a step that are looked at, close to its ends too, where an extreme may hide [-]."""
 DUE = 1e-12
 """Value above which a condition holds already when a piece begins [rad]."""
@@ -143,9 +143,7 @@ class Hops:
     def _apexes(self) -> Floats:
         """Times at which the centre of mass is highest in a flight after lift-off [s]."""
         lanes = self.lanes
-        return np.where(
-            lanes.flies & lanes.left, lanes.began + lanes.centre[1] / GRAVITY, -NEVER
-        )
+        return np.where(lanes.flies & lanes.left, lanes.began + lanes.centre[1] / GRAVITY, -NEVER)
 
     def _events(self, inside: Dense, step: Floats, accepted: Floats) -> tuple[Ints, Ints, Floats]:
         """First event of each lane that has one: lane, condition, share of the step."""

@@ -13,6 +13,9 @@ from legbench.signals import Bools, Floats, Ints
 from reference.legs import GRAVITY, Form, Legs, acceleration, foot, rise, stopped
 
 
+NEAR = 0.3 * GRAVITY
+"""Contact force over mass below which the ground nearly pulls [m/s^2]."""
+
 
 @dataclass(slots=True, kw_only=True)
 class Lanes:
@@ -84,14 +87,24 @@ class Lanes:
         return speed + foot(self.legs, self.y)[2] < 0.0
 
     def pull(self, y: Floats) -> Floats:
-        """Condition of lift-off: the ground pulls, and the released foot would rise [m/s^2]."""
-        legs, along = self.legs, self.legs.arm()
+        """Condition of lift-off: the ground pulls, and the released foot would rise [m/s^2].
+
+        The second is computed for lanes alone whose ground pulls, or nearly so, at some of the
+        states; the condition is below zero elsewhere.
+        """
+        legs = self.legs
         bare = acceleration(legs, self.form, self.motor, y)
         _, held = stopped(legs, self.form, y, bare, self.pushing, self.touched)
-        air = legs.air()
-        free = acceleration(legs, air, self.motor, y)
-        _, free = stopped(legs, air, y, free, None, self.touched)
-        return np.minimum(rise(along, y, held) - GRAVITY, rise(along, y, free) - GRAVITY)
+        pull = rise(legs.arm(), y, held) - GRAVITY
+        near = np.flatnonzero((pull > -NEAR).reshape(-1, self.number.size).any(axis=0))
+        if near.size:
+            lanes, y = self.take(near), y[..., near]
+            air = lanes.legs.air()
+            free = acceleration(lanes.legs, air, lanes.motor, y)
+            _, free = stopped(lanes.legs, air, y, free, None, lanes.touched)
+            rising = rise(lanes.legs.arm(), y, free) - GRAVITY
+            pull[..., near] = np.minimum(pull[..., near], rising)
+        return pull
 
     def asked(self, y: Floats, *, by_law: bool = False) -> Floats:
         """What each stop adds (4, ...); others act as switched, or by the law [rad/s^2]."""

@@ -106,11 +106,7 @@ def difference(told: Told, story: Told) -> str:
     for index, ((name, time), (wanted, then)) in enumerate(pairs):
         if name == wanted and abs(time - then) < SAME_TIME:
             continue
-        if (
-            index
-            and told.events[index - 1][0] == name
-            and time - told.events[index - 1][1] < TWICE
-        ):
+        if index and told.events[index - 1][0] == name and time - told.events[index - 1][1] < TWICE:
             return "doubled"
         if name == wanted:
             return "late"
