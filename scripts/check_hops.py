@@ -3,9 +3,10 @@
     python scripts/check_hops.py [--count 100000] [--seed 0] [--tolerance 1e-9] [--out FILE]
 
 Every four hops are of a random leg with random settings, and every hop has a random start; leg and
-start depend on the number of the hop alone. Results are appended to a file block by
-block; the same command continues where an earlier one was stopped. Exit status 1 if an event is missed, doubled or false, or
-an error is above 1e-5 of the map's units, and hops beside that one do not differ themselves.
+start depend on the number of the hop alone. Results are appended to a file block by block, and the
+same command continues where an earlier one was stopped. Exit status 1 if an event is missed,
+doubled or false, or an error is above 1e-5 of the map's units, unless hops beside that one, by the
+reference alone, differ as much: that hop grazes a condition, which is named.
 """
 
 import argparse
@@ -26,11 +27,11 @@ from random_hops import (  # pyright: ignore[reportMissingImports]
     told,
     tools_of,
 )
+from reference.verdicts import judge
 
 from legbench.control import JumpConfig
 from legbench.design import LegDesign
 from legbench.signals import Floats
-from reference.verdicts import judge
 
 BOUND, MEDIAN = 1e-5, 1e-7
 """Largest error, and its median, in units of the map [-]."""
@@ -58,7 +59,7 @@ def block_of(first: int, count: int, tolerance: float) -> dict[str, Any]:
             case = random_case(np.random.default_rng(seed - seed % STARTS))
             tools = tools_of(case, tolerance)
         case = thrown(case, np.random.default_rng((1, seed)))
-        story = told(tools, case)
+        story = told(tools, case, mapped=seed % STARTS == 0)
         if story is not None:
             vector = case.start.vector()
             seeds.append(seed)

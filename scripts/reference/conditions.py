@@ -3,11 +3,11 @@
 from typing import final
 
 import numpy as np
-
-from legbench.signals import Bools, Floats, Ints
 from reference.lanes import Lanes
 from reference.law import NEVER
 from reference.legs import STOPS, depth
+
+from legbench.signals import Bools, Floats, Ints
 
 RISE, FALL, TURN, FELL, FELL_BACK, LIMIT, CONTACT, PUSH = 0, 1, 2, 3, 4, 5, 9, 10
 """Rows of the conditions: y rises through its upper level, falls through its lower one, or has the
@@ -33,8 +33,9 @@ class Conditions:
         contact = every if only is None else only == CONTACT
         push = every if only is None else only >= PUSH
         contact = contact & (lanes.time >= lanes.blind)
-        self._air = _Part(lanes, contact & lanes.flies)
+        self._air = contact & lanes.flies
         self._ground = _Part(lanes, contact & ~lanes.flies)
+        self._out = np.where(lanes.touched, -1.0, 1.0)
         self._stops = _Part(lanes, push & lanes.touched.any(axis=0))
 
     def at(self, y: Floats, time: Floats) -> Floats:
@@ -47,12 +48,9 @@ class Conditions:
         lean = y[0] + y[1]
         found[FELL], found[FELL_BACK] = lean - FALLEN, -lean - FALLEN
         for stop in range(len(STOPS)):
-            beyond = depth(lanes.legs, stop, y)
-            found[LIMIT + stop] = np.where(lanes.touched[stop], -beyond, beyond)
-        if (air := self._air).columns.size:
-            found[CONTACT][..., air.columns] = -air.lanes.height(
-                y[..., air.columns], time[..., air.columns]
-            )
+            found[LIMIT + stop] = self._out[stop] * depth(lanes.legs, stop, y)
+        if self._air.any():
+            found[CONTACT] = np.where(self._air, -lanes.height(y, time), -NEVER)
         if (ground := self._ground).columns.size:
             found[CONTACT][..., ground.columns] = ground.lanes.pull(y[..., ground.columns])
         if self._stops.columns.size:

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
-
-from legbench.signals import Bools, Floats, Ints
 from reference.legs import GRAVITY, Form, Legs, acceleration, foot, rise, stopped
 
+from legbench.signals import Bools, Floats, Ints
 
 NEAR = 0.3 * GRAVITY
 """Contact force over mass below which the ground nearly pulls [m/s^2]."""
@@ -66,14 +65,10 @@ class Lanes:
 
     def rates(self, y: Floats) -> Floats:
         """Time derivative of the states (4, n)."""
-        a = np.array(acceleration(self.legs, self.form, self.motor, y))
-        some = np.flatnonzero((self.touched & self.pushing).any(axis=0))
-        if some.size:
-            form = Form(*(entry[some] for entry in self.form))
-            legs, touched, acts = self.legs.take(some), self.touched[:, some], self.pushing[:, some]
-            _, pushed = stopped(legs, form, y[:, some], (a[0, some], a[1, some]), acts, touched)
-            a[:, some] = pushed
-        return np.concatenate([y[2:], a])
+        a = acceleration(self.legs, self.form, self.motor, y)
+        if self.touched.any():
+            _, a = stopped(self.legs, self.form, y, a, self.pushing, self.touched)
+        return np.array([y[2], y[3], *a])
 
     def height(self, y: Floats, time: Floats) -> Floats:
         """Height of the foot in flight [m]."""

@@ -38,7 +38,9 @@ class Form(NamedTuple):
     weight_2: Floats
     """Torque of gravity on q2 at sin(q2) = 1 [N m]."""
 
-    def solve(self, q: Floats, right_1: Floats, right_2: Floats) -> tuple[Floats, Floats]:
+    def solve(
+        self, q: Floats, right_1: Floats | float, right_2: Floats | float
+    ) -> tuple[Floats, Floats]:
         """Accelerations that two torques cause [rad/s^2]."""
         mixed = self.mixed * np.cos(q[0] - q[1])
         whole = self.first * self.second - mixed * mixed
@@ -156,20 +158,23 @@ def stopped(
     `b = 2 / (d T)` and `k = 1 / (d T^2)`. Stops act one after the other.
     """
     added = np.zeros((len(STOPS), *y.shape[1:]))
+    first, second = a[0].copy(), a[1].copy()
     for stop, (on_1, on_2, sign) in enumerate(STOPS):
-        if not touched[stop].any():
+        columns = np.flatnonzero(touched[stop])
+        if not columns.size:
             continue
-        beyond = depth(legs, stop, y)
-        speed = -sign * (on_1 * y[2] + on_2 * y[3])
-        own = sign * (on_1 * a[0] + on_2 * a[1])
-        back = (2.0 * speed + beyond / STOP_TIME) / STOP_TIME
-        more = back - STOP_SHARE * own
-        added[stop] = more
-        pushes = touched[stop] & (more > 0.0 if acts is None else acts[stop])
-        unit = form.solve(y, sign * on_1 * np.ones_like(y[0]), sign * on_2 * np.ones_like(y[0]))
+        part, z = Form(*(entry[columns] for entry in form)), y[..., columns]
+        beyond = sign * (legs.limits[stop, columns] - on_1 * z[0] - on_2 * z[1])
+        speed = -sign * (on_1 * z[2] + on_2 * z[3])
+        own = sign * (on_1 * first[..., columns] + on_2 * second[..., columns])
+        more = (2.0 * speed + beyond / STOP_TIME) / STOP_TIME - STOP_SHARE * own
+        added[stop][..., columns] = more
+        unit = part.solve(z, sign * on_1, sign * on_2)
+        pushes = more > 0.0 if acts is None else acts[stop, columns]
         force = np.where(pushes, more / (sign * (on_1 * unit[0] + on_2 * unit[1])), 0.0)
-        a = a[0] + unit[0] * force, a[1] + unit[1] * force
-    return added, a
+        first[..., columns] += unit[0] * force
+        second[..., columns] += unit[1] * force
+    return added, (first, second)
 
 
 def rise(along: Floats, y: Floats, a: tuple[Floats, Floats]) -> Floats:

@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
+from reference.dop853 import Accuracy
+from reference.hops import Hops, Story
 
 from legbench.control import JumpConfig
 from legbench.design import LegDesign
 from legbench.signals import Floats
-from reference.dop853 import Accuracy
-from reference.hops import Hops, Story
 
 UNITS = np.array([0.01, 0.1, 0.1, 0.1, 1.0, 1.0])
 """Units of the six numbers of an apex [m, m/s, rad, rad, rad/s, rad/s]."""
@@ -37,11 +37,19 @@ class Case(Protocol):
     """A leg, its controller, and where it starts."""
 
     @property
-    def design(self) -> LegDesign: ...
+    def design(self) -> LegDesign:
+        """Parameters of the leg."""
+        ...
+
     @property
-    def config(self) -> JumpConfig: ...
+    def config(self) -> JumpConfig:
+        """Settings of the controller."""
+        ...
+
     @property
-    def vector(self) -> Floats: ...
+    def vector(self) -> Floats:
+        """Apex at which the hop begins (6,)."""
+        ...
 
 
 class Told(Protocol):

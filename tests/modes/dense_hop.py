@@ -108,7 +108,7 @@ class DenseHop:
         for stop, past in zip(model.stops, beyond, strict=True):
             sign = -1.0 if past else 1.0
             conditions[f"{stop} {past}"] = lambda _, y, stop=stop, sign=sign: (
-                sign * stop.depth(_pairs(y)[0]) - 1e-12
+                sign * stop.depth(_pairs(y)[0]) - 1e-13
             )
             if past:
                 pushes = self._asked(stop, self.y)[0] > 0.0

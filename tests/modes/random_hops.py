@@ -195,19 +195,22 @@ def tools_of(case: Case, tolerance: float) -> Tools | None:
     return TaylorLeg(LegModel.of(case.design), probe=law.probe, tolerance=tolerance), law
 
 
-def told(tools: Tools | None, case: Case) -> Story | None:
-    """Story of the compiled leg, checked against the return map; None if it cannot begin."""
+def told(tools: Tools | None, case: Case, *, mapped: bool = True) -> Story | None:
+    """Story of the compiled leg; None if it cannot begin.
+
+    If `mapped`, the return map has to end as the story does, to the bit.
+    """
     if tools is None:
         return None
     leg, law = tools
-    try:
-        done = return_map(leg, law, case.start)
-    except LegbenchError:
+    if case.start.height + leg.course.foot_from_centre(case.start.angles()[0])[1] < 0.0:
         return None
     story = told_by_compiled(leg, law, case.start)
-    after = None if done.after is None else tuple(done.after.vector().tolist())
-    if str(done.ending) != story.ending or after not in (None, story.apex):
-        raise AssertionError(f"the map ends with {done}, its events with {story}")
+    if mapped:
+        done = return_map(leg, law, case.start)
+        after = story.apex if done.after is None else tuple(done.after.vector().tolist())
+        if str(done.ending) != story.ending or after != story.apex:
+            raise AssertionError(f"the map ends with {done}, its events with {story}")
     return story
 
 
