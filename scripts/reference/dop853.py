@@ -21,7 +21,7 @@ STAGES, EXTENDED = table.N_STAGES, table.N_STAGES_EXTENDED
 A, B, E3, E5, D = table.A, table.B, table.E3, table.E5, table.D
 """Published coefficients; the last three rows of A are the stages of dense output [-]."""
 SAFETY, SLOWEST, FASTEST = 0.9, 0.2, 10.0
-"""Factor below the step that the error allows, and the smallest and largest change of a step [-]."""
+"""Factor below the step that the error allows, and smallest and largest change of a step [-]."""
 
 
 class Accuracy(NamedTuple):

@@ -62,7 +62,7 @@ def _model_leg(name: str) -> LegDesign:
 
 
 def random_leg(random: np.random.Generator) -> LegDesign:
-    """A leg with other lengths, masses, springs, dampers and limits than a model; rarely the model."""
+    """A leg with other lengths, masses, springs, dampers and limits than a model, or the model."""
     base = _model_leg(NAMES[random.integers(len(NAMES))])
     if random.uniform() < 0.1:
         return base
