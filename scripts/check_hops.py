@@ -13,7 +13,6 @@ import argparse
 import json
 import sys
 import time
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -29,25 +28,12 @@ from random_hops import (  # pyright: ignore[reportMissingImports]
 )
 from reference.verdicts import judge
 
-from legbench.control import JumpConfig
-from legbench.design import LegDesign
-from legbench.signals import Floats
-
 BOUND, MEDIAN = 1e-5, 1e-7
 """Largest error, and its median, in units of the map [-]."""
 BLOCK = 4000
 """Hops that are integrated together, and written together [-]."""
 STARTS = 4
 """Hops of each random leg [-]."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Case:
-    """A leg, its controller, and where it starts."""
-
-    design: LegDesign
-    config: JumpConfig
-    vector: Floats
 
 
 def block_of(first: int, count: int, tolerance: float) -> dict[str, Any]:
@@ -61,9 +47,8 @@ def block_of(first: int, count: int, tolerance: float) -> dict[str, Any]:
         case = thrown(case, np.random.default_rng((1, seed)))
         story = told(tools, case, mapped=seed % STARTS == 0)
         if story is not None:
-            vector = case.start.vector()
             seeds.append(seed)
-            cases.append(Case(design=case.design, config=case.config, vector=vector))
+            cases.append(case)
             stories.append(story)
     errors, remarks = [], []
     for seed, verdict in zip(seeds, judge(cases, stories), strict=True):

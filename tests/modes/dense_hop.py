@@ -271,7 +271,7 @@ class DenseHop:
 
 def _root(at: Any, begin: float, end: float) -> float:
     solve: Any = brentq
-    return float(solve(at, begin, end, xtol=1e-14, rtol=1e-14))
+    return float(solve(at, begin, end, xtol=1e-16, rtol=1e-15))
 
 
 def _pairs(y: Sequence[float]) -> tuple[tuple[float, float], tuple[float, float]]:

@@ -1,4 +1,4 @@
-"""Random disturbed hops of random legs, told by the compiled leg and by DOP853."""
+"""Random disturbed hops of random legs, told by the compiled leg."""
 
 import math
 from dataclasses import dataclass, replace
@@ -6,8 +6,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from dense_hop import DenseHop, Story  # pyright: ignore[reportMissingImports]
-from dense_rules import Rules  # pyright: ignore[reportMissingImports]
+from dense_hop import Story  # pyright: ignore[reportMissingImports]
 
 from legbench.analytic import LegModel, Regime
 from legbench.analytic.course import Course
@@ -16,21 +15,13 @@ from legbench.control import JumpConfig
 from legbench.design import LegDesign, Limits, Segment, load_design
 from legbench.errors import LegbenchError, PlantFault
 from legbench.modes.drive import JumpLaw
-from legbench.modes.fixed_point import UNITS
 from legbench.modes.hop import CALLS, FALLEN, HORIZON, Apex, return_map
+from legbench.signals import Floats
 
 MODELS = Path(__file__).parents[2] / "models"
 NAMES = ("prototype", "optimal", "table2")
-NEIGHBOUR = 1e-7
-"""Size of the disturbances that tell a hop that grazes, in the map's units [-]."""
-STEEP = 1e3
-"""Growth of such a disturbance in one hop beyond which a condition has been grazed [-]."""
-LOOKS_APART = (4e-3, 4e-4)
-"""Longest steps of DOP853: what it tells on the first is told on the second if it differs [s]."""
 WILD = (0.0, 1.0, 1.0, 3.0, 6.0)
 """Factors on lean, speed and rates of a start; each is as likely [-]."""
-SAME_TIME = 1e-6
-"""Largest difference between two times of one event [s]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,19 +32,10 @@ class Case:
     config: JumpConfig
     start: Apex
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Verdict:
-    """How two stories of a hop compare."""
-
-    same: bool
-    """Whether the same happened in the same order at the same times, with the same ending."""
-    error: float
-    """Largest difference of the apexes, in the map's units; 0 if none was reached [-]."""
-    grazes: bool
-    """Whether DOP853 tells hops beside this one in another way, or far apart."""
-    why: str
-    """The two stories, where they differ."""
+    @property
+    def vector(self) -> Floats:
+        """The start as an array (6,)."""
+        return self.start.vector()
 
 
 @cache
@@ -212,60 +194,3 @@ def told(tools: Tools | None, case: Case, *, mapped: bool = True) -> Story | Non
         if str(done.ending) != story.ending or after != story.apex:
             raise AssertionError(f"the map ends with {done}, its events with {story}")
     return story
-
-
-def compare(case: Case, tolerance: float) -> Verdict | None:
-    """Both stories of a hop; None where the case cannot begin."""
-    story, model = told(tools_of(case, tolerance), case), LegModel.of(case.design)
-    if story is None:
-        return None
-    doubtful, wrong, error, other = True, False, 0.0, Story()
-    for longest in LOOKS_APART:  # coarse looks may miss a turn that comes and goes between them
-        other = _dense(case, model, case.start, longest)
-        wrong = not _same(story, other)
-        error = _apart(story, other)
-        doubtful = wrong or error > 1e-6
-        if not doubtful:
-            break
-    return Verdict(
-        same=not wrong,
-        error=error,
-        grazes=doubtful and _grazes(case, model, other),
-        why=f"{story}\n{other}" if doubtful else "",
-    )
-
-
-def _same(one: Story, other: Story) -> bool:
-    if one.ending != other.ending or len(one.events) != len(other.events):
-        return False
-    return all(
-        first == second and abs(at - then) < SAME_TIME
-        for (first, at), (second, then) in zip(one.events, other.events, strict=True)
-    )
-
-
-def _apart(one: Story, other: Story) -> float:
-    if one.ending != "apex" or other.ending != "apex":
-        return 0.0
-    return float(np.max(np.abs(np.subtract(one.apex, other.apex)) / UNITS))
-
-
-def _grazes(case: Case, model: LegModel, story: Story) -> bool:
-    """Whether DOP853 tells hops beside this one in another way, or far apart."""
-    names = [name for name, _ in story.events]
-    for row in np.vstack([np.eye(6), -np.eye(6)]):
-        start = Apex.of(case.start.vector() + NEIGHBOUR * row * UNITS)
-        beside = _dense(case, model, start)
-        if [name for name, _ in beside.events] != names or beside.ending != story.ending:
-            return True
-        if _apart(story, beside) > STEEP * NEIGHBOUR:
-            return True
-        for (_, at), (_, then) in zip(story.events, beside.events, strict=True):
-            if abs(at - then) > STEEP * NEIGHBOUR:
-                return True
-    return False
-
-
-def _dense(case: Case, model: LegModel, start: Apex, longest: float = 4e-4) -> Story:
-    rules = Rules(case.config, case.design)
-    return DenseHop(model, rules, longest).run(start.height, start.speed, *start.angles())
