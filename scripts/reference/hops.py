@@ -1,11 +1,8 @@
 """Hops of many legs by brute force: from an apex of the centre of mass to the next one.
 
-All hops of a batch take their steps together. Every step is looked at on its dense output, all
-conditions at seven places; a condition that may rise above zero and fall back between two looks is
-followed to its largest value. The earliest event of each hop ends its piece there.
+All hops of a batch take their steps together, and the earliest event of each ends its piece.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -22,11 +19,11 @@ from reference.conditions import (
     TURN,
     Conditions,
 )
-from reference.dop853 import Accuracy, Dense, attempt, dense
-from reference.lanes import Lanes
+from reference.dop853 import SLOWEST, Accuracy, attempt, dense
+from reference.events import first_events
+from reference.lanes import launch
 from reference.law import SCALE, Law, Settings, probes
-from reference.legs import GRAVITY, Legs, depth, foot, landed
-from reference.roots import largest, rising_roots
+from reference.legs import GRAVITY, Legs, foot, landed
 
 from legbench.control import JumpConfig
 from legbench.design import LegDesign
@@ -42,8 +39,6 @@ SHORTEST = 1e-13
 """Step below which the integration has failed [s]."""
 LONGEST, LONGEST_TOUCHED = 8e-3, 2e-3
 """Longest steps, and those of a leg on a stop, whose time constant is 10 ms [s]."""
-SHARES = np.array([0.0, 0.02, 0.25, 0.5, 0.75, 0.98, 1.0])
-"""Places of a step that are looked at, close to its ends too, where an extreme may hide [-]."""
 DUE = 1e-12
 """Value above which a condition holds already when a piece begins [rad]."""
 
@@ -88,7 +83,7 @@ class Hops:
         self.stories = [Story() for _ in designs]
         self.steps = 0
         self._open = np.ones(len(designs), dtype=bool)
-        self.lanes = _launch(Legs.of(designs), probes(found), starts)
+        self.lanes = launch(Legs.of(designs), probes(found), starts)
         everyone = np.arange(len(designs))
         for lane in everyone.tolist():
             self._obey(lane)
@@ -113,11 +108,11 @@ class Hops:
         step = np.minimum(np.minimum(lanes.step, limit), end - lanes.time)
         whole = step >= end - lanes.time
         tried = attempt(lanes.rates, lanes.y, step, self.accuracy)
-        factor = np.where(lanes.rejected & tried.accepted, np.minimum(tried.factor, 1.0), 1.0)
-        factor = np.where(factor < 1.0, factor, np.nan_to_num(tried.factor, nan=0.2))
+        factor = np.nan_to_num(tried.factor, nan=SLOWEST)
+        factor = np.where(lanes.rejected, np.minimum(factor, 1.0), factor)
         cut = tried.accepted & (step < lanes.step)
         inside = dense(lanes.rates, lanes.y, step, tried)
-        lane, what, share = self._events(inside, step, tried.accepted)
+        lane, what, share = first_events(lanes, inside, step, tried.accepted)
         happens = np.zeros(step.size, dtype=bool)
         happens[lane] = True
         time = np.where(whole, end, lanes.time + step)
@@ -145,46 +140,6 @@ class Hops:
     def _apex(self, lane: int | slice) -> Any:
         """Times at which the centres of mass are highest, if the legs are in flight [s]."""
         return self.lanes.began[lane] + self.lanes.centre[1, lane] / GRAVITY
-
-    def _events(self, inside: Dense, step: Floats, accepted: Floats) -> tuple[Ints, Ints, Floats]:
-        """First event of each lane that has one: lane, condition, share of the step."""
-        lanes = self.lanes
-        times = lanes.time + SHARES[:, np.newaxis] * step
-        seen = Conditions(lanes).at(inside.looks(SHARES), times)
-        before, after = seen[:, :-1], seen[:, 1:]
-        what, place, lane = np.nonzero((after > 0.0) & (before <= 0.0) & accepted)
-        low, high = SHARES[place], SHARES[place + 1]
-        left, middle, right = seen[:, :-2], seen[:, 1:-1], seen[:, 2:]
-        drop = middle - np.minimum(left, right)
-        peak = (middle >= left) & (middle >= right) & (middle <= 0.0) & (middle + drop > 0.0)
-        hidden = np.nonzero(peak & accepted)
-        if hidden[0].size:
-            more, began = hidden[2], SHARES[hidden[1]]
-            function = self._condition(inside, step, more, hidden[0])
-            top, value = largest(function, began, SHARES[hidden[1] + 2])
-            comes = value > 0.0
-            what = np.concatenate([what, hidden[0][comes]])
-            lane = np.concatenate([lane, more[comes]])
-            low, high = (
-                np.concatenate([low, began[comes]]),
-                np.concatenate([high, top[comes]]),
-            )
-        if not lane.size:
-            return lane, what, low
-        share = rising_roots(self._condition(inside, step, lane, what), low, high)
-        order = np.lexsort((what, share, lane))
-        first = order[np.unique(lane[order], return_index=True)[1]]
-        return lane[first], what[first], share[first]
-
-    def _condition(self, inside: Dense, step: Floats, lane: Ints, what: Ints):
-        """One condition of each of some lanes, as a function of the share of the step."""
-        lanes, part, step = self.lanes.take(lane), inside.take(lane), step[lane]
-        conditions, every = Conditions(lanes, what), np.arange(lane.size)
-
-        def at(share: Floats) -> Floats:
-            return conditions.at(part.at(share), lanes.time + share * step)[what, every]
-
-        return at
 
     def _go_on(self, lane: Ints, what: Ints, arrived: Ints) -> None:
         """Let happen what ends the pieces, and begin the next ones."""
@@ -302,34 +257,3 @@ class Hops:
             height = z + (up - 0.5 * GRAVITY * elapsed) * elapsed
         story.ending, story.apex = ending, (height, speed, *modal)
         self._open[lanes.number[lane]] = False
-
-
-def _launch(legs: Legs, probe: Floats, starts: Floats) -> Lanes:
-    """Lanes at their first apexes."""
-    height, speed, z1, z2, dz1, dz2 = starts
-    size, none = height.size, np.zeros_like(height)
-    y = SCALE * np.array([z1 - z2, z1 + z2, dz1 - dz2, dz1 + dz2])
-    flies = np.ones(size, dtype=bool)
-    touched = np.array([depth(legs, stop, y) > 0.0 for stop in range(4)])
-    return Lanes(
-        number=np.arange(size),
-        legs=legs,
-        form=legs.form(flies),
-        probe=probe,
-        y=y,
-        time=none.copy(),
-        step=np.full(size, 1e-3),
-        rejected=~flies,
-        flies=flies,
-        left=~flies,
-        blind=np.full(size, -math.inf),
-        began=none.copy(),
-        centre=np.array([height, none, speed]),
-        touched=touched,
-        pushing=np.zeros_like(touched),
-        upper=none.copy(),
-        lower=none.copy(),
-        turning=np.zeros(size, dtype=np.int64),
-        alarm=none.copy(),
-        motor=np.zeros((2, size)),
-    )

@@ -4,11 +4,13 @@ A lane is one hop. A piece of a hop runs from one event to the next; within it m
 the switches of the stops stand still, so that the motion is smooth.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
-from reference.legs import GRAVITY, Form, Legs, acceleration, foot, rise, stopped
+from reference.law import SCALE
+from reference.legs import GRAVITY, STOPS, Form, Legs, acceleration, depth, foot, rise, stopped
 
 from legbench.signals import Bools, Floats, Ints
 
@@ -113,3 +115,34 @@ def _take(value: Any, columns: Ints | Bools) -> Any:
     if isinstance(value, tuple):
         return type(value)(*(entry[..., columns] for entry in value))
     return value[..., columns]
+
+
+def launch(legs: Legs, probe: Floats, starts: Floats) -> Lanes:
+    """Lanes at their first apexes."""
+    height, speed, z1, z2, dz1, dz2 = starts
+    size, none = height.size, np.zeros_like(height)
+    y = SCALE * np.array([z1 - z2, z1 + z2, dz1 - dz2, dz1 + dz2])
+    flies = np.ones(size, dtype=bool)
+    touched = np.array([depth(legs, stop, y) > 0.0 for stop in range(len(STOPS))])
+    return Lanes(
+        number=np.arange(size),
+        legs=legs,
+        form=legs.form(flies),
+        probe=probe,
+        y=y,
+        time=none.copy(),
+        step=np.full(size, 1e-3),
+        rejected=~flies,
+        flies=flies,
+        left=~flies,
+        blind=np.full(size, -math.inf),
+        began=none.copy(),
+        centre=np.array([height, none, speed]),
+        touched=touched,
+        pushing=np.zeros_like(touched),
+        upper=none.copy(),
+        lower=none.copy(),
+        turning=np.zeros(size, dtype=np.int64),
+        alarm=none.copy(),
+        motor=np.zeros((2, size)),
+    )

@@ -19,6 +19,7 @@ from reference.dop853 import (  # pyright: ignore[reportMissingImports]
     attempt,
     dense,
 )
+from reference.events import first_events  # pyright: ignore[reportMissingImports]
 from reference.hops import Hops, Story  # pyright: ignore[reportMissingImports]
 from reference.roots import largest, rising_roots  # pyright: ignore[reportMissingImports]
 from reference.verdicts import UNITS, difference  # pyright: ignore[reportMissingImports]
@@ -103,8 +104,7 @@ def test_roots_and_largest_values_are_found_in_each_bracket() -> None:
 
 
 def test_a_level_that_is_crossed_between_two_looks_is_found() -> None:
-    hops = batch()
-    lanes = hops.lanes
+    lanes = batch().lanes
     size, step = lanes.number.size, np.full(len(SEEDS), 1e-2)
     # The reading rises as x (1 - x) along the step, to 0.25 halfway between its ends.
     terms = np.zeros((7, 4, size))
@@ -113,7 +113,7 @@ def test_a_level_that_is_crossed_between_two_looks_is_found() -> None:
     start[:2] = -0.5 * terms[1, :2] + [[-0.5], [0.5]]
     level = np.sum(lanes.probe * start[:2], axis=0) + 0.25
     lanes.upper = level - np.array([1e-6, -1e-6, 1e-6, -1e-6])
-    lane, what, share = hops._events(Dense(start, terms), step, np.ones(size, dtype=bool))
+    lane, what, share = first_events(lanes, Dense(start, terms), step, np.ones(size, dtype=bool))
     assert lane.tolist() == [0, 2]
     assert what.tolist() == [0, 0]
     assert np.allclose(share, 0.5 - 1e-3, rtol=0.0, atol=1e-6)
