@@ -52,15 +52,14 @@ def random_map(number: int, points: int) -> Question:
         tools = tools_of(case, TOLERANCE)
         if tools is None:
             continue
+        leg, law = tools
         try:
-            found = fixed_point(*tools, settle(*tools, case.start, SETTLING)[-1])
+            found = fixed_point(leg, law, settle(leg, law, case.start, SETTLING)[-1])
         except LegbenchError:
             continue
         if abs(found.multipliers[0]) < STABLE:
-            pair = PAIRS[number % len(PAIRS)]
-            return question_around(
-                case.design, case.config, found.apex, pair, points, random, SPANS
-            )
+            pair, design = PAIRS[number % len(PAIRS)], case.design
+            return question_around(design, case.config, found.apex, pair, points, random, SPANS)
     raise SystemExit(f"map {number}: no leg with a stable hop in 1000")
 
 

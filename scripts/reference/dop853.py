@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate._ivp import dop853_coefficients as table
 
-from legbench.signals import Bools, Floats
+from legbench.signals import Bools, Floats, Ints
 
 Rates = Callable[[Floats], Floats]
 """Time derivative of the states (m, n) of n problems that do not depend on time themselves."""
@@ -72,7 +72,7 @@ class Dense(NamedTuple):
         moved = weights @ self.terms.reshape(len(self.terms), count * size)
         return self.start[:, np.newaxis] + moved.reshape(-1, count, size).swapaxes(0, 1)
 
-    def take(self, columns: Floats) -> "Dense":
+    def take(self, columns: Ints) -> "Dense":
         """Interpolant of some of the problems."""
         return Dense(self.start[:, columns], self.terms[:, :, columns])
 

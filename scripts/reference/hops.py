@@ -106,7 +106,7 @@ class Hops:
         end = self._ends()
         limit = np.where(lanes.touched.any(axis=0), LONGEST_TOUCHED, LONGEST) * self.longest
         step = np.minimum(np.minimum(lanes.step, limit), end - lanes.time)
-        whole = step >= end - lanes.time
+        whole = lanes.time + step >= end
         tried = attempt(lanes.rates, lanes.y, step, self.accuracy)
         factor = np.nan_to_num(tried.factor, nan=SLOWEST)
         factor = np.where(lanes.rejected, np.minimum(factor, 1.0), factor)
@@ -244,6 +244,8 @@ class Hops:
         for entry, new in zip(lanes.form, part.legs.form(~part.flies), strict=True):
             entry[some] = new
         for lane, flew in zip(some.tolist(), part.flies.tolist(), strict=True):
+            # An impact changes the rates at once, and may be the extreme of y itself.
+            self.laws[lanes.number[lane]].extreme(self._reading(lane))
             self._note(lane, "touchdown" if flew else "liftoff")
 
     def _finish(self, lane: int, ending: str) -> None:

@@ -118,7 +118,7 @@ class Law:
                 return "unloaded"
 
     def extreme(self, y: float) -> None:
-        """Handle a maximum of y in compression, or a minimum in the push."""
+        """Handle what may be the largest y of a compression, or the smallest of a push."""
         if self.phase == "compress":
             self.lower = max(self.lower, y - self.settings.turn)
         elif self.phase == "push":

@@ -13,7 +13,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from legbench.design import LegDesign
-from legbench.signals import Bools, Floats
+from legbench.signals import Bools, Floats, Ints
 
 GRAVITY = 9.81
 """Acceleration of gravity [m/s^2]."""
@@ -106,7 +106,7 @@ class Legs(NamedTuple):
             limits=np.array([[*d.limits.knee, *d.limits.hip] for d in designs]).T,
         )
 
-    def take(self, columns: Floats | Bools) -> Self:
+    def take(self, columns: Ints | Bools) -> Self:
         """Constants of some of the legs."""
         return type(self)(*(entry[..., columns] for entry in self))
 

@@ -126,6 +126,29 @@ def test_a_condition_that_holds_already_is_an_event_at_once() -> None:
     assert course.time == 0.0
 
 
+def test_an_impact_that_turns_the_probe_is_a_turning_point() -> None:
+    model, random = LegModel.of(design_of("optimal")), np.random.default_rng(5)
+    course, turns, wanted = Course(model, probe=PROBE), [0, 0], Levels(turns=True)
+
+    def rate() -> float:
+        return PROBE[0] * course.v[0] + PROBE[1] * course.v[1]
+
+    for _ in range(40):
+        q = (-0.5, float(random.uniform(0.4, 0.6)))
+        v1, v2 = (float(x) for x in random.normal(0.0, 4.0, 2))
+        height = 0.004 - model.foot_from_hip(q)[1] + model.mass_centre_from_hip(q)[1]
+        course.fly(q, (v1, v2), (0.0, height), (0.2, -0.8))
+        course.hold((-0.5, 0.5))
+        while course.go(0.2, wanted) is not Watched.CONTACT:
+            pass
+        touchdown, before = course.time, rate()
+        course.switch()
+        turned = before * rate() < 0.0
+        turns[turned] += 1
+        assert (course.go(0.2, wanted) is Watched.TURN and course.time == touchdown) == turned
+    assert min(turns) >= 5
+
+
 def test_a_leg_that_swings_over_between_two_events_has_fallen() -> None:
     design = design_of("optimal")
     held = Passive((-0.5, 0.5))
