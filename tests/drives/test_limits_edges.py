@@ -166,3 +166,18 @@ def test_bounds_are_the_limits_of_motion_and_the_period() -> None:
         standing=0.02,
         sway=0.05,
     )
+
+
+def test_a_limit_beyond_its_upper_end_is_refused_unless_it_is_waived_by_its_name() -> None:
+    assert str(refusal(SafetyLimits, lost_frames=51)).startswith("lost_frames is 51 cycles, the ")
+    assert SafetyLimits(lost_frames=51, waive=("lost_frames",)).lost_frames == 51
+    told = refusal(SafetyLimits, waive=("lost frames",))
+    assert str(told).startswith("waive in the limits file names 'lost frames'; it takes each of")
+
+
+def test_a_design_with_another_number_of_angles_is_refused() -> None:
+    for angles in ([ENDLESS], [ENDLESS] * 3):
+        with pytest.raises(ValueError, match="zip"):
+            SafetyLimits().check_within(angles, [ENDLESS] * 2)
+        with pytest.raises(ValueError, match="zip"):
+            SafetyLimits().check_within([ENDLESS] * 2, angles)
