@@ -7,6 +7,7 @@ A stage that fails ends it: hopeless data are not fitted, and what cannot be see
 """
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -27,6 +28,7 @@ from legbench.identify.outcome import Outcome
 from legbench.identify.parameters import INDEX, Freedom
 from legbench.identify.prediction import Guess, nothing_moved
 from legbench.identify.problem import Misfit, Problem
+from legbench.identify.regression import regressed
 from legbench.identify.spread import spread_of
 from legbench.identify.trial import Trial
 from legbench.identify.verdict import reasons_against
@@ -57,7 +59,7 @@ class Question:
     bars: Bars | None = None
     """Bars of the linkage; none: they weigh nothing."""
     starts: int = 3
-    """Number of starts of the fit, the first from the design."""
+    """Number of starts of the fit: from the design, from a regression, and from legs beside it."""
     seed: int = 0
     """Source of the further starts."""
 
@@ -150,14 +152,26 @@ def _findings(question: Question, leg: Leg) -> list[Finding]:
 
 
 def fits_from(problem: Problem, guess: Guess, starts: int, seed: int = 0) -> list[Fit]:
-    """Fits from a guess and from legs beside it; raises PlantFault where the first cannot be."""
+    """Fits from a guess, from what a regression makes of the runs, and from legs beside it.
+
+    Args:
+        problem: the runs, and what is free.
+        guess: first start; further ones are beside the second, which hardly depends on it.
+        starts: number of starts.
+        seed: source of those that are drawn.
+
+    Raises:
+        PlantFault: no leg can be predicted from the guess.
+    """
     found = [fit(problem, guess)]
+    near = regressed(problem.trials, guess, problem.freedom, problem.reach) or guess
     random = np.random.default_rng(seed)
-    for _ in range(starts - 1):
-        try:
-            found.append(fit(problem, beside(guess, problem.freedom, problem.reach, random, APART)))
-        except PlantFault:
-            continue
+    for place in range(starts - 1):
+        other = near
+        if place or near is guess:
+            other = beside(near, problem.freedom, problem.reach, random, APART)
+        with suppress(PlantFault):
+            found.append(fit(problem, other))
     return found
 
 
