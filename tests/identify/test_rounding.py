@@ -87,7 +87,7 @@ def test_derivatives_by_hidden_angles_are_those_of_finite_differences(
 
 
 def test_each_stand_has_an_angle_of_its_own_and_motion_has_one(steps: tuple[Trial, ...]) -> None:
-    ramp = 1e-2 * np.arange(100)
+    ramp = np.linspace(0.0, 0.99, 100)
     motors = np.concatenate([np.zeros(60), ramp, np.full(70, 1.0), ramp, np.full(20, 2.0)])
     first, second, rest = stretches_of(
         standing(coarse(steps[0]), np.stack([motors, 0.0 * motors], axis=1))
@@ -98,7 +98,7 @@ def test_each_stand_has_an_angle_of_its_own_and_motion_has_one(steps: tuple[Tria
     assert first.edges == (60,)
     assert second.edges == (159, 229)
     assert np.array_equal(rest.rows, ~(first.rows | second.rows))
-    many = np.repeat(np.arange(3.0 * MOST_STANDS), 60)
+    many = np.repeat(np.arange(3 * MOST_STANDS).astype(np.float64), 60)
     both = stretches_of(standing(coarse(steps[0]), np.stack([many, many], axis=1)))
     assert len(both) == 2 * (MOST_STANDS + 1)
 

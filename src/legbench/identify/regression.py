@@ -104,7 +104,8 @@ def _smoothed(trial: Trial) -> tuple[Floats, Floats, Floats, Floats]:
     step = float(trial.time[-1] - trial.time[0]) / (len(trial.time) - 1)
     half = int(np.ceil(REACH * WIDTH / step))
     if len(trial.time) <= 2 * half + 1:
-        return (np.zeros((0, 2)),) * 4
+        nothing = np.zeros((0, 2))
+        return nothing, nothing, nothing, nothing
     at = np.arange(-half, half + 1) * step / WIDTH
     bell = np.exp(-0.5 * at**2)
     bell /= bell.sum()
