@@ -31,7 +31,8 @@ WIDTH: Final = 1e-2
 makes inertias a third too small at 6 ms; wider ones blur products of angles and rates, which makes
 the coupling a fifth too small at 12 ms."""
 REACH: Final = 6.0
-"""Half length of the kernel in standard deviations [-]: a constant angle has no acceleration then."""
+"""Half length of the kernel in standard deviations [-]: a constant angle has no acceleration
+then."""
 MOST: Final = 20.0
 """Factor by which a positive parameter may leave the guess before [-]."""
 LINEAR: Final = (*(each.name for each in NINE), "f1", "f2")
