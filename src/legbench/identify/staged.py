@@ -17,7 +17,7 @@ from legbench.analytic.terms import Bars
 from legbench.design import LegDesign
 from legbench.errors import ConfigError, PlantFault
 from legbench.identify.adequacy import residuals_of, scores_of
-from legbench.identify.alternatives import explain
+from legbench.identify.alternatives import OtherBars, explain
 from legbench.identify.base import Leg, mended
 from legbench.identify.checks import Finding, check_data
 from legbench.identify.estimates import estimates_of
@@ -33,6 +33,7 @@ from legbench.identify.spread import spread_of
 from legbench.identify.trial import Trial
 from legbench.identify.verdict import reasons_against
 from legbench.identify.wiring import check_wiring
+from legbench.mjcf.fitting import fitted_bar_density
 
 ALIKE: Final = 0.99
 """Correlation from which two parameters are told to be hard to tell apart [-]."""
@@ -75,6 +76,17 @@ class Question:
     def leg(self) -> Leg:
         """Leg that the fit starts from."""
         return Leg.of(self.design, bars=self.bars, mass=self.mass)
+
+    @property
+    def other_bars(self) -> OtherBars | None:
+        """The leg with bars as they usually are, or without; none: it is too light for them."""
+        held = 0.0 if self.bars is None else self.bars.density
+        try:
+            bars = None if held else Bars(density=fitted_bar_density(self.design))
+        except ConfigError:
+            return None
+        leg = Leg.of(self.design, bars=bars, mass=self.mass)
+        return OtherBars(held=held, density=0.0 if bars is None else bars.density, leg=leg)
 
 
 def identify(question: Question, say: Say = lambda _: None) -> Outcome:
@@ -133,7 +145,7 @@ def _judged(question: Question, problem: Problem, misfit: Misfit, begun: Outcome
         misfit=misfit,
         residuals=tuple(residuals_of(misfit, trials)),
         scores=tuple(scores),
-        alternatives=tuple(explain(problem, misfit, scores)),
+        alternatives=tuple(explain(problem, misfit, scores, question.other_bars)),
         held_out=tuple(hold_out(each, misfit.guess, problem.reach) for each in question.held_out),
     )
     return replace(outcome, reasons=tuple(reasons_against(outcome)))
