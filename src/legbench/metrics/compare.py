@@ -143,7 +143,8 @@ def differences(recording: Recorded, other: Recorded) -> Differences:
         raise RecordingError(f"{recording.path} and {other.path} have no time in common: {spans}")
     ours, theirs = (_at(time, run) for run in runs)
     convention = recording.description.convention
-    z2 = [joint_to_modal(joint, convention)[:, 1] for joint in (ours, theirs)]
+    # Copies, as a view of the second coordinate keeps the first.
+    z2 = [joint_to_modal(joint, convention)[:, 1].copy() for joint in (ours, theirs)]
     return Differences(time=time, joint=theirs - ours, z2=z2[1] - z2[0])
 
 
