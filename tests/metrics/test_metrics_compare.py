@@ -36,7 +36,7 @@ def test_a_run_against_itself_differs_in_nothing() -> None:
 
 
 def test_signals_of_two_runs_are_not_kept_together() -> None:
-    run, other = Analysis(recording(Hop())), Analysis(recording(Hop()))
+    run, other = Analysis(Hop().recording()), Analysis(Hop().recording())
     for each in (run, other):
         assert len(each["joint_vel"]) == len(each.time)
     assert compare(run, other).joint_max == 0.0
