@@ -21,7 +21,7 @@ NAMED: Final = 0.8
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OtherBars:
-    """The same leg with bars of another mass, which no single parameter stands for."""
+    """Leg of a fit with bars of another mass, which no single parameter stands for."""
 
     held: float
     """Mass per length of the bars of the fit [kg/m]; zero: they weigh nothing."""
