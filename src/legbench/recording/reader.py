@@ -211,7 +211,8 @@ def described(manifest: Manifest, run: Path) -> RunDescription | FormatError:
     try:
         return describe(manifest, run.name)
     except FormatError as error:
-        return error
+        # A new one: the frames of one that was raised would keep the run's columns alive.
+        return FormatError(str(error))
 
 
 def run_folder(path: Path) -> Path:
