@@ -52,6 +52,7 @@ def test_a_sweep_prints_a_row_for_each_amplitude(tmp_path: Path) -> None:
     assert np.all(np.diff(clearance) > 0.0)
 
 
+@pytest.mark.long
 def test_the_bench_is_emulated_recorded_and_compared(tmp_path: Path) -> None:
     *table, difference = printed("bench.py", tmp_path)
     assert "ended       complete" in table

@@ -79,6 +79,7 @@ def deadly(work: Work) -> bytes:
 FIELDS = ("name", "experiments", "hashes", "together")
 
 
+@pytest.mark.long
 def test_a_shard_whose_worker_dies_is_run_again_then_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

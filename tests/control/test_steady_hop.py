@@ -44,7 +44,11 @@ def polar_rest(design: LegDesign, settings: JumpConfig, servo: ServoConfig) -> f
     return largest
 
 
-@pytest.mark.parametrize("servo", [ServoConfig(), LIMITED], ids=["ideal", "limited"])
+@pytest.mark.parametrize(
+    "servo",
+    [pytest.param(ServoConfig(), marks=pytest.mark.long), LIMITED],
+    ids=["ideal", "limited"],
+)
 def test_a_smaller_push_or_more_damping_steadies_the_hop(
     optimal: LegDesign, servo: ServoConfig
 ) -> None:

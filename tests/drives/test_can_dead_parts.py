@@ -54,9 +54,14 @@ def test_a_part_that_dies_is_found_in_time(
 @pytest.mark.parametrize(
     ("emulation", "servo"),
     [
-        (Emulation.SIM, ServoConfig(bandwidth=15.0, encoder_counts=4096)),
+        pytest.param(
+            *(Emulation.SIM, ServoConfig(bandwidth=15.0, encoder_counts=4096)),
+            marks=pytest.mark.long,
+        ),
         (Emulation.CAN, ServoConfig(bandwidth=15.0, encoder_counts=4096)),
-        (Emulation.ANALYTIC, ServoConfig(encoder_counts=1 << 20)),
+        pytest.param(
+            *(Emulation.ANALYTIC, ServoConfig(encoder_counts=1 << 20)), marks=pytest.mark.long
+        ),
     ],
 )
 def test_a_healthy_leg_is_left_alone(

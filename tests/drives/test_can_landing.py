@@ -69,7 +69,13 @@ def stands(it: Stage) -> None:
 
 
 @pytest.mark.parametrize(
-    ("phase", "cycles"), [("pushing", 150), ("released", 500), ("flying", 545), ("folding", 620)]
+    ("phase", "cycles"),
+    [
+        ("pushing", 150),
+        pytest.param("released", 500, marks=pytest.mark.long),
+        ("flying", 545),
+        pytest.param("folding", 620, marks=pytest.mark.long),
+    ],
 )
 def test_a_jump_ends_on_the_ground_whenever_its_time_is_over(phase: str, cycles: int) -> None:
     """In each phase, power goes when the foot stands and joints are slow."""
@@ -146,7 +152,9 @@ def test_a_run_that_is_to_stop_stops_in_mid_flight(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", [SetupKind.HFTS, SetupKind.VFTS, SetupKind.FFS])
-@pytest.mark.parametrize("config", [PositionJumpConfig(), BangBangConfig()])
+@pytest.mark.parametrize(
+    "config", [PositionJumpConfig(), pytest.param(BangBangConfig(), marks=pytest.mark.long)]
+)
 def test_a_leg_that_is_held_ends_in_its_rest_posture(
     kind: SetupKind, config: ControllerSettings
 ) -> None:
@@ -162,6 +170,7 @@ def test_a_leg_that_is_held_ends_in_its_rest_posture(
         assert outcome.message is None
 
 
+@pytest.mark.long
 def test_the_papers_leg_rests_in_time_where_it_swings_longest() -> None:
     """With its foot pinned, in the simulation that also moves the emulated bench."""
     chosen = replace(experiment(PositionJumpConfig()), setup=Setup(kind=SetupKind.FFS))

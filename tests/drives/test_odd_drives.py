@@ -77,7 +77,9 @@ NOT_NEEDED: tuple[Any, ...] = (
 @pytest.mark.parametrize(
     ("lacks", "code"),
     [
-        (lacks, CODES[(place + turn) % len(CODES)])
+        pytest.param(
+            lacks, CODES[(place + turn) % len(CODES)], marks=[pytest.mark.long] if turn else []
+        )
         for place, lacks in enumerate(NOT_NEEDED)
         for turn in (0, 1)
     ],
@@ -283,7 +285,9 @@ def test_one_encoder_leads_a_joint(side: Side, torque: Mapped | None) -> None:
 # --- together --------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("block", range(BLOCKS))
+@pytest.mark.parametrize(
+    "block", [0, *(pytest.param(block, marks=pytest.mark.long) for block in range(1, BLOCKS))]
+)
 def test_random_combinations_run_or_are_refused_in_one_line(block: int) -> None:
     chance = random.Random(f"odd drives {block}")
     ran = 0

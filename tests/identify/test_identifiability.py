@@ -9,6 +9,7 @@ from legbench.identify.parameters import NINE
 from legbench.identify.trial import Trial
 
 
+@pytest.mark.long
 def test_nine_parameters_are_seen_by_three_setups_and_a_known_mass(
     steps: tuple[Trial, ...],
 ) -> None:

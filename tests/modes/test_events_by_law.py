@@ -55,7 +55,9 @@ def test_legs_settle_that_cross_a_level_up_and_down_in_one_step(
     assert abs(apexes[-1].height - apex) < 1e-5
 
 
-@pytest.mark.parametrize("first", [0, 20, 40])
+@pytest.mark.parametrize(
+    "first", [0, *(pytest.param(first, marks=pytest.mark.long) for first in (20, 40))]
+)
 def test_random_hops_are_told_as_dense_events_tell_them(first: int) -> None:
     errors = []
     for seed in range(first, first + 20):
@@ -143,6 +145,7 @@ def test_every_reading_has_its_place() -> None:
     assert [int(event) for event in Event] == list(range(len(Event)))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "seed"), [("prototype", 3), ("optimal", 4)])
 def test_cells_of_a_basin_are_those_of_brute_force(name: str, seed: int) -> None:
     question = random_question(design_of(name), seed, 6)

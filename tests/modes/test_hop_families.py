@@ -130,6 +130,7 @@ def test_a_guess_that_is_no_cycle_is_named() -> None:
         find_cycle(leg, law, [low, START])
 
 
+@pytest.mark.long
 def test_damping_steadies_the_hop_and_the_family_says_where(hop: Cycle) -> None:
     seen: list[tuple[int, int]] = []
     family = follow_hop(

@@ -99,7 +99,7 @@ def test_a_stopped_search_keeps_its_best_and_goes_on(
     assert len(trace.read_text().splitlines()) == 1 + whole["evaluations"] // 20
 
 
-@pytest.mark.parametrize("suffix", ["svg", "png"])
+@pytest.mark.parametrize("suffix", ["svg", pytest.param("png", marks=pytest.mark.long)])
 def test_pictures(tmp_path: Path, suffix: str) -> None:
     leg, plot = tmp_path / f"leg.{suffix}", tmp_path / f"plot.{suffix}"
     pictures = ["--drawing", str(leg), "--plot", str(plot)]

@@ -101,8 +101,18 @@ WRONG = {
 """What goes wrong -> the line that does it, what is said of it, and the source that is shown."""
 
 
-@PLANTS
-@pytest.mark.parametrize("way", WRONG)
+@pytest.mark.parametrize(
+    ("plant", "way"),
+    [
+        *((("sim",), way) for way in WRONG),
+        *((plant, "raises") for plant in (("analytic",), EMULATED)),
+        *(
+            pytest.param(plant, way, marks=pytest.mark.long)
+            for plant in (("analytic",), EMULATED)
+            for way in ("nan", "shape")
+        ),
+    ],
+)
 def test_one_that_fails_is_the_cause_with_its_own_lines_and_the_recording_is_whole(
     way: str, plant: tuple[str, ...], tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

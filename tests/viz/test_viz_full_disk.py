@@ -51,7 +51,7 @@ def on_a_full_disk(run: Path, out: Path, *suffixes: str) -> list[str]:
 
 @pytest.fixture(scope="module")
 def short(tmp_path_factory: pytest.TempPathFactory) -> Recording:
-    run = record(tmp_path_factory.mktemp("short"), SetupKind.JUMP, 700)
+    run = record(tmp_path_factory.mktemp("short"), SetupKind.JUMP, 300)
     (run.path / "samples.arrows").write_bytes(b"".join(stream_of(run)))
     return run
 
