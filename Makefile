@@ -36,7 +36,7 @@ dist: $(STAMP) ## wheel and sdist in dist/, installed and used in an empty folde
 check: $(STAMP) typings/mujoco/__init__.pyi dist ## lint, format, types, layers, wheel
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/pyright
+	$(BIN)/pyrefly check --threads 1
 	$(BIN)/lint-imports
 
 test: check ## check, then the tests, a file a processor at a time

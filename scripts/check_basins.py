@@ -7,7 +7,7 @@ from pathlib import Path
 
 sys.path.append(str(Path(__file__).parents[1] / "tests" / "modes"))
 
-from brute_basins import differing, random_question  # pyright: ignore[reportMissingImports]
+from brute_basins import differing, random_question
 
 from legbench.design import load_design
 

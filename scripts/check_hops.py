@@ -13,7 +13,7 @@ import numpy as np
 
 sys.path.append(str(Path(__file__).parents[1] / "tests" / "modes"))
 
-from random_hops import compare, random_case  # pyright: ignore[reportMissingImports]
+from random_hops import compare, random_case
 
 BOUND, MEDIAN = 1e-5, 1e-7
 """Largest error, and its median, in units of the map [-]."""

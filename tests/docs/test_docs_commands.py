@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from docs_blocks import (  # pyright: ignore[reportMissingImports]
+from docs_blocks import (
     ROOT,
     CommandLine,
     NamedFile,
@@ -12,8 +12,8 @@ from docs_blocks import (  # pyright: ignore[reportMissingImports]
     pages,
     spans,
 )
-from docs_parse import misunderstood, unknown_flags  # pyright: ignore[reportMissingImports]
-from docs_run import lay, play, prepare  # pyright: ignore[reportMissingImports]
+from docs_parse import misunderstood, unknown_flags
+from docs_run import lay, play, prepare
 
 PAGES = pages()
 SHOWN = [

@@ -37,8 +37,15 @@ CAUSES = {
     ("emulation", "controller", "drive", "onset", "servo"),
     [
         (Emulation.CAN, "jump", 1, 0.537, ServoConfig(bandwidth=30.0)),
-        (Emulation.SIM, "bang-bang", 0, 0.622, ServoConfig(bandwidth=15.0, encoder_counts=4096)),
-        (Emulation.ANALYTIC, "jump", 1, 0.704, ServoConfig(delay_cycles=2)),
+        pytest.param(
+            *(Emulation.SIM, "bang-bang", 0, 0.622),
+            ServoConfig(bandwidth=15.0, encoder_counts=4096),
+            marks=pytest.mark.long,
+        ),
+        pytest.param(
+            *(Emulation.ANALYTIC, "jump", 1, 0.704, ServoConfig(delay_cycles=2)),
+            marks=pytest.mark.long,
+        ),
     ],
 )
 def test_a_part_that_dies_is_found_in_time(

@@ -4,7 +4,7 @@ import re
 from datetime import datetime
 
 import canopen
-import eds  # pyright: ignore[reportMissingImports]
+import eds
 import pytest
 from can_rig import BUS, LIMITS, ROOT
 

@@ -228,9 +228,9 @@ def test_an_interrupt_while_it_lands_takes_the_power_at_once() -> None:
             began.append(it.network.now_ns)
             if len(began) == 50:
                 stop.set()
-            return lead(motor_pos)  # pyright: ignore[reportArgumentType]
+            return lead(motor_pos)  # pyrefly: ignore[bad-argument-type]
 
-        it.plant._lead = counted  # pyright: ignore[reportAttributeAccessIssue]
+        it.plant._lead = counted  # pyrefly: ignore[bad-assignment]
         outcome = run(it.plant, it.controller, 300, stop=stop)
         assert outcome.status == "interrupted"
         assert len(began) == 50
@@ -249,9 +249,9 @@ def lands_with(it: Stage, fault: NodeFaultKind) -> Outcome:
         told.append(motor_pos)
         if len(told) == 50:
             it.network.inject(NodeFault(kind=fault, node_id=1, start_ns=it.network.now_ns))
-        return lead(motor_pos)  # pyright: ignore[reportArgumentType]
+        return lead(motor_pos)  # pyrefly: ignore[bad-argument-type]
 
-    it.plant._lead = failing  # pyright: ignore[reportAttributeAccessIssue]
+    it.plant._lead = failing  # pyrefly: ignore[bad-assignment]
     return run(it.plant, it.controller, 300)
 
 

@@ -39,7 +39,8 @@ from legbench.recording.events import read_events
 from legbench.recording.repair import recover
 
 
-@pytest.mark.parametrize("name", ["SIGKILL", pytest.param("SIGSTOP", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["SIGKILL", "SIGSTOP"])
 def test_drives_stop_by_themselves_when_the_master_is_gone(name: str, tmp_path: Path) -> None:
     with served(tmp_path, deadline_ms=1000) as drives, leading(tmp_path, drives) as run:
         os.kill(run.pid, getattr(signal, name))

@@ -105,6 +105,7 @@ def test_statements_of_the_paper_hold_or_fail() -> None:
     assert not gone[-2].held
 
 
+@pytest.mark.long
 def test_predictions_are_of_every_setup(monkeypatch: pytest.MonkeyPatch) -> None:
     for setup, duration in ((SetupKind.FFS, 2.8), (SetupKind.HFTS, 0.9), (SetupKind.VFTS, 0.9)):
         monkeypatch.setitem(consistency.DURATIONS, setup, duration)

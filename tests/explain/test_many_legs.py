@@ -64,7 +64,10 @@ def experiment(setup: SetupKind, controller: ControllerSettings, duration: float
             marks=pytest.mark.long,
         ),
         (SetupKind.HFTS, STEP, 0.5, ("perfect", "friction", "backlash", "motors")),
-        (SetupKind.VFTS, STEP, 0.5, ("zero errors", "backlash", "motors")),
+        pytest.param(
+            *(SetupKind.VFTS, STEP, 0.5, ("zero errors", "backlash", "motors")),
+            marks=pytest.mark.long,
+        ),
         (SetupKind.HFTS, BANG, 0.6, ("springs, segments", "friction", "motors")),
         pytest.param(*(SetupKind.FFS, BANG, 1.5, ("zero errors", "guide")), marks=pytest.mark.long),
     ],

@@ -39,6 +39,7 @@ def test_what_cannot_be_seen_is_refused_in_words(
         identify(asked)
 
 
+@pytest.mark.long
 def test_zero_errors_on_both_sides_of_the_springs_are_marked_weak(
     steps: tuple[Trial, ...],
 ) -> None:

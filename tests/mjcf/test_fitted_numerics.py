@@ -55,7 +55,11 @@ def departure(
     return largest
 
 
-@pytest.mark.parametrize("leg", LEGS, ids=lambda leg: leg.name)
+@pytest.mark.parametrize(
+    "leg",
+    [*LEGS[:4], *(pytest.param(leg, marks=pytest.mark.long) for leg in LEGS[4:])],
+    ids=lambda leg: leg.name,
+)
 def test_a_feasible_leg_keeps_its_mode(leg: LegDesign) -> None:
     assert departure(leg, "reduced") < 1e-6
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from dense_hop import DenseHop, Story  # pyright: ignore[reportMissingImports]
-from dense_rules import Rules  # pyright: ignore[reportMissingImports]
+from dense_hop import DenseHop, Story
+from dense_rules import Rules
 
 from legbench.analytic import LegModel, Regime
 from legbench.analytic.taylor import TaylorLeg, Watched

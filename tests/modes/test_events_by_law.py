@@ -12,8 +12,8 @@ from legbench.design import LegDesign, load_design
 
 pytest.importorskip("heyoka")
 
-from brute_basins import differing, random_question  # pyright: ignore[reportMissingImports]
-from random_hops import compare, random_case  # pyright: ignore[reportMissingImports]
+from brute_basins import differing, random_question
+from random_hops import compare, random_case
 
 from legbench.analytic.course import Course
 from legbench.analytic.event_detector import Levels

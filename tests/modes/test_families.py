@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from exact_leg import exact_design  # pyright: ignore[reportMissingImports]
-from independent import (  # pyright: ignore[reportMissingImports]
+from exact_leg import exact_design
+from independent import (
     bang_bang,
     motors_at,
     moved,

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dense_hop import DenseHop, Rules  # pyright: ignore[reportMissingImports]
+from dense_hop import DenseHop, Rules
 
 pytest.importorskip("heyoka")
 

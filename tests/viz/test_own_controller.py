@@ -16,7 +16,6 @@ OWN = ROOT / "scripts" / "examples" / "own_controller.py"
 LEG = ("--design", str(ROOT / "models" / "prototype.toml"))
 BUS = str(ROOT / "hardware" / "leg.toml")
 EMULATED = ("can", "--interface", "legbench", "--end", "stop", "--bus", BUS)
-PLANTS = pytest.mark.parametrize("plant", [("sim",), ("analytic",), EMULATED], ids=lambda p: p[0])
 
 
 def ran(
@@ -29,7 +28,11 @@ def ran(
     return status, json.loads(seen.out), seen.err
 
 
-@PLANTS
+@pytest.mark.parametrize(
+    "plant",
+    [("sim",), *(pytest.param(p, marks=pytest.mark.long) for p in (("analytic",), EMULATED))],
+    ids=lambda plant: plant[0],
+)
 def test_it_runs_is_rated_and_its_signal_is_recorded_and_plotted(
     plant: tuple[str, ...], tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
