@@ -42,7 +42,9 @@ check: $(STAMP) typings/mujoco/__init__.pyi dist ## lint, format, types, layers,
 test: check ## check, then the tests, a file a processor at a time
 	$(BIN)/pytest -m 'not long' --numprocesses auto --dist loadfile
 
-test-long: $(STAMP) ## the tests that `make test` leaves out
+test-long: $(STAMP) ## the tests that `make test` leaves out, a notebook's kernel installed for them
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[notebook]'
+	$(BIN)/python scripts/dist.py --fresh
 	$(BIN)/pytest -m long --numprocesses auto --dist loadfile
 
 test-engine: $(STAMP) ## the tests against Pinocchio, which is installed for them

@@ -71,8 +71,8 @@ JOBS = (
     Job(words=("model", "--view"), status=1, prints="legbench[render]"),
     Job(words=("report", "{run}"), status=1, prints="legbench[report]"),
     Job(words=("replay", "{run}", "--figure", "phase.png"), status=1, prints="legbench[viz]"),
-    Job(words=("run", "jump", "--design", "nobody"), status=1, prints="optimal"),
-    Job(words=("run", "jump", "--plant", "can"), status=1, prints="no such file"),
+    Job(words=("run", "jump", "--design", "nobody"), status=2, prints="optimal"),
+    Job(words=("run", "jump", "--plant", "can"), status=2, prints="no such file"),
 )
 
 

@@ -21,9 +21,12 @@ class Done:
     out: str
     err: str
 
-    def refused(self, *words: str) -> None:
-        """One clear message, no traceback, nothing on stdout, a status that says so."""
-        assert self.status == 1, self.err
+    def refused(self, *words: str, status: int = 2) -> None:
+        """One clear message, no traceback, nothing on stdout, a status that says so.
+
+        It is 2 where the command was refused as it was asked, 1 where it could not be done.
+        """
+        assert self.status == status, self.err
         assert self.out == ""
         assert self.err.startswith("legbench: "), self.err
         assert self.err.count("\n") == 1, self.err

@@ -230,7 +230,7 @@ def test_the_command_writes_numbers_experiment_and_figures(
 def test_bad_input_is_refused_in_one_line(
     flags: list[str], words: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["explain", "--design", str(MODELS / "prototype.toml"), *flags]) == 1
+    assert main(["explain", "--design", str(MODELS / "prototype.toml"), *flags]) == 2
     shown = capfd.readouterr()
     assert shown.out == ""
     assert shown.err.count("\n") == 1

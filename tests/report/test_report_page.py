@@ -145,7 +145,7 @@ def test_a_report_is_about_something(tmp_path: Path) -> None:
 
 def test_single_figures_are_written_beside_the_page(reported: tuple[Path, dict[str, Any]]) -> None:
     page, content = reported
-    assert content["page"] == str(page)
+    assert content["out"] == str(page)
     stems = ("fig4-step", "fig4-bang-bang", "fig5-ideal-equilibrium", "fig5-ideal-motor")
     names = {f"{stem}.png" for stem in (*stems, "fig6", "fig7")}
     assert {path.name for path in (page.parent / "figures").iterdir()} == names
@@ -220,5 +220,5 @@ def test_a_page_that_cannot_be_written_is_refused_at_once(
     told = capsys.readouterr()
     assert told.err.startswith(f"legbench: cannot write {tmp_path / 'file'}")
     assert told.err.count("\n") == 1
-    assert main(["report", str(folder), "--out", str(tmp_path / "page.png")]) == 1
+    assert main(["report", str(folder), "--out", str(tmp_path / "page.png")]) == 2
     assert "the page is a .html file" in capsys.readouterr().err
