@@ -221,6 +221,7 @@ def test_one_mode_is_shown_where_the_other_has_no_such_orbit(
     assert shown["polar"]["energy"] == pytest.approx(0.5, rel=1e-9)
 
 
+@pytest.mark.long
 def test_modes_in_full_are_printed_and_written(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -93,7 +93,7 @@ Jump.step = step
     assert (manifest["status"], manifest["cause"]) == ("fault", "controller failed")
 
 
-@pytest.mark.parametrize("where", ["reset", "step"])
+@pytest.mark.parametrize("where", [pytest.param("reset", marks=pytest.mark.long), "step"])
 def test_a_plant_that_fails_otherwise_is_a_message_and_no_traceback(
     tmp_path: Path, where: str
 ) -> None:

@@ -120,6 +120,7 @@ def test_predictions_are_of_every_setup(monkeypatch: pytest.MonkeyPatch) -> None
         assert np.isfinite([lower, usual]).all()
 
 
+@pytest.mark.long
 def test_a_spring_mismatch_costs_the_hop_its_rating() -> None:
     perfect, apart = hop_of(PROTOTYPE, [PERFECT, Imperfections(stiffness_error=(-0.04, 0.04))])
     assert perfect.cause is None

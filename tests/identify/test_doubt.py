@@ -63,9 +63,8 @@ def test_a_delay_and_a_stretched_time_are_told_apart(
     assert any(f"something that was held is wrong: {name}" in each for each in outcome.reasons)
 
 
-@pytest.mark.parametrize(
-    ("segment", "name"), [pytest.param("thigh", "J1", marks=pytest.mark.long), ("shank", "J2")]
-)
+@pytest.mark.long
+@pytest.mark.parametrize(("segment", "name"), [("thigh", "J1"), ("shank", "J2")])
 def test_a_fixed_inertia_that_is_five_percent_wrong_is_named(
     steps: tuple[Trial, ...], segment: str, name: str
 ) -> None:

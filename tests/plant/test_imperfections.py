@@ -268,8 +268,11 @@ def test_rows_of_a_batch_have_the_noise_of_single_legs() -> None:
 
 @pytest.mark.parametrize(
     "name",
-    ["leg", "noise"]
-    + [pytest.param(n, marks=pytest.mark.long) for n in ("friction", "guide", "backlash", "zeros")],
+    ["leg"]
+    + [
+        pytest.param(name, marks=pytest.mark.long)
+        for name in ("friction", "guide", "backlash", "zeros", "noise")
+    ],
 )
 def test_an_emulated_leg_has_them_too(name: str) -> None:
     """To the two cycles that a bus takes, and the counts of its encoders."""

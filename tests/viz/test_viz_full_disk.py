@@ -68,6 +68,7 @@ def test_no_half_figure_or_view_stays(short: Recording, tmp_path: Path) -> None:
     refused((".png", ".svg", ".pdf", ".rrd"), short, tmp_path)
 
 
+@pytest.mark.long
 def test_no_half_film_stays(short: Recording, tmp_path: Path) -> None:
     if not gl_works():
         pytest.skip("no OpenGL without a display")
