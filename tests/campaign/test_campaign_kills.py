@@ -37,6 +37,7 @@ def waited(until: Any) -> None:
         time.sleep(0.002)
 
 
+@pytest.mark.long
 def test_a_campaign_that_is_killed_is_gone_on_with(tmp_path: Path) -> None:
     """Killed once so many shards are there, at no particular instant; then gone on with here.
 

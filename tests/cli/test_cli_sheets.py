@@ -115,6 +115,7 @@ def test_a_sheet_that_is_none_is_one_line(call: Call, folder: Path) -> None:
     assert not (folder / "my.toml").exists()
 
 
+@pytest.mark.long
 def test_emulate_wears_a_sheet_and_says_what_the_bus_file_asks_in_vain(
     call: Call, folder: Path
 ) -> None:

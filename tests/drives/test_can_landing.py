@@ -123,6 +123,7 @@ def test_in_mid_flight_the_leg_lands_first_and_slowly() -> None:
         assert len(moves) > 1000
 
 
+@pytest.mark.long
 def test_a_run_that_is_to_stop_stops_in_mid_flight(tmp_path: Path) -> None:
     chosen = calm(JumpConfig())
     with stage(chosen) as it:

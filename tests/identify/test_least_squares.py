@@ -30,6 +30,7 @@ def test_springs_and_dampers_that_are_thirty_percent_off_are_found(
         assert each.value == pytest.approx(true, rel=2e-4 if each.name[0] == "k" else 4e-3)
 
 
+@pytest.mark.long
 def test_nine_parameters_of_a_leg_that_was_built_otherwise_are_found() -> None:
     flaws = {
         "stiffness_error": (0.04, -0.03),

@@ -64,6 +64,7 @@ def refused(suffixes: tuple[str, ...], run: Recording, out: Path) -> None:
     assert list(out.iterdir()) == []
 
 
+@pytest.mark.long
 def test_no_half_figure_or_view_stays(short: Recording, tmp_path: Path) -> None:
     refused((".png", ".svg", ".pdf", ".rrd"), short, tmp_path)
 
