@@ -1,5 +1,5 @@
 .DEFAULT_GOAL := help
-.PHONY: help setup jump docs dist test test-engine test-readers test-socketcan check bench mutants models clean
+.PHONY: help setup jump docs dist test test-long test-engine test-readers test-socketcan check bench mutants models clean
 
 # The first of these that is new enough; another one by make PYTHON=...
 PYTHON ?= $(shell for name in python3 python3.14 python3.13 python3.12 python3.11; do \
@@ -36,11 +36,16 @@ dist: $(STAMP) ## wheel and sdist in dist/, installed and used in an empty folde
 check: $(STAMP) typings/mujoco/__init__.pyi dist ## lint, format, types, layers, wheel
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/pyright
+	$(BIN)/pyrefly check --threads 1
 	$(BIN)/lint-imports
 
 test: check ## check, then the tests, a file a processor at a time
-	$(BIN)/pytest --numprocesses auto --dist loadfile
+	$(BIN)/pytest -m 'not long' --numprocesses auto --dist loadfile
+
+test-long: $(STAMP) ## the tests that `make test` leaves out, a notebook's kernel installed for them
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[notebook]'
+	$(BIN)/python scripts/dist.py --fresh
+	$(BIN)/pytest -m long --numprocesses auto --dist loadfile
 
 test-engine: $(STAMP) ## the tests against Pinocchio, which is installed for them
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[pinocchio]'

@@ -379,6 +379,15 @@ def bench_first() -> Result:
         return bench_start("run jump of one cycle", 5.0, *words, "--out", folder)
 
 
+def bench_cold() -> Result:
+    """All that a run costs besides its simulation: one cycle, from the shell to the last line."""
+    with tempfile.TemporaryDirectory() as folder:
+        words = ("-m", "legbench", "run", "jump", "--duration", "0.001", "--out", folder)
+        bare, ours = cpu_time("-c", "import numpy"), cpu_time(*words)
+    detail = f"CPU time; import numpy takes {1e3 * bare:.0f} ms"
+    return Result(name="run jump of one cycle", value=ours, bound=1.5, unit="s", detail=detail)
+
+
 BENCHES = {
     "loop": bench_loop,
     "batch": bench_batch,
@@ -393,6 +402,7 @@ BENCHES = {
     "help": lambda: bench_start("legbench --help", 0.3, "-m", "legbench", "--help"),
     "run-help": lambda: bench_start("run --help", 3.0, "-m", "legbench", "run", "--help"),
     "first": bench_first,
+    "cold": bench_cold,
 }
 
 

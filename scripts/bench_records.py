@@ -91,7 +91,8 @@ def long_run(recorded: Path, path: Path, duration: float) -> Path:
     shutil.rmtree(path, ignore_errors=True)
     path.mkdir(parents=True)
     manifest = recording.manifest | {"id": path.name, "rows": rows, "duration": duration - 1e-3}
-    write_archive(path, Repeated(table, int(first), int(stop), rows), manifest)  # pyright: ignore
+    # pyrefly: ignore[bad-argument-type]
+    write_archive(path, Repeated(table, int(first), int(stop), rows), manifest)
     write_manifest(path, manifest)
     (path / "events.jsonl").touch()
     return path

@@ -20,8 +20,8 @@ import numpy as np
 
 sys.path.append(str(Path(__file__).parents[1] / "tests" / "modes"))
 
-from brute_basins import question_around  # pyright: ignore[reportMissingImports]
-from random_hops import random_case, tools_of  # pyright: ignore[reportMissingImports]
+from brute_basins import question_around
+from random_hops import random_case, tools_of
 from reference.basins import Cells, edges, fates
 from reference.dop853 import Accuracy
 

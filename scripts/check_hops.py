@@ -20,7 +20,7 @@ import numpy as np
 
 sys.path.append(str(Path(__file__).parents[1] / "tests" / "modes"))
 
-from random_hops import (  # pyright: ignore[reportMissingImports]
+from random_hops import (
     random_case,
     thrown,
     told,

@@ -18,9 +18,9 @@ from scipy.integrate import solve_ivp
 
 sys.path.append(str(Path(__file__).parents[1] / "tests" / "modes"))
 
-from dense_hop import DenseHop  # pyright: ignore[reportMissingImports]
-from dense_rules import Rules  # pyright: ignore[reportMissingImports]
-from random_hops import Case, random_case  # pyright: ignore[reportMissingImports]
+from dense_hop import DenseHop
+from dense_rules import Rules
+from random_hops import Case, random_case
 from reference.dop853 import Accuracy, Rates, attempt
 from reference.hops import Hops
 from reference.verdicts import FINER, FINEST, UNITS, difference

@@ -2,9 +2,14 @@
 
 The wheel is made from the sdist, so that both are whole. Nothing but the core is installed: a
 command that needs an extra must name it in one line. Warnings are errors.
+
+What the wheel asks for is linked into its environment from the one that runs this, package by
+package as their metadata name each other; pip then checks that nothing is missing and that all
+versions fit. With --fresh, pip installs it from the registry, as it does for a user.
 """
 
 import argparse
+import json
 import os
 import subprocess
 import sys
@@ -13,6 +18,8 @@ import venv
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+from dist_environment import link_needed
 
 ROOT = Path(__file__).parents[1]
 CANNOT = "Traceback (most recent call last)"
@@ -55,7 +62,7 @@ JOBS = (
     Job(words=("export", "{run}", "--csv"), prints="wrote"),
     Job(words=("export", "{run}", "--mcap"), status=1, prints="legbench[mcap]"),
     Job(words=("model", "--design", "table2", "--out", "leg.xml")),
-    Job(words=("check", "prototype"), status=1, prints="VIOLATED"),
+    Job(words=("check", "prototype", "--no-model"), status=1, prints="VIOLATED"),
     Job(words=("drives", "budget"), prints="SYNC"),
     Job(words=("drives", "learn", "{eds}", "--out", "my.toml"), status=1, prints="canopen"),
     Job(words=("modes", "prototype"), status=1, prints="legbench[modes]"),
@@ -64,21 +71,41 @@ JOBS = (
     Job(words=("model", "--view"), status=1, prints="legbench[render]"),
     Job(words=("report", "{run}"), status=1, prints="legbench[report]"),
     Job(words=("replay", "{run}", "--figure", "phase.png"), status=1, prints="legbench[viz]"),
-    Job(words=("run", "jump", "--design", "nobody"), status=1, prints="optimal"),
-    Job(words=("run", "jump", "--plant", "can"), status=1, prints="no such file"),
+    Job(words=("run", "jump", "--design", "nobody"), status=2, prints="optimal"),
+    Job(words=("run", "jump", "--plant", "can"), status=2, prints="no such file"),
 )
+
+
+TOGETHER = """
+import contextlib, io, json, sys
+from legbench.cli import COMMANDS, main
+
+found = []
+for words in [["--help"], *([name, "--help"] for name in COMMANDS), *json.loads(sys.argv[1])]:
+    said = io.StringIO()
+    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+        try:
+            status = main(words)
+        except SystemExit as end:
+            status = end.code or 0
+    found.append([words, status, said.getvalue()])
+print(json.dumps(found))
+"""
+"""Program that asks every command for help and then calls some, all in one process."""
 
 
 def main() -> int:
     """Build, install, use; returns 1 if a command does not do what it should."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=ROOT / "dist", help="folder of the archives")
-    out: Path = parser.parse_args().out
+    parser.add_argument("--fresh", action="store_true", help="let pip install what is needed")
+    asked = parser.parse_args()
+    out: Path = asked.out
     for old in out.glob("legbench-*"):
         old.unlink()
-    run([sys.executable, "-m", "build", "--outdir", str(out), str(ROOT)])
+    run([sys.executable, "-m", "build", "--no-isolation", "--outdir", str(out), str(ROOT)])
     with tempfile.TemporaryDirectory() as place:
-        python = installed(next(out.glob("*.whl")), Path(place) / "env")
+        python = installed(next(out.glob("*.whl")), Path(place) / "env", fresh=asked.fresh)
         empty = Path(place) / "empty"
         empty.mkdir()
         wrong = list(faults(python, empty))
@@ -95,29 +122,51 @@ def run(words: Sequence[str]) -> None:
         sys.exit(f"{' '.join(words)}\n{done.stdout}{done.stderr}")
 
 
-def installed(wheel: Path, place: Path) -> Path:
+def installed(wheel: Path, place: Path, *, fresh: bool) -> Path:
     """Python of a new environment that has the wheel and what it needs."""
-    venv.create(place, with_pip=True)
+    venv.create(place, with_pip=False)
     python = place / "bin" / "python"
-    quiet = ("--quiet", "--disable-pip-version-check")
-    pinned = ("--constraint", str(ROOT / "constraints.txt"))
-    run([str(python), "-m", "pip", "install", *quiet, *pinned, str(wheel)])
+    if not fresh:
+        link_needed(wheel, place)
+    pip = [sys.executable, "-m", "pip", "--python", str(python), "--disable-pip-version-check"]
+    sources = ("--constraint", str(ROOT / "constraints.txt")) if fresh else ("--no-index",)
+    run([*pip, "install", "--quiet", "--no-compile", *sources, str(wheel)])
+    run([*pip, "check"])
     return python
 
 
 def faults(python: Path, folder: Path) -> Iterator[str]:
-    """Say which commands do not do what they should in an empty folder."""
-    listing = "from legbench.cli import COMMANDS; print(*COMMANDS)"
-    names = legbench(python, folder, ["-c", listing]).stdout.split()
-    helps = [Job(words=(name, "--help"), prints="usage") for name in names]
-    for job in (Job(words=("--help",), prints="usage"), *helps, *JOBS):
-        run = next(folder.glob("runs/*_*"), "")
-        eds = str(ROOT / "hardware" / "legbench-drive.eds")
-        words = [word.format(run=run, eds=eds) for word in job.words]
+    """Say which commands do not do what they should in an empty folder.
+
+    Main uses have a process each; help and refusals come from one process for all.
+    """
+    eds = str(ROOT / "hardware" / "legbench-drive.eds")
+    for job in [job for job in JOBS if not job.status]:
+        words = filled(job, folder, eds)
         done = legbench(python, folder, ["-W", "error", "-m", "legbench", *words])
-        printed = done.stdout + done.stderr
-        if done.returncode != job.status or job.prints not in printed or CANNOT in printed:
-            yield f"legbench {' '.join(words)}: status {done.returncode}\n{printed}"
+        yield from fault(job, words, done.returncode, done.stdout + done.stderr)
+    refused = [job for job in JOBS if job.status]
+    lines = json.dumps([filled(job, folder, eds) for job in refused])
+    done = legbench(python, folder, ["-W", "error", "-c", TOGETHER, lines])
+    if done.returncode:
+        yield f"help and refusals: status {done.returncode}\n{done.stdout}{done.stderr}"
+        return
+    told = json.loads(done.stdout)
+    helped = Job(words=("--help",), prints="usage")
+    jobs = [helped] * (len(told) - len(refused)) + refused
+    for job, (words, status, printed) in zip(jobs, told, strict=True):
+        yield from fault(job, words, status, printed)
+
+
+def filled(job: Job, folder: Path, eds: str) -> list[str]:
+    """Words of a job with the run that is there by then."""
+    return [word.format(run=next(folder.glob("runs/*_*"), ""), eds=eds) for word in job.words]
+
+
+def fault(job: Job, words: Sequence[str], status: int, printed: str) -> Iterator[str]:
+    """Say what is wrong with a command that was called."""
+    if status != job.status or job.prints not in printed or CANNOT in printed:
+        yield f"legbench {' '.join(words)}: status {status}\n{printed}"
 
 
 def legbench(python: Path, folder: Path, words: Sequence[str]) -> subprocess.CompletedProcess[str]:

@@ -48,7 +48,7 @@ def prepare(folder: Path) -> None:
         folder: empty folder in which commands are to be run.
     """
     sys.path.append(str(ROOT / "tests" / "drives"))
-    from eds_texts import fremd_7  # noqa: PLC0415  # pyright: ignore[reportMissingImports]
+    from eds_texts import fremd_7  # noqa: PLC0415
 
     for name in ("models", "hardware"):
         shutil.copytree(ROOT / name, folder / name)

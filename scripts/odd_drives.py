@@ -13,6 +13,7 @@ import sys
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from odd_drive_draw import Drawn, draw, ordinary
 
@@ -155,7 +156,7 @@ class _Watch:
         values, node = drive._values, self._drawn.node
         span = values[0x60C2, 1] * 10.0 ** values[0x60C2, 2]
         told = 0x60C2 not in self._drawn.behaviour.lacks
-        says = [
+        says: list[tuple[str, Any, Any]] = [
             ("offset of the position", values[0x60B0, 0], 0),
             ("polarity", values[0x607E, 0], 0),
             ("mode asked for", values[0x6060, 0], 8),

@@ -3,17 +3,16 @@
 PYTHON scripts/readers.py FOLDER
 """
 
-# pyright: reportMissingImports=false
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import duckdb
-import fastparquet
+import duckdb  # type: ignore[import-not-found]
+import fastparquet  # type: ignore[import-not-found]
 import numpy as np
-import pandas as pd
-import polars as pl
+import pandas as pd  # type: ignore[import-not-found]
+import polars as pl  # type: ignore[import-not-found]
 
 Columns = Mapping[str, Any]
 

@@ -1,3 +1,4 @@
+import gc
 import os
 import signal
 import subprocess
@@ -27,6 +28,12 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
 MODELS = Path(__file__).parents[1] / "models"
+
+
+def pytest_collection_finish() -> None:
+    """Take what has been collected out of every later search for garbage."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session")

@@ -1,6 +1,7 @@
 """Errors go from one process to another as they are."""
 
 import pickle
+from typing import Any
 
 import pytest
 
@@ -12,7 +13,7 @@ def all_below(kind: type[LegbenchError]) -> list[type[LegbenchError]]:
     return [kind, *(below for child in kind.__subclasses__() for below in all_below(child))]
 
 
-ARGUMENTS = {
+ARGUMENTS: dict[type[LegbenchError], tuple[Any, ...]] = {
     PlantFault: ("sway", "the links sway"),
     SdoAbortError: (0x0602_0000, 0x6040, 1, "no such object"),
 }

@@ -43,6 +43,7 @@ def test_an_example_is_short_and_told_in_the_documents(path: Path) -> None:
     assert any(path.name in text.read_text(encoding="utf-8") for text in told)
 
 
+@pytest.mark.long
 def test_a_sweep_prints_a_row_for_each_amplitude(tmp_path: Path) -> None:
     head, *rows = printed("sweep.py", tmp_path)
     assert head.split("  ") == ["dz2 [rad]", "P^r flight [-]", "foot clearance [mm]"]
@@ -52,6 +53,7 @@ def test_a_sweep_prints_a_row_for_each_amplitude(tmp_path: Path) -> None:
     assert np.all(np.diff(clearance) > 0.0)
 
 
+@pytest.mark.long
 def test_the_bench_is_emulated_recorded_and_compared(tmp_path: Path) -> None:
     *table, difference = printed("bench.py", tmp_path)
     assert "ended       complete" in table

@@ -6,6 +6,7 @@ import sys
 import threading
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -26,9 +27,9 @@ from legbench.signals import Observation
 CONTROLLERS = (JumpConfig(), BangBangConfig(), PositionJumpConfig())
 
 
-def short(design: LegDesign, **choices: object) -> Experiment:
+def short(design: LegDesign, **choices: Any) -> Experiment:
     experiment = Experiment(design=design, controller=JumpConfig(), duration=0.12)
-    return replace(experiment, **choices)  # pyright: ignore[reportArgumentType]
+    return replace(experiment, **choices)
 
 
 @pytest.mark.parametrize("linkage", LinkageKind)
@@ -153,7 +154,7 @@ def test_an_error_on_the_way_closes_the_run(tmp_path: Path, prototype: LegDesign
 def test_an_operating_system_error_names_the_run(
     tmp_path: Path, prototype: LegDesign, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def refuse(path: Path, *_content: object, **_options: object) -> None:
+    def refuse(path: Path, *_content: object, **_options: Any) -> None:
         raise PermissionError(13, "no", str(path))
 
     monkeypatch.setattr(Path, "write_text", refuse)

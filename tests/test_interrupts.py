@@ -92,7 +92,7 @@ def test_a_signal_while_a_shield_is_put_up_or_taken_down_leaves_no_handler(
         calls += 1
         if calls == at:
             raise KeyboardInterrupt
-        return install(number, handler)  # pyright: ignore[reportArgumentType]
+        return install(number, handler)  # pyrefly: ignore[bad-argument-type]
 
     def stop() -> None:
         with shielded():

@@ -455,7 +455,7 @@ class Wrong(AbstractController):
             return Command.holding(np.zeros(2))
         if isinstance(self._answer, BaseException):
             self._fail()
-        return self._answer  # pyright: ignore[reportReturnType]
+        return self._answer  # pyrefly: ignore[bad-return]
 
     def _fail(self) -> None:
         assert isinstance(self._answer, BaseException)
@@ -492,7 +492,7 @@ def test_a_controller_that_raises_at_its_reset_is_a_fault_before_the_first_row()
 
 
 def command(motor_pos: object, phase: object = 0) -> Command:
-    return Command(motor_pos=motor_pos, phase=phase)  # pyright: ignore[reportArgumentType]
+    return Command(motor_pos=motor_pos, phase=phase)  # pyrefly: ignore[bad-argument-type]
 
 
 @pytest.mark.parametrize(

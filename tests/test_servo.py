@@ -1,4 +1,5 @@
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,8 +16,8 @@ BY_LAW = settings(derandomize=True, max_examples=100, deadline=None)
 POSITIONS = st.lists(st.floats(-2.0, 2.0), min_size=1, max_size=40)
 
 
-def servo(start: Floats, **limits: float) -> Servo:
-    made = Servo(ServoConfig(**limits), PERIOD)  # pyright: ignore[reportArgumentType]
+def servo(start: Floats, **limits: Any) -> Servo:
+    made = Servo(ServoConfig(**limits), PERIOD)
     made.reset(start)
     return made
 
@@ -125,7 +126,7 @@ def test_a_limit_that_is_no_limit(value: float) -> None:
     with pytest.raises(ConfigError, match=r"servo bandwidth is .* Hz; it must be positive"):
         ServoConfig(bandwidth=value)
     with pytest.raises(ConfigError, match=r"servo encoder_counts is .* counts per revolution"):
-        ServoConfig(encoder_counts=value)  # pyright: ignore[reportArgumentType]
+        ServoConfig(encoder_counts=value)  # pyrefly: ignore[bad-argument-type]
 
 
 @pytest.mark.parametrize("delay", [-1, MAX_DELAY_CYCLES + 1, 10**12])

@@ -64,7 +64,7 @@ def test_limits_beside_a_bus_file_of_one_s_own_are_not_the_package_s(
     own.parent.mkdir()
     own.write_bytes((shipped_root() / "hardware" / "leg.toml").read_bytes())
     words = ["run", "jump", "--plant", "can", "--interface", "legbench", "--bus", str(own)]
-    assert main(words) == 1
+    assert main(words) == 2
     assert "limits.toml: no such file" in capsys.readouterr().err
 
 

@@ -2,7 +2,7 @@
 
 An edit exchanges an operator or a comparison, shifts a number, turns a condition round, leaves out
 a statement that acts, or lets a loop serve its first element only. Annotations, texts and the
-messages of errors are left alone: types are checked by pyright, and wording is no behaviour.
+messages of errors are left alone: types are checked by pyrefly, and wording is no behaviour.
 """
 
 import ast
@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-OPERATORS = {
+OPERATORS: dict[type[ast.AST], tuple[str, str]] = {
     ast.Add: ("+", "-"),
     ast.Sub: ("-", "+"),
     ast.Mult: ("*", "/"),
@@ -26,7 +26,7 @@ OPERATORS = {
     ast.And: ("and", "or"),
     ast.Or: ("or", "and"),
 }
-COMPARISONS = {
+COMPARISONS: dict[type[ast.AST], tuple[str, tuple[str, ...]]] = {
     ast.Lt: ("<", ("<=", ">=")),
     ast.LtE: ("<=", ("<", ">")),
     ast.Gt: (">", (">=", "<=")),

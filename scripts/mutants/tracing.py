@@ -83,7 +83,7 @@ class LineTrace:
             return (yield)
         finally:
             sys.settrace(None)
-            threading.settrace(None)  # pyright: ignore[reportArgumentType]
+            threading.settrace(None)
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Keep what a test ran once it has passed."""

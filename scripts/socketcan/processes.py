@@ -106,7 +106,7 @@ def forked(output: Path, work: Callable[[], int]) -> Child:
         traceback.print_exc()
     finally:
         sys.stdout.flush()
-        os._exit(status)
+    os._exit(status)
 
 
 def legbench(output: Path, *arguments: str) -> Child:

@@ -17,6 +17,10 @@ class ConfigError(LegbenchError, ValueError):
     """Error of a setting that the chosen design, setup or controller refuses."""
 
 
+class UnwritableError(ConfigError):
+    """Error of a file or folder that was named for results and cannot be written."""
+
+
 class RecordingError(LegbenchError, OSError):
     """Error of a run folder that cannot be written, read or repaired."""
 

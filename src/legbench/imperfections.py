@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass, fields, replace
-from typing import Final
+from typing import Any, Final
 
 from legbench.design import LegDesign, Segment
 from legbench.errors import ConfigError, DesignError
@@ -114,7 +114,7 @@ class Imperfections:
         inertia = self.inertia_error or _NONE
         names = ("thigh", "shank", "foot")
         try:
-            segments = {
+            segments: dict[str, Any] = {
                 name: _segment(segment, mass[place], com[place], inertia[place])
                 for place, (name, segment) in enumerate(zip(names, design.segments, strict=True))
             }
@@ -161,7 +161,7 @@ def _numbers(value: object) -> list[float]:
         return []
     if isinstance(value, tuple):
         return [number for entry in value for number in _numbers(entry)]
-    return [float(value)]  # pyright: ignore[reportArgumentType]
+    return [float(value)]  # pyrefly: ignore[bad-argument-type]
 
 
 def _scaled(values: Pair, error: Pair | None) -> Pair:

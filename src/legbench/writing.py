@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from legbench.errors import ConfigError, RecordingError
+from legbench.errors import RecordingError, UnwritableError
 
 
 def reason(error: Exception) -> str:
@@ -51,13 +51,13 @@ def save_whole(path: Path, content: str) -> None:
     """Write a file for the user, whole, and make its folder if need be.
 
     Raises:
-        ConfigError: it cannot be written; an older file is untouched.
+        UnwritableError: it cannot be written; an older file is untouched.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, content.encode())
     except OSError as error:
-        raise ConfigError(
+        raise UnwritableError(
             f"cannot write {path}: {reason(error)}; name a file that you can write"
         ) from None
 

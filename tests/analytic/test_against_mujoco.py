@@ -19,7 +19,10 @@ from legbench.signals import Command, Floats
 
 DESIGN = load_design(Path(__file__).parents[2] / "models" / "prototype.toml")
 FINE = Accuracy(rtol=1e-12, atol=1e-14)
-FIXED = [SetupKind.HFTS, SetupKind.VFTS, SetupKind.FFS]
+FIXED = [
+    SetupKind.FFS,
+    *(pytest.param(kind, marks=pytest.mark.long) for kind in (SetupKind.HFTS, SetupKind.VFTS)),
+]
 STEPS = (1e-3, 5e-4, 2.5e-4, 1.25e-4)
 """The simulator's time steps [s]."""
 DENSITIES = (0.007, 0.0035, 0.00175, 0.000875)

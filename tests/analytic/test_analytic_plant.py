@@ -124,7 +124,8 @@ def test_the_servo_is_the_one_of_the_simulation() -> None:
         rows.append(
             [plant.step(Command.holding(start.motor_pos + 0.05)).motor_pos for _ in range(30)]
         )
-    assert np.array_equal(*rows)
+    analytic, simulated = rows
+    assert np.array_equal(analytic, simulated)
 
 
 @pytest.mark.parametrize(
@@ -199,7 +200,8 @@ def test_first_flight_of_a_jump_is_that_of_the_simulation(
     row = middle + int(np.flatnonzero(foot[middle:] <= 0.0)[0])
     # Continue the last three heights in the air: the row after is already braked by the ground.
     curve = np.polynomial.Polynomial.fit([-2.0, -1.0, 0.0], foot[row - 3 : row], 2)
-    crossings = [float(root.real) for root in curve.roots() if abs(root.imag) < 1e-9]
+    roots = np.asarray(curve.roots(), dtype=complex)
+    crossings = [root.real for root in roots.tolist() if abs(root.imag) < 1e-9]
     met = 1e-3 * (row - 1 + min(root for root in crossings if root > 0.0))
     assert abs(met - touchdown) < 3e-4
 

@@ -133,13 +133,16 @@ def check_run(model: LegModel, start: LegState, motor: tuple[float, float], time
     return len(events)
 
 
-@pytest.mark.parametrize("model", [EXACT, PROTOTYPE], ids=["exact", "prototype"])
+@pytest.mark.parametrize(
+    "model", [pytest.param(EXACT, marks=pytest.mark.long), PROTOTYPE], ids=["exact", "prototype"]
+)
 def test_random_starts_miss_no_event_and_repeat_none(model: LegModel) -> None:
     random = np.random.default_rng(11)
     events = sum(check_run(model, random_start(model, random), MOTOR, 0.3) for _ in range(25))
     assert events > 25
 
 
+@pytest.mark.long
 def test_a_long_step_misses_no_event_that_short_ones_find() -> None:
     random = np.random.default_rng(12)
     coarse, fine = HybridLeg(EXACT), HybridLeg(EXACT, Accuracy(rtol=1e-12, max_step=2e-4))

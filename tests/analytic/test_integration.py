@@ -41,6 +41,7 @@ def test_undamped_stance_keeps_its_energy_for_ten_seconds(q: tuple[float, float]
     assert drift(MODEL, Accuracy(), standing(MODEL, q, pinned=True), 10.0) < 1e-9
 
 
+@pytest.mark.long
 def test_undamped_flight_keeps_its_energy_for_ten_seconds() -> None:
     state = flying(MODEL, (-0.8, 0.7), (3.0, -5.0), (0.0, 500.3), (0.1, 2.0))
     assert drift(MODEL, Accuracy(rtol=1e-12, atol=1e-14), state, 10.0) < 1e-9

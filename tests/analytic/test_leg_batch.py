@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -82,20 +83,21 @@ def test_a_path_is_what_its_ends_are() -> None:
 def changed(model: LegModel, place: int, size: float) -> LegModel:
     """A standing leg one of whose nine parameters is larger."""
     if place >= DAMPING:
-        one = [*model.damping]
-        one[place - DAMPING] += size
-        return replace(model, damping=tuple(one))
+        first, second = model.damping
+        damping = (first + size, second) if place == DAMPING else (first, second + size)
+        return replace(model, damping=damping)
     if place >= STIFFNESS:
-        one = [*model.stiffness]
-        one[place - STIFFNESS] += size
-        return replace(model, stiffness=tuple(one))
+        first, second = model.stiffness
+        stiffness = (first + size, second) if place == STIFFNESS else (first, second + size)
+        return replace(model, stiffness=stiffness)
     terms = model.stance
     if place == COUPLING:
         return replace(model, stance=replace(terms, coupling=terms.coupling + size))
-    name, first = ("moment", MOMENT) if place >= MOMENT else ("inertia", INERTIA)
+    name, begin = ("moment", MOMENT) if place >= MOMENT else ("inertia", INERTIA)
     one = [*getattr(terms, name)]
-    one[place - first] += size
-    return replace(model, stance=replace(terms, **{name: tuple(one)}))
+    one[place - begin] += size
+    more: dict[str, Any] = {name: tuple(one)}
+    return replace(model, stance=replace(terms, **more))
 
 
 @pytest.mark.parametrize("rubbing", [False, True])

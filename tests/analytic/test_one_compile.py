@@ -31,7 +31,7 @@ CASES: list[tuple[SetupKind, ControllerSettings]] = [
 ]
 
 
-@pytest.mark.parametrize("name", ["prototype", "optimal"])
+@pytest.mark.parametrize("name", ["prototype", pytest.param("optimal", marks=pytest.mark.long)])
 @pytest.mark.parametrize(("kind", "settings"), CASES, ids=[kind for kind, _ in CASES])
 def test_it_moves_as_the_interpreted_plant(
     name: str, kind: SetupKind, settings: ControllerSettings

@@ -107,7 +107,8 @@ def differences(
             shifted[index] += sign * size
             end, _ = leg.advance(moved(start, shifted), until, motor)
             ends.append(numbers(end))
-        columns.append(np.subtract(*ends) / (2.0 * size))
+        above, below = ends
+        columns.append(np.subtract(above, below) / (2.0 * size))
     return np.stack(columns, axis=-1)
 
 

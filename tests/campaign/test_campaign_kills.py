@@ -37,6 +37,7 @@ def waited(until: Any) -> None:
         time.sleep(0.002)
 
 
+@pytest.mark.long
 def test_a_campaign_that_is_killed_is_gone_on_with(tmp_path: Path) -> None:
     """Killed once so many shards are there, at no particular instant; then gone on with here.
 
@@ -79,6 +80,7 @@ def deadly(work: Work) -> bytes:
 FIELDS = ("name", "experiments", "hashes", "together")
 
 
+@pytest.mark.long
 def test_a_shard_whose_worker_dies_is_run_again_then_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

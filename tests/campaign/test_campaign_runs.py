@@ -67,6 +67,7 @@ def test_processes_of_this_machine_change_no_byte(
     assert table_bytes(tmp_path) == whole
 
 
+@pytest.mark.long
 def test_dask_changes_no_byte(mixed: Plan, whole: bytes, tmp_path: Path) -> None:
     ran(mixed, tmp_path, DaskExecutor(workers=1), 4)
     assert table_bytes(tmp_path) == whole

@@ -22,8 +22,11 @@ class Done:
     err: str
 
     def refused(self, *words: str) -> None:
-        """One clear message, no traceback, nothing on stdout, a status that says so."""
-        assert self.status == 1, self.err
+        """One clear message, no traceback, nothing on stdout, a status that says so.
+
+        The table of bad inputs tells which: 2 where it was refused as it was asked, else 1.
+        """
+        assert self.status in (1, 2), self.err
         assert self.out == ""
         assert self.err.startswith("legbench: "), self.err
         assert self.err.count("\n") == 1, self.err

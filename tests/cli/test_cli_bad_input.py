@@ -59,7 +59,7 @@ def test_a_reader_that_has_gone(tmp_path: Path) -> None:
     os.close(reader)
     try:
         done = subprocess.run(
-            [sys.executable, "-m", "legbench", "check", str(MODELS / "table2.toml"), "--no-model"],
+            [sys.executable, "-m", "legbench", "drives", "budget"],
             stdout=writer,
             stderr=subprocess.PIPE,
             cwd=tmp_path,

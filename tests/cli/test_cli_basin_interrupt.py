@@ -15,7 +15,7 @@ PATIENCE = 90.0
 """Longest time that anything may take [s]; the map ends in a few."""
 
 
-@pytest.mark.parametrize("delay", [0.0, 0.4])
+@pytest.mark.parametrize("delay", [0.0, pytest.param(0.4, marks=pytest.mark.long)])
 def test_an_interrupt_while_workers_start_is_one_line(delay: float, tmp_path: Path) -> None:
     out = tmp_path / "map"
     command = [sys.executable, "-m", "legbench", "hop", str(DESIGN), "--hops", "10"]

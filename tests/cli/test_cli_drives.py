@@ -273,7 +273,7 @@ def test_budget_is_the_worst_case_and_refuses_too_much(
     assert json.loads(done.out)["load"] == pytest.approx(0.568, abs=0.001)
     slow = changed(tmp_path, ("1_000_000", "500_000"))
     done = called(capfd, "drives", "budget", "--bus", slow)
-    assert done.status == 1
+    assert done.status == 2
     assert "114 % of 500000 bit/s at worst, the limit is 80 %" in done.err
 
 
@@ -423,6 +423,6 @@ def test_a_bitrate_that_is_too_slow_is_refused_before_a_bus_is_opened(
 ) -> None:
     for command in (JUMP[:-2], ("drives", "budget")):
         done = called(capfd, *command, "--bus", BUS, *DESIGN, "--bitrate", "500000")
-        assert done.status == 1
+        assert done.status == 2
         assert "114 % of 500000 bit/s" in done.err
         assert "the bus file says 1000000 bit/s" in done.err

@@ -270,7 +270,7 @@ def test_a_file_that_does_not_import_shows_its_own_lines(
     capfd: pytest.CaptureFixture[str],
 ) -> None:
     done = called(capfd, "run", f"{GUESTS / 'broken.py'}:Mine")
-    assert done.status == 1
+    assert done.status == 2
     assert "broken.py does not import:" in done.err
     assert "LENGTH = half()" in done.err
     assert "no_such_name" in done.err.splitlines()[-1]
@@ -309,5 +309,5 @@ def test_an_imperfection_that_is_none_is_wrong_usage(
     assert (done.status, done.out) == (2, "")
     assert done.err == "legbench: backlash is (-1.0, 0.0) rad; it must be 0 or more\n"
     done = called(capfd, "run", str(file), "--out", str(tmp_path), "--set", "imperfections.zero=1")
-    assert done.status == 1
+    assert done.status == 2
     assert "imperfections.zero: unknown key; did you mean 'link_zero'? known are" in done.err

@@ -85,7 +85,7 @@ def test_what_cannot_be_shown_is_refused_and_still_planned_for(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     refused = called(capfd, "identify", runs["vfts"], "--free", "nine")
-    assert refused.status == 1
+    assert refused.status == 2
     assert refused.out == ""
     assert "all nine scale together" in refused.err.splitlines()[-1]
     chirp = Experiment(

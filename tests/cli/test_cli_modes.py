@@ -97,6 +97,7 @@ def test_a_hop_that_is_not_stable_has_no_basin_and_the_status_says_so(
     assert not (tmp_path / "basin.jsonl").exists()
 
 
+@pytest.mark.long
 @pytest.mark.skipif(os.name == "nt", reason="signals of a terminal")
 def test_a_map_that_is_interrupted_ends_and_keeps_its_rows(tmp_path: Path) -> None:
     rows = tmp_path / "basin.jsonl"
@@ -220,6 +221,7 @@ def test_one_mode_is_shown_where_the_other_has_no_such_orbit(
     assert shown["polar"]["energy"] == pytest.approx(0.5, rel=1e-9)
 
 
+@pytest.mark.long
 def test_modes_in_full_are_printed_and_written(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -250,6 +252,7 @@ def test_the_mode_in_flight_is_asked_for_as_any_other(capfd: pytest.CaptureFixtu
     assert all(one["bend"] < 1e-4 for one in content["modes"]["radial"]["orbits"])
 
 
+@pytest.mark.long
 def test_a_hop_of_two_is_found_and_followed(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

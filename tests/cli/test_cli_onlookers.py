@@ -39,11 +39,13 @@ def ran(
     ("before", "redirect"),
     [
         ("pass", "2>&-"),
-        ("pass", "0<&- 2>&-"),
+        pytest.param("pass", "0<&- 2>&-", marks=pytest.mark.long),
         ("pass", "2>/dev/full"),
         (TERMINAL.format(error="BrokenPipeError(32, 'Broken pipe')"), ""),
-        (TERMINAL.format(error="ValueError('I/O operation on closed file')"), ""),
-        (TERMINAL.format(error="AttributeError('write')"), ""),
+        *(
+            pytest.param(TERMINAL.format(error=error), "", marks=pytest.mark.long)
+            for error in ("ValueError('I/O operation on closed file')", "AttributeError('write')")
+        ),
     ],
     ids=["closed", "all closed", "full", "broken pipe", "closed file", "no write"],
 )
@@ -60,7 +62,7 @@ def test_a_stderr_that_takes_nothing_ends_no_run(
     assert len(recording.time) == 250
 
 
-@pytest.mark.parametrize("redirect", ["2>&-", "2>/dev/full"])
+@pytest.mark.parametrize("redirect", ["2>&-", pytest.param("2>/dev/full", marks=pytest.mark.long)])
 def test_a_note_that_nobody_can_read_is_dropped(tmp_path: Path, redirect: str) -> None:
     """Without a stderr, `print` would put the note into the JSON."""
     done = ran(
@@ -91,7 +93,7 @@ Jump.step = step
     assert (manifest["status"], manifest["cause"]) == ("fault", "controller failed")
 
 
-@pytest.mark.parametrize("where", ["reset", "step"])
+@pytest.mark.parametrize("where", [pytest.param("reset", marks=pytest.mark.long), "step"])
 def test_a_plant_that_fails_otherwise_is_a_message_and_no_traceback(
     tmp_path: Path, where: str
 ) -> None:

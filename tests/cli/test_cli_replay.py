@@ -133,7 +133,7 @@ def test_flags_that_mean_nothing_together_are_refused(
     flags: list[str], words: list[str], jump: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     done = called(capfd, "replay", jump, *flags, "--json")
-    assert done.status == 1
+    assert done.status == 2
     assert done.err.count("\n") == 1, done.err
     assert all(word in done.err for word in words), done.err
     assert not Path("x.rrd").exists()

@@ -16,6 +16,17 @@ from legbench.cli import main
         ("run jump --setup nowhere", "invalid choice 'nowhere' for argument '--setup'"),
         ("frob", "no command 'frob'; there are run, "),
         ("run nobody", "no controller 'nobody'; there are jump, "),
+        ("run", "run what? jump, "),
+        ("run jump --duration nan", "duration is nan s"),
+        ("run jump --out=", "--out is empty"),
+        ("run jump --set nonsense", "--set nonsense: write dotted.key=value"),
+        ("run jump --limits nowhere.toml", "nowhere.toml"),
+        ("check nowhere.toml", "nowhere.toml: no such design file"),
+        ("export RUN --csv --out -", "- is no file"),
+        ("model --out -", "- is no file"),
+        ("render RUN --out -", "- is no file"),
+        ("drives learn sheet.eds --out -", "- is no file"),
+        ("replay -", "- is no file"),
     ],
 )
 def test_wrong_usage_is_a_line(words: str, told: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -46,7 +46,11 @@ def swing(
     return np.ptp(np.reshape(z2, (4, 500)), axis=1)
 
 
-@pytest.mark.parametrize("three_levels", [False, True], ids=["two levels", "three levels"])
+@pytest.mark.parametrize(
+    "three_levels",
+    [False, pytest.param(True, marks=pytest.mark.long)],
+    ids=["two levels", "three levels"],
+)
 @pytest.mark.parametrize("kind", [SetupKind.HFTS, SetupKind.VFTS, SetupKind.FFS])
 def test_the_law_sustains_the_motion_and_its_inverse_does_not(
     prototype: LegDesign, kind: SetupKind, three_levels: bool

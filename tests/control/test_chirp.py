@@ -1,5 +1,6 @@
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -106,7 +107,7 @@ def test_legs_of_a_batch_have_chirps_of_their_own(prototype: LegDesign) -> None:
     ],
 )
 def test_it_refuses_what_the_leg_cannot_do(
-    prototype: LegDesign, change: dict[str, float], words: str
+    prototype: LegDesign, change: dict[str, Any], words: str
 ) -> None:
     with pytest.raises(ConfigError, match=words):
         Chirp(replace(ChirpConfig(), **change), targets_for(prototype))

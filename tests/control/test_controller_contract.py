@@ -95,7 +95,7 @@ def test_settings_are_frozen_and_say_where_the_controller_is_at_home(
 ) -> None:
     assert isinstance(settings.kind, str)
     assert settings.usual_setup in set(SetupKind)
-    first = fields(settings)[0].name  # pyright: ignore
+    first = fields(settings)[0].name  # pyrefly: ignore[bad-argument-type]
     with pytest.raises(FrozenInstanceError):
         setattr(settings, first, getattr(settings, first))
 

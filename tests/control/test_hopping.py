@@ -78,6 +78,7 @@ def test_a_leg_without_truth_tells_the_same_jumps(hops: dict[str, Summary], name
     assert np.max(np.abs(told.stance.end[-10:] - seen.stance.end[-10:])) < 0.02
 
 
+@pytest.mark.long
 def test_the_optimal_leg_goes_on_hopping(optimal: LegDesign, tmp_path: Path) -> None:
     """Past the time in which a hop that grows slowly would reach a straight leg."""
     reduced = Linkage(kind=LinkageKind.REDUCED)

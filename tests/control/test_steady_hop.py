@@ -44,11 +44,13 @@ def polar_rest(design: LegDesign, settings: JumpConfig, servo: ServoConfig) -> f
     return largest
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("servo", [ServoConfig(), LIMITED], ids=["ideal", "limited"])
 def test_a_smaller_push_or_more_damping_steadies_the_hop(
     optimal: LegDesign, servo: ServoConfig
 ) -> None:
-    damped = replace(optimal, damping=tuple(1.3 * value for value in optimal.damping))
+    hip, knee = optimal.damping
+    damped = replace(optimal, damping=(1.3 * hip, 1.3 * knee))
     assert polar_rest(optimal, JumpConfig(), servo) > 0.005
     assert polar_rest(optimal, JumpConfig(dz2=0.14), servo) < 0.001
     assert polar_rest(damped, JumpConfig(), servo) < 0.001

@@ -1,5 +1,6 @@
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -141,9 +142,10 @@ def test_every_mend_mends(leg: LegDesign) -> None:
             elif part[0] == "springs":
                 pair = list(getattr(leg, part[1]))
                 pair[int(mend.parameter[-2]) - 1] = value
-                changed = replace(leg, **{part[1]: tuple(pair)})
+                spring: dict[str, Any] = {part[1]: tuple(pair)}
+                changed = replace(leg, **spring)
             else:
-                segment = replace(getattr(leg, part[0]), **{part[1]: value})
+                segment: Any = replace(getattr(leg, part[0]), **{part[1]: value})
                 changed = replace(leg, **{part[0]: segment})
             after = conditions(changed)
             assert abs(after[name].ratio) < 1e-9

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from docs_blocks import (  # pyright: ignore[reportMissingImports]
+from docs_blocks import (
     ROOT,
     CommandLine,
     NamedFile,
@@ -12,8 +12,8 @@ from docs_blocks import (  # pyright: ignore[reportMissingImports]
     pages,
     spans,
 )
-from docs_parse import misunderstood, unknown_flags  # pyright: ignore[reportMissingImports]
-from docs_run import lay, play, prepare  # pyright: ignore[reportMissingImports]
+from docs_parse import misunderstood, unknown_flags
+from docs_run import lay, play, prepare
 
 PAGES = pages()
 SHOWN = [
@@ -21,6 +21,8 @@ SHOWN = [
     for page in PAGES
     if any(isinstance(each, CommandLine) and each.prompted for each in items(page))
 ]
+LONG = ("identify.md",)
+"""Documents whose commands take seconds; those of all others are tried by `make test`."""
 
 
 def named(page: Path) -> str:
@@ -54,7 +56,13 @@ def test_commands_within_sentences_have_the_flags_that_are_named(page: Path, des
     assert wrong == {}
 
 
-@pytest.mark.parametrize("page", SHOWN, ids=named)
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(page, marks=[pytest.mark.long] if page.name in LONG else [], id=named(page))
+        for page in SHOWN
+    ],
+)
 def test_what_is_shown_is_what_is_printed(page: Path, tmp_path: Path) -> None:
     prepare(tmp_path)
     wrong = {

@@ -5,8 +5,8 @@ import unicodedata
 from pathlib import Path
 
 import pytest
-from docs_blocks import FENCED, ROOT, pages  # pyright: ignore[reportMissingImports]
-from docs_links import broken_links  # pyright: ignore[reportMissingImports]
+from docs_blocks import FENCED, ROOT, pages
+from docs_links import broken_links
 
 PAGES = [*pages(), ROOT / "CHANGELOG.md"]
 LINK = re.compile(r"\]\((?!https?:)([^)#\s]*)(?:#([^)\s]+))?\)")

@@ -3,15 +3,15 @@
 from pathlib import Path
 
 import pytest
-from docs_blocks import (  # pyright: ignore[reportMissingImports]
+from docs_blocks import (
     CommandLine,
     NamedFile,
     Program,
     items,
     spans,
 )
-from docs_compare import differences  # pyright: ignore[reportMissingImports]
-from docs_parse import misunderstood, unknown_flags  # pyright: ignore[reportMissingImports]
+from docs_compare import differences
+from docs_parse import misunderstood, unknown_flags
 
 PAGE = """# A page
 
@@ -58,6 +58,8 @@ def test_commands_files_and_programs_are_found_with_their_places(page: Path) -> 
         prompted=True,
         shown=("inertia    met  +3.714e-10", "", "elastic    met"),
     )
+    assert isinstance(hop, CommandLine)
+    assert isinstance(replay, CommandLine)
     assert (hop.words, hop.prompted, hop.shown) == (("legbench", "hop", "leg.toml"), True, ())
     assert (replay.words, replay.prompted) == (
         ("legbench", "replay", "RUN", *["--view", "--speed", "0.5"]),

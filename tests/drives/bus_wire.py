@@ -21,7 +21,7 @@ BROKEN = 0x7F0
 class Ports(Protocol):
     """Opens buses on one wire and lets its time pass."""
 
-    def open(self, **options: object) -> can.BusABC:
+    def open(self, **options: Any) -> can.BusABC:
         """Open one more bus."""
         ...
 
@@ -46,8 +46,8 @@ class LockstepPorts:
     def __init__(self, _folder: Path) -> None:
         self.network = _network()
 
-    def open(self, **options: object) -> can.BusABC:
-        return LockstepBus("wire", network=self.network, **options)  # pyright: ignore[reportArgumentType]
+    def open(self, **options: Any) -> can.BusABC:
+        return LockstepBus("wire", network=self.network, **options)
 
     def pass_time(self) -> None:
         self.network.advance(self.network.now_ns + MS)
@@ -71,8 +71,8 @@ class UnixPorts:
         self._now_ns += MS // 10
         return self._now_ns
 
-    def open(self, **options: object) -> can.BusABC:
-        bus = UnixBus(str(self.server.path), **options)  # pyright: ignore[reportArgumentType]
+    def open(self, **options: Any) -> can.BusABC:
+        bus = UnixBus(str(self.server.path), **options)
         for _ in range(3):
             self.server.poll()
         return bus

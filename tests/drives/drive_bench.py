@@ -1,6 +1,7 @@
 """One emulated drive by itself and a hand that feeds it, frame by frame."""
 
 import math
+from typing import Any
 
 from drives_rig import MS, config, node
 
@@ -23,8 +24,9 @@ OFFSET = 777
 class Bench:
     """One drive and a hand that feeds it: 1 ms a cycle, SYNC at its start."""
 
-    def __init__(self, *, configured: bool = True, **changes: object) -> None:
-        self.behaviour = Behaviour(**{"reply_delay_us": (50, 50), "interpolate": False, **changes})  # pyright: ignore[reportArgumentType]
+    def __init__(self, *, configured: bool = True, **changes: Any) -> None:
+        # pyrefly: ignore[bad-argument-type]
+        self.behaviour = Behaviour(**{"reply_delay_us": (50, 50), "interpolate": False, **changes})
         self.drive = EmulatedDrive(node(0), self.behaviour)
         self.now_ns = 0
         self.sent: list[tuple[int, Frame]] = []

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.body import Body, stiff_body
@@ -40,7 +41,7 @@ def node(place: int) -> NodeConfig:
     )
 
 
-def config(**changes: object) -> BusConfig:
+def config(**changes: Any) -> BusConfig:
     """The bus of the rig."""
     return replace(BusConfig(nodes=(node(0), node(1))), **changes)
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.objects import OBJECTS, Key
@@ -54,10 +55,11 @@ class Sheet:
             self.entries[key].access, self.entries[key].default = access, value
         return self
 
-    def add(self, key: Key, kind: DataType | int, access: str = "ro", **more: object) -> "Sheet":
+    def add(self, key: Key, kind: DataType | int, access: str = "ro", **more: Any) -> "Sheet":
         """Add an object."""
         usual = {"name": "thing", "default": "0", "mappable": access != "const"}
-        self.entries[key] = Entry(kind=int(kind), access=access, **(usual | more))  # pyright: ignore[reportArgumentType]
+        # pyrefly: ignore[bad-argument-type]
+        self.entries[key] = Entry(kind=int(kind), access=access, **(usual | more))
         return self
 
     def text(self, spell: Callable[[int], str] = lambda number: f"0x{number:X}") -> str:

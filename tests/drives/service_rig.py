@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Sequence
+from typing import Any
 
 from can_rig import BUS
 
@@ -25,7 +26,7 @@ HOMED = HomedCondition(object=Mapped(0x6041, 0, DataType.UNSIGNED16), mask=0x800
 BENCH = load_bus(BUS)
 
 
-def serial(node: NodeConfig, number: int, **changes: object) -> NodeConfig:
+def serial(node: NodeConfig, number: int, **changes: Any) -> NodeConfig:
     identity = dataclasses.replace(node.identity, serial=number)
     return dataclasses.replace(node, identity=identity, **changes)
 

@@ -31,8 +31,15 @@ CAUSES = {
     ("emulation", "controller", "drive", "onset", "servo"),
     [
         (Emulation.CAN, "jump", 1, 0.537, ServoConfig(bandwidth=30.0)),
-        (Emulation.SIM, "bang-bang", 0, 0.622, ServoConfig(bandwidth=15.0, encoder_counts=4096)),
-        (Emulation.ANALYTIC, "jump", 1, 0.704, ServoConfig(delay_cycles=2)),
+        pytest.param(
+            *(Emulation.SIM, "bang-bang", 0, 0.622),
+            ServoConfig(bandwidth=15.0, encoder_counts=4096),
+            marks=pytest.mark.long,
+        ),
+        pytest.param(
+            *(Emulation.ANALYTIC, "jump", 1, 0.704, ServoConfig(delay_cycles=2)),
+            marks=pytest.mark.long,
+        ),
     ],
 )
 def test_a_part_that_dies_is_found_in_time(
@@ -48,9 +55,14 @@ def test_a_part_that_dies_is_found_in_time(
 @pytest.mark.parametrize(
     ("emulation", "servo"),
     [
-        (Emulation.SIM, ServoConfig(bandwidth=15.0, encoder_counts=4096)),
+        pytest.param(
+            *(Emulation.SIM, ServoConfig(bandwidth=15.0, encoder_counts=4096)),
+            marks=pytest.mark.long,
+        ),
         (Emulation.CAN, ServoConfig(bandwidth=15.0, encoder_counts=4096)),
-        (Emulation.ANALYTIC, ServoConfig(encoder_counts=1 << 20)),
+        pytest.param(
+            *(Emulation.ANALYTIC, ServoConfig(encoder_counts=1 << 20)), marks=pytest.mark.long
+        ),
     ],
 )
 def test_a_healthy_leg_is_left_alone(

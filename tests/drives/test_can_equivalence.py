@@ -111,7 +111,7 @@ def both(chosen: Experiment, folder: Path) -> tuple[Recording, Recording]:
 
 @pytest.mark.parametrize(
     ("config", "duration"),
-    [(BangBangConfig(), 1.5), (JumpConfig(), 1.0)],
+    [pytest.param(BangBangConfig(), 1.5, marks=pytest.mark.long), (JumpConfig(), 1.0)],
     ids=["bang-bang", "jump"],
 )
 def test_drives_are_a_simulation_with_one_cycle_of_delay(

@@ -69,7 +69,13 @@ def stands(it: Stage) -> None:
 
 
 @pytest.mark.parametrize(
-    ("phase", "cycles"), [("pushing", 150), ("released", 500), ("flying", 545), ("folding", 620)]
+    ("phase", "cycles"),
+    [
+        ("pushing", 150),
+        pytest.param("released", 500, marks=pytest.mark.long),
+        ("flying", 545),
+        pytest.param("folding", 620, marks=pytest.mark.long),
+    ],
 )
 def test_a_jump_ends_on_the_ground_whenever_its_time_is_over(phase: str, cycles: int) -> None:
     """In each phase, power goes when the foot stands and joints are slow."""
@@ -117,6 +123,7 @@ def test_in_mid_flight_the_leg_lands_first_and_slowly() -> None:
         assert len(moves) > 1000
 
 
+@pytest.mark.long
 def test_a_run_that_is_to_stop_stops_in_mid_flight(tmp_path: Path) -> None:
     chosen = calm(JumpConfig())
     with stage(chosen) as it:
@@ -146,7 +153,9 @@ def test_a_run_that_is_to_stop_stops_in_mid_flight(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", [SetupKind.HFTS, SetupKind.VFTS, SetupKind.FFS])
-@pytest.mark.parametrize("config", [PositionJumpConfig(), BangBangConfig()])
+@pytest.mark.parametrize(
+    "config", [PositionJumpConfig(), pytest.param(BangBangConfig(), marks=pytest.mark.long)]
+)
 def test_a_leg_that_is_held_ends_in_its_rest_posture(
     kind: SetupKind, config: ControllerSettings
 ) -> None:
@@ -162,6 +171,7 @@ def test_a_leg_that_is_held_ends_in_its_rest_posture(
         assert outcome.message is None
 
 
+@pytest.mark.long
 def test_the_papers_leg_rests_in_time_where_it_swings_longest() -> None:
     """With its foot pinned, in the simulation that also moves the emulated bench."""
     chosen = replace(experiment(PositionJumpConfig()), setup=Setup(kind=SetupKind.FFS))
@@ -219,9 +229,9 @@ def test_an_interrupt_while_it_lands_takes_the_power_at_once() -> None:
             began.append(it.network.now_ns)
             if len(began) == 50:
                 stop.set()
-            return lead(motor_pos)  # pyright: ignore[reportArgumentType]
+            return lead(motor_pos)  # pyrefly: ignore[bad-argument-type]
 
-        it.plant._lead = counted  # pyright: ignore[reportAttributeAccessIssue]
+        it.plant._lead = counted  # pyrefly: ignore[bad-assignment]
         outcome = run(it.plant, it.controller, 300, stop=stop)
         assert outcome.status == "interrupted"
         assert len(began) == 50
@@ -240,9 +250,9 @@ def lands_with(it: Stage, fault: NodeFaultKind) -> Outcome:
         told.append(motor_pos)
         if len(told) == 50:
             it.network.inject(NodeFault(kind=fault, node_id=1, start_ns=it.network.now_ns))
-        return lead(motor_pos)  # pyright: ignore[reportArgumentType]
+        return lead(motor_pos)  # pyrefly: ignore[bad-argument-type]
 
-    it.plant._lead = failing  # pyright: ignore[reportAttributeAccessIssue]
+    it.plant._lead = failing  # pyrefly: ignore[bad-assignment]
     return run(it.plant, it.controller, 300)
 
 

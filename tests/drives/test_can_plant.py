@@ -53,6 +53,7 @@ def test_the_leg_does_not_move_until_it_is_told_to() -> None:
         assert seen.time == 0.0
 
 
+@pytest.mark.long
 def test_drives_that_stand_elsewhere_go_to_the_start_slowly() -> None:
     chosen = experiment(PositionJumpConfig())
     away = [float(value) + 0.1 for value in start_of(chosen).motor_pos]

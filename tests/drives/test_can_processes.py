@@ -39,6 +39,7 @@ from legbench.recording.events import read_events
 from legbench.recording.repair import recover
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["SIGKILL", "SIGSTOP"])
 def test_drives_stop_by_themselves_when_the_master_is_gone(name: str, tmp_path: Path) -> None:
     with served(tmp_path, deadline_ms=1000) as drives, leading(tmp_path, drives) as run:
@@ -49,6 +50,7 @@ def test_drives_stop_by_themselves_when_the_master_is_gone(name: str, tmp_path: 
     assert report.rows_kept > 0
 
 
+@pytest.mark.long
 def test_a_run_over_the_slcan_of_python_can(tmp_path: Path) -> None:
     with served(tmp_path, "--serve", "slcan") as drives:
         drives.await_state("switch on disabled")
@@ -75,6 +77,7 @@ SLOW = 0.05
 """Time that each step of a guest takes [s]."""
 
 
+@pytest.mark.long
 def test_a_guest_that_takes_too_long_is_the_fault_with_its_own_lines(tmp_path: Path) -> None:
     own = (ROOT / "scripts" / "examples" / "own_controller.py").read_text(encoding="utf-8")
     step = "    def step(self, observation):\n"
@@ -124,6 +127,7 @@ def rows_go_on(folder: Path) -> bool:
     return stream.stat().st_size > size
 
 
+@pytest.mark.long
 def test_looking_beside_a_master_changes_nothing_for_it(
     led: tuple[Served, Popen[str], Path],
 ) -> None:

@@ -244,6 +244,7 @@ def logged(monkeypatch: pytest.MonkeyPatch) -> list[Network]:
     return made
 
 
+@pytest.mark.long
 def test_2_ms_at_500_kbit_on_two_channels_with_12_bits_that_wrap_in_mid_jump(
     tmp_path: Path, logged: list[Network]
 ) -> None:

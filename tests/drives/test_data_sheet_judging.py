@@ -5,6 +5,7 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from drives_rig import config
@@ -205,10 +206,10 @@ def test_random_combinations_are_predicted_or_refused_alike(tmp_path: Path) -> N
 # --- proposing -------------------------------------------------------------------------------
 
 
-def learned_by(tmp_path: Path, sheet: Sheet, **more: object) -> BusConfig:
+def learned_by(tmp_path: Path, sheet: Sheet, **more: Any) -> BusConfig:
     (tmp_path / "it.eds").write_text(sheet.text(), encoding="utf-8")
     out = tmp_path / "leg.toml"
-    found = learn(tmp_path / "it.eds", out, **more)  # pyright: ignore[reportArgumentType]
+    found = learn(tmp_path / "it.eds", out, **more)
     assert found.problems == ()
     write_bus(found, out)
     assert check(out).problems == ()

@@ -251,6 +251,7 @@ def test_a_command_that_reads_no_sheet_loads_no_library() -> None:
     assert done.stdout == "False\n"
 
 
+@pytest.mark.long
 def test_mutated_sheets_are_proposed_from_or_refused_in_one_line() -> None:
     command = [sys.executable, "-W", "error", str(ROOT / "scripts" / "fuzz_sheets.py")]
     done = subprocess.run(

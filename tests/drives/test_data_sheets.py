@@ -8,7 +8,7 @@ from datetime import datetime
 from pathlib import Path
 
 import canopen
-import eds  # pyright: ignore[reportMissingImports]
+import eds
 import pytest
 from can_rig import BUS, ROOT
 
@@ -26,7 +26,7 @@ OBJECT = re.compile(r"([0-9A-F]{4})(?:sub([0-9A-F]+))?")
 
 def sheet(name: str) -> configparser.ConfigParser:
     parser = configparser.ConfigParser(interpolation=None)
-    parser.optionxform = str  # pyright: ignore[reportAttributeAccessIssue]
+    parser.optionxform = str  # pyrefly: ignore[bad-assignment]
     parser.read(HARDWARE / name, encoding="ascii")
     return parser
 

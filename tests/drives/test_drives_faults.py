@@ -2,6 +2,7 @@
 
 import math
 from pathlib import Path
+from typing import Any
 
 import pytest
 from drives_rig import MS, START, Rig, rig
@@ -38,13 +39,13 @@ def move_until_fault(it: Rig, cycles: int = 400) -> tuple[PlantFault, int]:
     pytest.fail("not detected")
 
 
-def strike(it: Rig, **what: object) -> None:
+def strike(it: Rig, **what: Any) -> None:
     start_ns = it.network.now_ns + AFTER * MS
     kind = what["kind"]
     it.network.inject(
-        NodeFault(start_ns=start_ns, **what)  # pyright: ignore[reportArgumentType]
+        NodeFault(start_ns=start_ns, **what)
         if isinstance(kind, NodeFaultKind)
-        else FrameFault(start_ns=start_ns, **what)  # pyright: ignore[reportArgumentType]
+        else FrameFault(start_ns=start_ns, **what)
     )
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from can_rig import BUS, LIMITS, ROOT
@@ -32,7 +33,7 @@ from legbench.plants import limits_for
 angles = st.floats(-2.2, 2.2)
 
 
-def changed(**changes: object) -> BusConfig:
+def changed(**changes: Any) -> BusConfig:
     """The bench's bus with another first node."""
     bus = load_bus(BUS)
     return replace(bus, nodes=(replace(bus.nodes[0], **changes), bus.nodes[1]))

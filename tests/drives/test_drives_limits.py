@@ -117,18 +117,18 @@ GOOD: dict[str, Any] = {
         ({"temperature": [25.0, 81.0]}, "temperature", r"drive 2 is at 81\.0 deg C"),
     ],
 )
-def test_every_limit_has_its_cause(change: dict[str, object], cause: str, words: str) -> None:
+def test_every_limit_has_its_cause(change: dict[str, Any], cause: str, words: str) -> None:
     guard = Guard(LIMITS, PERIOD)
     guard.check(**GOOD)
     with pytest.raises(PlantFault, match=words) as caught:
-        guard.check(**{**GOOD, **change})  # pyright: ignore[reportArgumentType]
+        guard.check(**{**GOOD, **change})
     assert caught.value.cause == cause
 
 
 def test_a_following_error_may_last_its_cycles() -> None:
     guard = Guard(LIMITS, PERIOD)
     guard.start_at((0.0, 1.0))
-    away = {**GOOD, "motor_pos": (0.2, 1.0)}
+    away: dict[str, Any] = {**GOOD, "motor_pos": (0.2, 1.0)}
     for _ in range(3):
         guard.check(**away, expected_pos=(0.0, 1.0))
     guard.check(**GOOD, expected_pos=(0.0, 1.0))

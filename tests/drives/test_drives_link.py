@@ -232,7 +232,8 @@ def test_another_drive_is_named_before_anything_is_enabled(
     network = emulate(config())
     bus = LockstepBus("rig", network=network)
     wanted = replaced(0, **{name: value})
-    link = Link(bus, wanted, stiffness=STIFFNESS, lock=ChannelLock("rig", tmp_path))  # pyright: ignore[reportArgumentType]
+    # pyrefly: ignore[bad-argument-type]
+    link = Link(bus, wanted, stiffness=STIFFNESS, lock=ChannelLock("rig", tmp_path))
     with pytest.raises(DriveError, match=words):
         link.start()
     assert all(drive.axis.power.state is SO for drive in network.drives)

@@ -64,7 +64,8 @@ QUICK = [Behaviour(start_pos=pos, reply_delay_us=(50, 100)) for pos in START]
 
 def test_two_tpdos_a_drive_and_a_temperature(tmp_path: Path) -> None:
     chosen = wide()
-    with rig(tmp_path, bus_config=chosen, behaviours=QUICK) as it:  # pyright: ignore[reportArgumentType]
+    # pyrefly: ignore[bad-argument-type]
+    with rig(tmp_path, bus_config=chosen, behaviours=QUICK) as it:
         it.link.start()
         it.run(450)
         it.link.command(START)
@@ -76,7 +77,8 @@ def test_two_tpdos_a_drive_and_a_temperature(tmp_path: Path) -> None:
 def test_too_hot_a_drive_ends_the_run(tmp_path: Path) -> None:
     chosen = wide()
     limits = replace(LIMITS, temperature=60.0)
-    with rig(tmp_path, bus_config=chosen, limits=limits, behaviours=QUICK) as it:  # pyright: ignore[reportArgumentType]
+    # pyrefly: ignore[bad-argument-type]
+    with rig(tmp_path, bus_config=chosen, limits=limits, behaviours=QUICK) as it:
         it.link.start()
         # The sensor alone: the drive itself has not tripped yet.
         it.network.drives[0]._values[0x2070, 0] = 701

@@ -4,6 +4,7 @@ import math
 import struct
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import can
 import pytest
@@ -37,9 +38,9 @@ FORGOTTEN = 15_000
 """Position offset that another program left in a drive [counts]."""
 
 
-def with_nodes(**changes: object) -> BusConfig:
+def with_nodes(**changes: Any) -> BusConfig:
     """The rig's bus with the same changes to both drives."""
-    return config(nodes=tuple(replace(node, **changes) for node in config().nodes))  # pyright: ignore[reportArgumentType]
+    return config(nodes=tuple(replace(node, **changes) for node in config().nodes))
 
 
 def parameter(index: int, value: int, sub: int = 0) -> Parameter:

@@ -6,6 +6,7 @@ import random
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import can
 import pytest
@@ -276,8 +277,14 @@ def test_what_is_no_classic_frame_is_not_sent_and_a_closed_bus_does_nothing(
     server: SlcanServer,
 ) -> None:
     bus = opened(server)
-    for changes in ({"is_error_frame": True}, {"is_fd": True}, {"arbitration_id": 1 << 29}):
+    wrong: list[dict[str, Any]] = [
+        {"is_error_frame": True},
+        {"is_fd": True},
+        {"arbitration_id": 1 << 29},
+    ]
+    for changes in wrong:
         with pytest.raises(can.CanOperationError, match=r"not sent|29 bits"):
+            # pyrefly: ignore[bad-argument-type]
             bus.send(can.Message(**{"arbitration_id": 0, "data": b"\1\1", **changes}))
     bus.shutdown()
     for call in (lambda: bus.send(ASK), lambda: bus.recv(0.0)):

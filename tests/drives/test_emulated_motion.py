@@ -33,7 +33,7 @@ def motor(
         (0x6065, 0): 0xFFFFFFFF,
         (0x6066, 0): 0,
     } | (objects or {})
-    return Motion(units, Behaviour(**behaviour), values)  # pyright: ignore[reportArgumentType]
+    return Motion(units, Behaviour(**behaviour), values)  # pyrefly: ignore[bad-argument-type]
 
 
 @pytest.mark.parametrize("units", [UNITS, MIRRORED])

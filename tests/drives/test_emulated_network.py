@@ -1,6 +1,7 @@
 """The wire of the emulated bus: order, times, error counters, and each fault in its window."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import pytest
 from drives_rig import MS, config
@@ -28,14 +29,14 @@ US = 1000
 KIND = FrameFaultKind
 
 
-def wire(*faults: Fault, stuffing: Stuffing = Stuffing.NONE, **changes: object) -> Network:
+def wire(*faults: Fault, stuffing: Stuffing = Stuffing.NONE, **changes: Any) -> Network:
     """A bus without drives: two masters talk."""
     return Network(
         (),
         faults=faults,
         stuffing=stuffing,
         keep_log=True,
-        **changes,  # pyright: ignore[reportArgumentType]
+        **changes,
     )
 
 
@@ -294,10 +295,8 @@ def test_a_frame_fault_strikes_its_identifier_in_its_window(kind: FrameFaultKind
         ({"kind": KIND.WRONG_LENGTH, "length": 0}, [(63, b"")]),
     ],
 )
-def test_what_arrives_of_a_frame(
-    fault: dict[str, object], arrivals: list[tuple[int, bytes]]
-) -> None:
-    network = wire(FrameFault(cob_id=0x100, **fault))  # pyright: ignore[reportArgumentType]
+def test_what_arrives_of_a_frame(fault: dict[str, Any], arrivals: list[tuple[int, bytes]]) -> None:
+    network = wire(FrameFault(cob_id=0x100, **fault))
     here, there = network.attach(), network.attach()
     network.send(here, Frame(0x100, b"\1\2"))
     network.advance(5 * MS)

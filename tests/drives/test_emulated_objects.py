@@ -273,8 +273,12 @@ def test_orders_to_other_nodes_are_not_obeyed_those_to_all_are() -> None:
 def test_frames_that_are_not_for_it_are_not_heard() -> None:
     bench = Bench(configured=False)
     start = nmt_frame(NmtCommand.START, 1)
-    for change in ({"error": True}, {"extended": True}, {"remote": True}):
-        bench.give(start._replace(**change))
+    for other in (
+        start._replace(error=True),
+        start._replace(extended=True),
+        start._replace(remote=True),
+    ):
+        bench.give(other)
         assert bench.drive.state is NmtState.PRE_OPERATIONAL
     request = bytes.fromhex("4000100000000000")
     for cob_id, answers in ((0x602, 0), (0x600, 0), (0x601, 1)):

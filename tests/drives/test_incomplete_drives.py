@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+import can
 import pytest
 from drives_rig import LIMITS, config, node, rig
 from object_tables import NO_OBJECT, Objects
@@ -36,17 +37,17 @@ class Table:
             self.it.sizes[parameter.key] = len(pack(parameter.kind, 0))
         self.up = self.it.bring_up(self.bus)
         self._send = self.it.send
-        self.it.send = self._answer  # pyright: ignore[reportAttributeAccessIssue]
+        self.it.send = self._answer
 
-    def _answer(self, message: object) -> None:
-        data = bytes(message.data)  # pyright: ignore[reportAttributeAccessIssue]
+    def _answer(self, message: can.Message) -> None:
+        data = bytes(message.data)
         key = (int.from_bytes(data[1:3], "little"), data[3])
         if key in self.fixed and data[0] != 0x40:
             self.it.aborts[key] = READ_ONLY
-            self._send(message)  # pyright: ignore[reportArgumentType]
+            self._send(message)
             del self.it.aborts[key]
             return
-        self._send(message)  # pyright: ignore[reportArgumentType]
+        self._send(message)
 
     def has(self, key: tuple[int, int], value: int) -> None:
         """Fix a value: a write is answered by 06010002h."""
@@ -212,15 +213,15 @@ def test_another_option_that_brakes_is_tried_where_one_is_refused() -> None:
     refused = {(0x605A, 0): 2, (0x6007, 0): 3, (0x605E, 0): 2}
     send = it.it.send
 
-    def choosy(message: object) -> None:
-        data = bytes(message.data)  # pyright: ignore[reportAttributeAccessIssue]
+    def choosy(message: can.Message) -> None:
+        data = bytes(message.data)
         key = (int.from_bytes(data[1:3], "little"), data[3])
         if data[0] != 0x40 and refused.get(key) == data[4]:
             it.it.aborts[key] = TOO_HIGH
-        send(message)  # pyright: ignore[reportArgumentType]
+        send(message)
         it.it.aborts.clear()
 
-    it.it.send = choosy  # pyright: ignore[reportAttributeAccessIssue]
+    it.it.send = choosy
     found = it.configured()
     assert {key: found[key].there for key in refused} == {
         (0x605A, 0): 6,

@@ -54,7 +54,8 @@ def test_a_limit_that_is_left_out_does_not_act_and_counts_have_their_numbers() -
 @pytest.mark.parametrize("name", list(GIVEN))
 def test_real_drives_are_led_with_all_seven_limits_and_not_without_any(name: str) -> None:
     assert refusal(SafetyLimits(**GIVEN).require_complete) is None
-    told = refusal(SafetyLimits(**{**GIVEN, name: INF}).require_complete)
+    fewer: dict[str, Any] = {**GIVEN, name: INF}
+    told = refusal(SafetyLimits(**fewer).require_complete)
     assert told == (f"limits leave out {name}; real drives are not led without: give each a value")
 
 
@@ -69,7 +70,7 @@ def test_a_limit_is_above_zero(name: str, value: float) -> None:
 
 @pytest.mark.parametrize("name", ["following_cycles", "overrun_cycles", "lost_frames"])
 def test_a_count_is_at_least_one(name: str) -> None:
-    assert getattr(SafetyLimits(**{name: 1}), name) == 1  # pyright: ignore[reportArgumentType]
+    assert getattr(SafetyLimits(**{name: 1}), name) == 1  # pyrefly: ignore[bad-argument-type]
     assert refusal(SafetyLimits, **{name: 0}) == f"{name} is 0 cycles; it must be positive"
 
 

@@ -5,12 +5,12 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from odd_drive_draw import (  # pyright: ignore[reportMissingImports]
+from odd_drive_draw import (
     INTERPOLATES,
     Drawn,
     ordinary,
 )
-from odd_drives import START, pair, trial  # pyright: ignore[reportMissingImports]
+from odd_drives import START, pair, trial
 
 from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.pdo import Mapped
@@ -77,7 +77,9 @@ NOT_NEEDED: tuple[Any, ...] = (
 @pytest.mark.parametrize(
     ("lacks", "code"),
     [
-        (lacks, CODES[(place + turn) % len(CODES)])
+        pytest.param(
+            lacks, CODES[(place + turn) % len(CODES)], marks=[pytest.mark.long] if turn else []
+        )
         for place, lacks in enumerate(NOT_NEEDED)
         for turn in (0, 1)
     ],
@@ -128,7 +130,7 @@ def test_a_mode_that_follows_after_seconds_is_waited_for_as_the_bus_file_says() 
     assert led(told(slow, mode_patience_ms=6000)) is None
 
 
-@pytest.mark.parametrize("lag_us", [0, 300_000, 3_000_000])
+@pytest.mark.parametrize("lag_us", [0, pytest.param(300_000, marks=pytest.mark.long), 3_000_000])
 @pytest.mark.parametrize("follows", [True, False])
 def test_a_mode_that_is_shown_with_power_alone_is_asked_for_then(
     lag_us: int, follows: bool
@@ -283,7 +285,9 @@ def test_one_encoder_leads_a_joint(side: Side, torque: Mapped | None) -> None:
 # --- together --------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("block", range(BLOCKS))
+@pytest.mark.parametrize(
+    "block", [0, *(pytest.param(block, marks=pytest.mark.long) for block in range(1, BLOCKS))]
+)
 def test_random_combinations_run_or_are_refused_in_one_line(block: int) -> None:
     chance = random.Random(f"odd drives {block}")
     ran = 0

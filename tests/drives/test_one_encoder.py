@@ -202,6 +202,7 @@ def test_controllers_that_lead_motors_are_refused_where_links_are_led(
 # --- runs ------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_a_jump_on_motor_encoders_and_torques_is_rated_as_any(tmp_path: Path) -> None:
     (tmp_path / "a").mkdir()
     usual = ran(tmp_path / "a", BUS.read_text(encoding="utf-8"), JumpConfig(), 1.6)

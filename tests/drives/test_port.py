@@ -2,6 +2,7 @@
 
 from collections import deque
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import can
 import pytest
@@ -61,7 +62,7 @@ class Wire(can.BusABC):
         self.clock.wait_until(until_ns)
         return None
 
-    def give(self, cob_id: int, data: bytes, after_ms: float = 0.0, **kind: bool) -> None:
+    def give(self, cob_id: int, data: bytes, after_ms: float = 0.0, **kind: Any) -> None:
         """A frame that comes so long from now."""
         message = can.Message(
             arbitration_id=cob_id, data=data, timestamp=1e-9 * self.clock.now, is_extended_id=False
@@ -177,11 +178,11 @@ def test_a_stamp_of_our_clock_is_kept_and_any_other_is_now(
     port, seen = port_of(wire), list[float]()
     port.listener = lambda message: seen.append(message.timestamp)
     now = 1e-9 * wire.clock.now
-    wire.give(0x181, b"", timestamp=now - age_s)  # pyright: ignore[reportArgumentType]
+    wire.give(0x181, b"", timestamp=now - age_s)
     port.take()
     assert seen == [pytest.approx(now - age_s if kept else now, abs=1e-6)]
     # The system's clock is another one, and is brought to ours.
-    wire.give(0x181, b"", timestamp=1.7e9 - age_s)  # pyright: ignore[reportArgumentType]
+    wire.give(0x181, b"", timestamp=1.7e9 - age_s)
     port.take()
     assert seen[1] == pytest.approx(now - age_s if kept else now, abs=1e-5)
 

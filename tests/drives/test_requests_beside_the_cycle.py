@@ -23,6 +23,7 @@ def warm(**changes: object) -> BusConfig:
     return config(nodes=nodes, **changes)
 
 
+@pytest.mark.long
 def test_no_answer_is_late_in_10_s_in_which_temperatures_are_asked(tmp_path: Path) -> None:
     how = [Behaviour(start_pos=pos, seed=place) for place, pos in enumerate(START)]
     bus = warm(tpdo_deadline_us=650)

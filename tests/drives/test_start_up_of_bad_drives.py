@@ -2,6 +2,7 @@
 
 import itertools
 from pathlib import Path
+from typing import Any
 
 import pytest
 from drives_rig import MS, START, Rig, config, rig
@@ -17,10 +18,10 @@ OE, SOD = DriveState.OPERATION_ENABLED, DriveState.SWITCH_ON_DISABLED
 NAMES = ("hip", "knee")
 
 
-def pair(place: int, **odd: object) -> list[Behaviour]:
+def pair(place: int, **odd: Any) -> list[Behaviour]:
     """Two drives, one of them odd."""
     made = [Behaviour(start_pos=pos, seed=3) for pos in START]
-    made[place] = Behaviour(start_pos=START[place], seed=3, **odd)  # pyright: ignore[reportArgumentType]
+    made[place] = Behaviour(start_pos=START[place], seed=3, **odd)
     return made
 
 

@@ -1,5 +1,7 @@
 """Storing of what drives hold (1010h)."""
 
+from typing import Any
+
 import pytest
 from service_rig import BENCH, MS, opened, written
 
@@ -81,7 +83,7 @@ def test_a_drive_that_never_answers_to_the_signature_is_told_as_unknown() -> Non
         if frame.data[1:3] != b"\x10\x10" or frame.data[0] >> 5 != 1:
             real(frame, now_ns)
 
-    drive.receive = receive  # pyright: ignore[reportAttributeAccessIssue]
+    drive.receive = receive
     with session, pytest.raises(NoAnswerError, match=r"within 3 s, so whether it has stored"):
         store(session, session.config.nodes, timeout=3.0)
     assert len([frame for frame in written(network) if frame.data[1:3] == b"\x10\x10"]) == 1
@@ -96,10 +98,10 @@ def test_a_drive_that_never_answers_to_the_signature_is_told_as_unknown() -> Non
         ({"timeout": 61.0}, "timeout is 61 s"),
     ],
 )
-def test_settings_of_store_have_two_ends(changes: dict[str, float], words: str) -> None:
+def test_settings_of_store_have_two_ends(changes: dict[str, Any], words: str) -> None:
     session, network = opened()
     with session, pytest.raises(ConfigError, match=words):
-        store(session, session.config.nodes, **changes)  # pyright: ignore[reportArgumentType]
+        store(session, session.config.nodes, **changes)
     assert written(network) == []
 
 

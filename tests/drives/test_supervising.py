@@ -45,9 +45,9 @@ class Scene:
     )
 
     def supervisor(self, **limits: float) -> Supervisor:
-        values = {name: getattr(LIMITS, name) for name in ("motor_range",)} | limits
+        values: dict[str, Any] = {name: getattr(LIMITS, name) for name in ("motor_range",)} | limits
         clock = SimpleNamespace(now_ns=lambda: 1234)
-        chosen = SafetyLimits(**values)  # pyright: ignore[reportArgumentType]
+        chosen = SafetyLimits(**values)
         return Supervisor(cast(Any, self), self.bus, chosen, cast(Any, clock))
 
 

@@ -6,6 +6,7 @@ share would otherwise agree with itself.
 
 import configparser
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from drives_rig import config, node
@@ -39,9 +40,9 @@ def told(bus: BusConfig, chosen: NodeConfig) -> Told:
     ]
 
 
-def bus_of(chosen: NodeConfig, **changes: object) -> BusConfig:
+def bus_of(chosen: NodeConfig, **changes: Any) -> BusConfig:
     other = replace(node(1 - (chosen.node_id == 2)), node_id=3 - chosen.node_id)
-    return replace(config(), nodes=(chosen, other), **changes)  # pyright: ignore[reportArgumentType]
+    return replace(config(), nodes=(chosen, other), **changes)
 
 
 USUAL: Told = [
@@ -210,7 +211,7 @@ def test_pdos_have_the_objects_of_the_standard() -> None:
 
 def sheet(text: str) -> configparser.ConfigParser:
     parser = configparser.ConfigParser(interpolation=None)
-    parser.optionxform = str  # pyright: ignore[reportAttributeAccessIssue]
+    parser.optionxform = str  # pyrefly: ignore[bad-assignment]
     parser.read_string(text)
     return parser
 

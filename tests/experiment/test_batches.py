@@ -29,7 +29,7 @@ JUMP, FFS = Setup(kind=SetupKind.JUMP), Setup(kind=SetupKind.FFS)
 
 
 def chosen(controller: ControllerSettings, setup: Setup = FFS, **more: Any) -> Experiment:
-    given = {"linkage": REDUCED, "duration": 0.25} | more
+    given: dict[str, Any] = {"linkage": REDUCED, "duration": 0.25} | more
     return Experiment(design=PROTOTYPE, controller=controller, setup=setup, **given)
 
 
@@ -91,6 +91,7 @@ def test_every_leg_is_as_alone(controllers: str) -> None:
         same(record_in_memory(leg), together)
 
 
+@pytest.mark.long
 def test_company_and_threads_change_nothing() -> None:
     legs = all_different(12)
     whole = run_batch(legs, threads=1)

@@ -105,6 +105,7 @@ def test_statements_of_the_paper_hold_or_fail() -> None:
     assert not gone[-2].held
 
 
+@pytest.mark.long
 def test_predictions_are_of_every_setup(monkeypatch: pytest.MonkeyPatch) -> None:
     for setup, duration in ((SetupKind.FFS, 2.8), (SetupKind.HFTS, 0.9), (SetupKind.VFTS, 0.9)):
         monkeypatch.setitem(consistency.DURATIONS, setup, duration)
@@ -119,6 +120,7 @@ def test_predictions_are_of_every_setup(monkeypatch: pytest.MonkeyPatch) -> None
         assert np.isfinite([lower, usual]).all()
 
 
+@pytest.mark.long
 def test_a_spring_mismatch_costs_the_hop_its_rating() -> None:
     perfect, apart = hop_of(PROTOTYPE, [PERFECT, Imperfections(stiffness_error=(-0.04, 0.04))])
     assert perfect.cause is None
@@ -229,7 +231,7 @@ def test_the_command_writes_numbers_experiment_and_figures(
 def test_bad_input_is_refused_in_one_line(
     flags: list[str], words: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["explain", "--design", str(MODELS / "prototype.toml"), *flags]) == 1
+    assert main(["explain", "--design", str(MODELS / "prototype.toml"), *flags]) == 2
     shown = capfd.readouterr()
     assert shown.out == ""
     assert shown.err.count("\n") == 1

@@ -59,11 +59,17 @@ def experiment(setup: SetupKind, controller: ControllerSettings, duration: float
 @pytest.mark.parametrize(
     ("setup", "controller", "duration", "flaws"),
     [
-        (SetupKind.FFS, STEP, 1.4, ("springs, segments", "friction", "guide", "range")),
+        pytest.param(
+            *(SetupKind.FFS, STEP, 1.4, ("springs, segments", "friction", "guide", "range")),
+            marks=pytest.mark.long,
+        ),
         (SetupKind.HFTS, STEP, 0.5, ("perfect", "friction", "backlash", "motors")),
-        (SetupKind.VFTS, STEP, 0.5, ("zero errors", "backlash", "motors")),
+        pytest.param(
+            *(SetupKind.VFTS, STEP, 0.5, ("zero errors", "backlash", "motors")),
+            marks=pytest.mark.long,
+        ),
         (SetupKind.HFTS, BANG, 0.6, ("springs, segments", "friction", "motors")),
-        (SetupKind.FFS, BANG, 1.5, ("zero errors", "guide")),
+        pytest.param(*(SetupKind.FFS, BANG, 1.5, ("zero errors", "guide")), marks=pytest.mark.long),
     ],
 )
 def test_ratings_are_those_of_the_runs(

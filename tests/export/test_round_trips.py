@@ -22,7 +22,8 @@ def phases_of(run: Recording) -> set[str]:
 
 def written(run: Recording, folder: Path, kind: Format) -> Path:
     told: list[tuple[int, int]] = []
-    path = export(run, folder / "new" / f"run.{kind.value}", kind, lambda *done: told.append(done))
+    file = folder / "new" / f"run.{kind.value}"
+    path = export(run, file, kind, lambda done, of: told.append((done, of)))
     assert told[-1][0] == told[-1][1] > 0
     assert [each.name for each in path.parent.iterdir()] == [path.name]
     return path

@@ -50,7 +50,7 @@ def test_encoders_that_are_wired_wrongly_or_stand_still_are_named_before_any_fit
     ("harm", "name", "value"),
     [
         (lambda t: late(t, 3), "delay", 3e-3),
-        (lambda t: stretched(t, 1.01), "time_base", 1.01),
+        pytest.param(lambda t: stretched(t, 1.01), "time_base", 1.01, marks=pytest.mark.long),
     ],
 )
 def test_a_delay_and_a_stretched_time_are_told_apart(
@@ -65,6 +65,7 @@ def test_a_delay_and_a_stretched_time_are_told_apart(
     assert any(f"something that was held is wrong: {name}" in each for each in outcome.reasons)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("segment", "name"), [("thigh", "J1"), ("shank", "J2")])
 def test_a_fixed_inertia_that_is_five_percent_wrong_is_named(
     steps: tuple[Trial, ...], segment: str, name: str
@@ -93,6 +94,7 @@ def test_bars_that_are_not_there_are_named(steps: tuple[Trial, ...]) -> None:
     assert outcome.alternatives[0].share > 0.9
 
 
+@pytest.mark.long
 def test_a_held_out_run_judges_the_fit(steps: tuple[Trial, ...]) -> None:
     chirp = trials(
         experiments(

@@ -9,6 +9,7 @@ from legbench.identify.parameters import NINE
 from legbench.identify.trial import Trial
 
 
+@pytest.mark.long
 def test_nine_parameters_are_seen_by_three_setups_and_a_known_mass(
     steps: tuple[Trial, ...],
 ) -> None:
@@ -38,6 +39,7 @@ def test_what_cannot_be_seen_is_refused_in_words(
         identify(asked)
 
 
+@pytest.mark.long
 def test_zero_errors_on_both_sides_of_the_springs_are_marked_weak(
     steps: tuple[Trial, ...],
 ) -> None:

@@ -30,6 +30,7 @@ def test_springs_and_dampers_that_are_thirty_percent_off_are_found(
         assert each.value == pytest.approx(true, rel=2e-4 if each.name[0] == "k" else 4e-3)
 
 
+@pytest.mark.long
 def test_nine_parameters_of_a_leg_that_was_built_otherwise_are_found() -> None:
     flaws = {
         "stiffness_error": (0.04, -0.03),
@@ -48,6 +49,7 @@ def test_nine_parameters_of_a_leg_that_was_built_otherwise_are_found() -> None:
         assert each.error < 0.02 * true
 
 
+@pytest.mark.long
 def test_a_leg_with_bars_is_found_by_equations_with_bars(
     steps_of_bars: tuple[Trial, ...],
 ) -> None:
@@ -59,6 +61,7 @@ def test_a_leg_with_bars_is_found_by_equations_with_bars(
         assert abs(each.value - true) < 4.0 * each.error
 
 
+@pytest.mark.long
 def test_a_run_that_begins_in_motion_is_fitted_from_its_first_row_on(
     steps: tuple[Trial, ...],
 ) -> None:
@@ -122,6 +125,7 @@ def test_predicted_errors_are_those_that_noise_makes(steps: tuple[Trial, ...]) -
     assert np.all(np.abs(ratio - 1.0) < 0.5)
 
 
+@pytest.mark.long
 def test_friction_is_found_where_there_is_some() -> None:
     chosen = experiments(kinds=(SetupKind.VFTS, SetupKind.FFS), coulomb_friction=(0.004, 0.003))
     outcome = identify(

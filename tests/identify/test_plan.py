@@ -44,6 +44,7 @@ def test_a_chirp_shrinks_the_error_of_the_coupling_and_another_step_hardly_does(
     assert "chirp" in plan_lines([first, second])[1]
 
 
+@pytest.mark.long
 def test_predicted_errors_are_those_of_the_fit_after_the_run(steps: tuple[Trial, ...]) -> None:
     """Planning a run like the third after the first two predicts the errors of all three."""
     three = identify(nine(steps))

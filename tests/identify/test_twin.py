@@ -46,6 +46,7 @@ def driven(controller: PositionJumpConfig | JumpConfig, kind: SetupKind,
     )
 
 
+@pytest.mark.long
 def test_a_twin_behind_emulated_drives_is_identified_and_its_hop_predicted(
     tmp_path: Path,
 ) -> None:

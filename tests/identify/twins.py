@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -33,7 +34,7 @@ def experiments(
     controller: ControllerSettings = STEP,
     linkage: Linkage = REDUCED,
     duration: float = 0.6,
-    **flaws: tuple[float, ...],
+    **flaws: Any,
 ) -> list[Experiment]:
     """One run in each of some setups, with noise and counts on the encoders."""
     return [
@@ -43,7 +44,7 @@ def experiments(
             setup=Setup(kind=kind),
             linkage=linkage,
             servo=ServoConfig(encoder_counts=65536),
-            imperfections=Imperfections(link_noise=(NOISE, NOISE), **flaws),  # pyright: ignore
+            imperfections=Imperfections(link_noise=(NOISE, NOISE), **flaws),
             duration=duration,
             seed=place,
         )
@@ -60,9 +61,9 @@ def trials(chosen: Sequence[Experiment]) -> tuple[Trial, ...]:
     )
 
 
-def question(runs: Sequence[Trial], design: LegDesign = OFF, **more: object) -> Question:
+def question(runs: Sequence[Trial], design: LegDesign = OFF, **more: Any) -> Question:
     """Question to some runs that starts once, from a leg that is 30 % off."""
-    return Question(design=design, trials=tuple(runs), starts=1, **more)  # pyright: ignore
+    return Question(design=design, trials=tuple(runs), starts=1, **more)
 
 
 def stretched(trial: Trial, factor: float) -> Trial:

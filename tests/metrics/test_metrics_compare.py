@@ -135,12 +135,12 @@ def test_another_design_and_setup_are_named_entry_by_entry() -> None:
 
 def test_names_say_what_made_a_run() -> None:
     bars = {"kind": "bars"}
-    for entries, title in (
-        ({"plant": "sim", "linkage": bars}, "sim / bars / prototype"),
-        ({"plant": "analytic", "linkage": bars}, "analytic / prototype"),
-        ({}, "prototype"),
+    for made, title in (
+        (manifest(plant="sim", linkage=bars), "sim / bars / prototype"),
+        (manifest(plant="analytic", linkage=bars), "analytic / prototype"),
+        (manifest(), "prototype"),
     ):
-        assert recording(clock(1), manifest(**entries)).description.title == title
+        assert recording(clock(1), made).description.title == title
 
 
 @pytest.mark.parametrize("rows", [1, 2, 5, 60, 250, 900])

@@ -55,16 +55,22 @@ def departure(
     return largest
 
 
-@pytest.mark.parametrize("leg", LEGS, ids=lambda leg: leg.name)
+@pytest.mark.parametrize(
+    "leg",
+    [*LEGS[:4], *(pytest.param(leg, marks=pytest.mark.long) for leg in LEGS[4:])],
+    ids=lambda leg: leg.name,
+)
 def test_a_feasible_leg_keeps_its_mode(leg: LegDesign) -> None:
     assert departure(leg, "reduced") < 1e-6
 
 
+@pytest.mark.long
 def test_the_step_of_the_papers_legs_would_not_keep_every_mode() -> None:
     lost = [leg.name for leg in LEGS if departure(leg, "reduced", timestep=STEP) > 1e-6]
     assert lost == ["random 1", "random 7"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("setup", ["hfts", "ffs"])
 def test_light_bars_get_the_step_that_they_need(setup: str) -> None:
     """Bars that are light add nothing but what the solver makes of them: it falls with the step."""

@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
-from dense_hop import DenseHop  # pyright: ignore[reportMissingImports]
-from dense_rules import Rules  # pyright: ignore[reportMissingImports]
+from dense_hop import DenseHop
+from dense_rules import Rules
 
 from legbench.analytic import LegModel, flying
 from legbench.analytic.taylor import TaylorLeg

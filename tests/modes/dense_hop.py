@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from dense_rules import SCALE, Condition, Rules  # pyright: ignore[reportMissingImports]
+from dense_rules import SCALE, Condition, Rules
 from scipy.integrate import DOP853
 from scipy.optimize import brentq, minimize_scalar
 
@@ -204,7 +204,7 @@ class DenseHop:
                 raise RuntimeError("the reference failed")
             dense = solver.dense_output()
             times = np.linspace(dense.t_old, dense.t, LOOKS + 1)
-            states = [state.tolist() for state in dense(times).T]
+            states: list[list[float]] = [state.tolist() for state in dense(times).T]
             found = self._first(dense, times.tolist(), states, conditions)
             if found is not None:
                 name, self.time = found

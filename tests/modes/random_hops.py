@@ -6,7 +6,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from dense_hop import Story  # pyright: ignore[reportMissingImports]
+from dense_hop import Story
 
 from legbench.analytic import LegModel, Regime
 from legbench.analytic.course import Course

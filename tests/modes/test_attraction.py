@@ -14,7 +14,7 @@ from legbench.signals import Floats
 
 pytest.importorskip("heyoka")
 
-from brute_basins import random_question  # pyright: ignore[reportMissingImports]
+from brute_basins import random_question
 
 from legbench.modes.attraction import Attraction, attraction_of
 from legbench.modes.basin import Fate, Question, attraction_in, fate_of

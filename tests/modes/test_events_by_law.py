@@ -12,9 +12,9 @@ from legbench.design import LegDesign, load_design
 
 pytest.importorskip("heyoka")
 
-from brute_basins import differing, random_question  # pyright: ignore[reportMissingImports]
-from random_hops import random_case, told, tools_of  # pyright: ignore[reportMissingImports]
-from reference.verdicts import judge  # pyright: ignore[reportMissingImports]
+from brute_basins import differing, random_question
+from random_hops import random_case, told, tools_of
+from reference.verdicts import judge
 
 from legbench.analytic.course import Course
 from legbench.analytic.event_detector import Levels
@@ -166,6 +166,7 @@ def test_every_reading_has_its_place() -> None:
     assert [int(event) for event in Event] == list(range(len(Event)))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "seed"), [("prototype", 3), ("optimal", 4)])
 def test_cells_of_a_basin_are_those_of_brute_force(name: str, seed: int) -> None:
     question = random_question(design_of(name), seed, 6)

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from exact_leg import exact_design  # pyright: ignore[reportMissingImports]
-from independent import (  # pyright: ignore[reportMissingImports]
+from exact_leg import exact_design
+from independent import (
     bang_bang,
     motors_at,
     moved,
@@ -177,6 +177,7 @@ def switched(
     return state
 
 
+@pytest.mark.long
 def test_responses_close_and_their_multipliers_are_differences() -> None:
     scene = make_scene(PROTOTYPE, Holding.FFS, 1.0)
     curve = respond(scene, PROTOTYPE.damping, 0.03)
@@ -216,6 +217,7 @@ def test_weak_motors_excite_as_a_linear_oscillator() -> None:
     assert widest.freq == pytest.approx(omega / (2.0 * np.pi), rel=0.01)
 
 
+@pytest.mark.long
 def test_bang_bang_in_the_equations_rides_the_curve() -> None:
     damping, threshold, dz2 = PROTOTYPE.damping, 0.05, 0.08
     scene = make_scene(PROTOTYPE, Holding.FFS, 1.0)
@@ -267,6 +269,7 @@ def test_a_response_that_meets_a_stop_ends_there_by_name() -> None:
     assert curve.responses[-1].radial > 0.7
 
 
+@pytest.mark.long
 def test_a_multiplier_of_minus_one_leads_to_orbits_of_twice_the_period() -> None:
     scene = make_scene(OPTIMAL, Holding.FFS, 1.3)
     family = follow(scene, "radial", 0.35)

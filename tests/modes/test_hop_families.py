@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dense_hop import DenseHop, Rules  # pyright: ignore[reportMissingImports]
+from dense_hop import DenseHop, Rules
 
 pytest.importorskip("heyoka")
 
@@ -130,6 +130,7 @@ def test_a_guess_that_is_no_cycle_is_named() -> None:
         find_cycle(leg, law, [low, START])
 
 
+@pytest.mark.long
 def test_damping_steadies_the_hop_and_the_family_says_where(hop: Cycle) -> None:
     seen: list[tuple[int, int]] = []
     family = follow_hop(

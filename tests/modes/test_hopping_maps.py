@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from exact_leg import exact_design  # pyright: ignore[reportMissingImports]
+from exact_leg import exact_design
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from exact_leg import exact_design  # pyright: ignore[reportMissingImports]
-from independent import differences, moved  # pyright: ignore[reportMissingImports]
+from exact_leg import exact_design
+from independent import differences, moved
 
 pytest.importorskip("heyoka")
 
@@ -47,7 +47,9 @@ def test_modes_of_the_matched_leg_are_the_modal_axes(kind: Holding) -> None:
         assert abs(mode.alignment - 1.0) < 1e-12
 
 
-@pytest.mark.parametrize("kind", HELD)
+@pytest.mark.parametrize(
+    "kind", [*HELD[2:], *(pytest.param(kind, marks=pytest.mark.long) for kind in HELD[:2])]
+)
 def test_the_flow_and_its_derivative_are_those_of_another_integration(kind: Holding) -> None:
     scene = scene_of(PROTOTYPE, kind)
     carrier = Carrier(scene)
@@ -139,7 +141,9 @@ def test_polar_mode_bends_and_radial_mode_of_the_prototype_hardly() -> None:
     assert bends["polar"] > 0.05
 
 
-@pytest.mark.parametrize("design", [EXACT, PROTOTYPE], ids=["exact", "prototype"])
+@pytest.mark.parametrize(
+    "design", [pytest.param(EXACT, marks=pytest.mark.long), PROTOTYPE], ids=["exact", "prototype"]
+)
 @pytest.mark.parametrize("z2", [0.9, 2.04])
 @pytest.mark.parametrize("name", ["radial", "polar"])
 def test_multipliers_are_those_of_a_conservative_flow(

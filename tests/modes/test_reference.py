@@ -10,19 +10,19 @@ import pytest
 
 pytest.importorskip("heyoka")
 
-from dense_hop import DenseHop  # pyright: ignore[reportMissingImports]
-from dense_rules import Rules  # pyright: ignore[reportMissingImports]
-from random_hops import random_case  # pyright: ignore[reportMissingImports]
-from reference.dop853 import (  # pyright: ignore[reportMissingImports]
+from dense_hop import DenseHop
+from dense_rules import Rules
+from random_hops import random_case
+from reference.dop853 import (
     Accuracy,
     Dense,
     attempt,
     dense,
 )
-from reference.events import first_events  # pyright: ignore[reportMissingImports]
-from reference.hops import Hops, Story  # pyright: ignore[reportMissingImports]
-from reference.roots import largest, rising_roots  # pyright: ignore[reportMissingImports]
-from reference.verdicts import UNITS, difference  # pyright: ignore[reportMissingImports]
+from reference.events import first_events
+from reference.hops import Hops, Story
+from reference.roots import largest, rising_roots
+from reference.verdicts import UNITS, difference
 from scipy.integrate import DOP853
 
 from legbench.analytic import LegModel

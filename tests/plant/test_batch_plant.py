@@ -31,7 +31,7 @@ def test_each_row_is_bit_identical_to_a_single_run(
     linkage: LinkageKind, servo: ServoConfig
 ) -> None:
     """Plant and controller, legs that all differ and legs that are all the same."""
-    designs = [*family(12), *[PROTOTYPE] * 4]
+    designs = [*family(6), *[PROTOTYPE] * 2]
     options, cycles = built(JUMP, linkage), 250
     controller, start = hopping(designs)
     plant = BatchPlant(designs, options, start, servo, threads=2)

@@ -266,7 +266,14 @@ def test_rows_of_a_batch_have_the_noise_of_single_legs() -> None:
             assert np.array_equal(batch.link[row], one.link)
 
 
-@pytest.mark.parametrize("name", ["leg", "friction", "guide", "backlash", "zeros", "noise"])
+@pytest.mark.parametrize(
+    "name",
+    ["leg"]
+    + [
+        pytest.param(name, marks=pytest.mark.long)
+        for name in ("friction", "guide", "backlash", "zeros", "noise")
+    ],
+)
 def test_an_emulated_leg_has_them_too(name: str) -> None:
     """To the two cycles that a bus takes, and the counts of its encoders."""
     step = PositionJumpConfig(z2=0.9, dz2=0.05, delay=0.05)

@@ -38,7 +38,7 @@ NAMES: dict[ModuleType, tuple[str, ...]] = {
 def hide() -> None:
     """Take away what other systems do not have."""
     for name in MODULES:
-        sys.modules[name] = None  # pyright: ignore[reportArgumentType]
+        sys.modules[name] = None  # pyrefly: ignore[unsupported-operation]
     for module, names in NAMES.items():
         for name in names:
             if name in vars(module):

@@ -26,7 +26,7 @@ def cycle(row: int, *, truth: bool = True) -> Cycle:
         contact_force=pairs[9],
         energy=pairs[10],
         loop_gap=pairs[11],
-        contact=np.bool_(row % 3 == 0),  # pyright: ignore[reportArgumentType]
+        contact=np.bool_(row % 3 == 0),  # pyrefly: ignore[bad-argument-type]
     )
     observation = Observation(
         time=row / RATE,

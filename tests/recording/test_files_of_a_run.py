@@ -121,7 +121,7 @@ def test_a_file_that_is_there_is_not_appended_to(tmp_path: Path) -> None:
 
 
 def test_plain_values_are_those_of_json() -> None:
-    given = {
+    given: dict[Any, Any] = {
         "array": np.array([[1.0, np.inf], [-np.inf, np.nan]]),
         "number": np.float32(0.5),
         "flag": np.bool_(True),

@@ -38,10 +38,9 @@ def test_the_manifest_is_there_from_the_start(tmp_path: Path) -> None:
     assert manifest["status"] == "running"
     assert manifest["cause"] is None
     assert manifest["design"] == {"m": 0.2}
-    assert manifest["units"]["joint_vel_1"] == "rad/s"  # pyright: ignore
-    assert set(manifest["provenance"]["versions"]) == {  # pyright: ignore
-        *("python", "numpy", "pyarrow", "mujoco")
-    }
+    assert manifest["units"]["joint_vel_1"] == "rad/s"  # pyrefly: ignore[bad-index]
+    # pyrefly: ignore[bad-index]
+    assert set(manifest["provenance"]["versions"]) == {*("python", "numpy", "pyarrow", "mujoco")}
     assert not load(writer.path).complete
     writer.close("interrupted", "SIGINT")
     assert (manifest_of(writer.path) | {"status": "interrupted", "cause": "SIGINT"}) == (

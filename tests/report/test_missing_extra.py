@@ -4,7 +4,9 @@ import sys
 import pytest
 
 
-@pytest.mark.parametrize("absent", [["jinja2"], ["jinja2", "matplotlib"]])
+@pytest.mark.parametrize(
+    "absent", [pytest.param(["jinja2"], marks=pytest.mark.long), ["jinja2", "matplotlib"]]
+)
 def test_missing_libraries_are_told_with_the_extra_that_has_all_of_them(absent: list[str]) -> None:
     code = f"""
 import sys

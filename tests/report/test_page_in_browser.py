@@ -20,9 +20,12 @@ MEASURE = """
 """
 """Left and right end, height and smallest text of every panel [px]."""
 
-pytestmark = pytest.mark.skipif(
-    chromium() is None, reason="no chromium is installed: apt-get install chromium"
-)
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.skipif(
+        chromium() is None, reason="no chromium is installed: apt-get install chromium"
+    ),
+]
 
 
 @pytest.fixture

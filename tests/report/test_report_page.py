@@ -51,6 +51,7 @@ class Outline(HTMLParser):
         assert self.open.pop() == tag
 
 
+@pytest.mark.long
 def test_the_page_is_whole_small_and_asks_for_nothing(
     reported: tuple[Path, dict[str, Any]],
 ) -> None:
@@ -66,12 +67,14 @@ def test_the_page_is_whole_small_and_asks_for_nothing(
     assert text.count('<div class="panel">') == 2 * 3 + 2 * 6 + 3 + 8
 
 
+@pytest.mark.long
 def test_names_of_a_campaign_are_text(reported: tuple[Path, dict[str, Any]]) -> None:
     text = reported[0].read_text(encoding="utf-8")
     assert "small &lt;b&gt; &amp; fair" in text
     assert "small <b>" not in text
 
 
+@pytest.mark.long
 def test_experiments_without_recordings_are_run_afresh_under_their_hash(
     reported: tuple[Path, dict[str, Any]], small: Path
 ) -> None:
@@ -85,6 +88,7 @@ def test_experiments_without_recordings_are_run_afresh_under_their_hash(
         assert told["experiment"] in text
 
 
+@pytest.mark.long
 def test_every_experiment_of_a_campaign_is_made_anew_from_its_folder(small: Path) -> None:
     rows = rows_of(read_table(small), "run")
     for row in rows:
@@ -100,6 +104,7 @@ def test_every_experiment_of_a_campaign_is_made_anew_from_its_folder(small: Path
     }
 
 
+@pytest.mark.long
 def test_an_experiment_that_would_be_another_is_refused(small: Path, tmp_path: Path) -> None:
     row = next(row for row in rows_of(read_table(small), "run"))
     told = json.loads((small / "campaign.json").read_bytes())
@@ -113,6 +118,7 @@ def test_an_experiment_that_would_be_another_is_refused(small: Path, tmp_path: P
         experiment_of(tmp_path, row)
 
 
+@pytest.mark.long
 def test_numbers_stand_beside_the_paper(reported: tuple[Path, dict[str, Any]]) -> None:
     numbers = {row["key"]: row for row in reported[1]["numbers"]}
     assert numbers["step_rating_1"]["published"] == "0.94"
@@ -143,9 +149,10 @@ def test_a_report_is_about_something(tmp_path: Path) -> None:
         write_report([], tmp_path / "report.html")
 
 
+@pytest.mark.long
 def test_single_figures_are_written_beside_the_page(reported: tuple[Path, dict[str, Any]]) -> None:
     page, content = reported
-    assert content["page"] == str(page)
+    assert content["out"] == str(page)
     stems = ("fig4-step", "fig4-bang-bang", "fig5-ideal-equilibrium", "fig5-ideal-motor")
     names = {f"{stem}.png" for stem in (*stems, "fig6", "fig7")}
     assert {path.name for path in (page.parent / "figures").iterdir()} == names
@@ -220,5 +227,5 @@ def test_a_page_that_cannot_be_written_is_refused_at_once(
     told = capsys.readouterr()
     assert told.err.startswith(f"legbench: cannot write {tmp_path / 'file'}")
     assert told.err.count("\n") == 1
-    assert main(["report", str(folder), "--out", str(tmp_path / "page.png")]) == 1
+    assert main(["report", str(folder), "--out", str(tmp_path / "page.png")]) == 2
     assert "the page is a .html file" in capsys.readouterr().err

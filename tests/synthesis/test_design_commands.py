@@ -1,3 +1,4 @@
+import itertools
 import json
 import re
 from pathlib import Path
@@ -73,11 +74,29 @@ def test_design_of_a_quadruped_from_a_file_and_by_name(
 def test_design_refuses_in_one_line(
     arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["design", "--no-cross-check", *arguments]) == 1
+    unwritable = message == "cannot write"
+    assert main(["design", "--no-cross-check", *arguments]) == (1 if unwritable else 2)
     printed = capsys.readouterr()
     assert printed.out == ""
     (line,) = [line for line in printed.err.splitlines() if line.startswith("legbench: ")]
     assert message in line
+
+
+def test_progress_tells_the_best_leg_and_the_time_left_at_the_most(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    told: list[str] = []
+    clock = itertools.count()
+    monkeypatch.setattr("legbench.cli.design.status_line", told.append)
+    monkeypatch.setattr("legbench.cli.output.time.monotonic", lambda: float(next(clock)))
+    assert main(["design", "--no-cross-check", "--evaluations", "100", "--seed", "2"]) == 0
+    first, *later = told
+    assert re.fullmatch(r" +20 of at most 100 evaluations, best \S.*", first)
+    assert "left" not in first
+    # A second a generation: what is left of 100 evaluations in generations of 20.
+    assert [line.rsplit(", ", 1)[1] for line in later] == [
+        f"0:{seconds:02d} left at the most" for seconds in (3, 2, 1, 0)
+    ]
 
 
 def test_a_stopped_search_keeps_its_best_and_goes_on(
@@ -99,7 +118,7 @@ def test_a_stopped_search_keeps_its_best_and_goes_on(
     assert len(trace.read_text().splitlines()) == 1 + whole["evaluations"] // 20
 
 
-@pytest.mark.parametrize("suffix", ["svg", "png"])
+@pytest.mark.parametrize("suffix", ["svg", pytest.param("png", marks=pytest.mark.long)])
 def test_pictures(tmp_path: Path, suffix: str) -> None:
     leg, plot = tmp_path / f"leg.{suffix}", tmp_path / f"plot.{suffix}"
     pictures = ["--drawing", str(leg), "--plot", str(plot)]
@@ -152,7 +171,7 @@ def test_check_tells_exact_from_rounded(capsys: pytest.CaptureFixture[str]) -> N
     arguments = ["check", str(MODELS / "table2.toml"), "--no-model"]
     assert main(arguments) == 0
     assert main([*arguments, "--tolerance", "1e-12"]) == 1
-    assert main([*arguments, "--tolerance", "nan"]) == 1
+    assert main([*arguments, "--tolerance", "nan"]) == 2
     assert "tolerance is nan; it must be zero or more" in capsys.readouterr().err
 
 

@@ -57,7 +57,9 @@ def test_residuals_are_rounding(paper: Solution) -> None:
     assert paper.conditions[4].residual > 0.0
 
 
-@pytest.mark.parametrize("seed", [1, 7, 13])
+@pytest.mark.parametrize(
+    "seed", [1, *(pytest.param(seed, marks=pytest.mark.long) for seed in (7, 13))]
+)
 def test_other_seeds_find_the_same_leg(seed: int, paper: Solution) -> None:
     other = solve(PAPER, SearchSettings(seed=seed), cross_check=False)
     np.testing.assert_allclose(other.free, paper.free, atol=1e-6)
@@ -103,7 +105,9 @@ def test_refining_leaves_an_optimum_alone(paper: Solution) -> None:
     np.testing.assert_allclose(refine(PAPER, shifted), paper.free, atol=1e-5)
 
 
-@pytest.mark.parametrize("mass", [0.1, 20.0, 140.0])
+@pytest.mark.parametrize(
+    "mass", [20.0, *(pytest.param(mass, marks=pytest.mark.long) for mass in (0.1, 140.0))]
+)
 def test_quadrupeds_have_legs(mass: float) -> None:
     found = solve(quadruped(mass), SearchSettings(), cross_check=False)
     assert found.design.total_mass == pytest.approx(mass / 4.0)

@@ -16,7 +16,6 @@ OWN = ROOT / "scripts" / "examples" / "own_controller.py"
 LEG = ("--design", str(ROOT / "models" / "prototype.toml"))
 BUS = str(ROOT / "hardware" / "leg.toml")
 EMULATED = ("can", "--interface", "legbench", "--end", "stop", "--bus", BUS)
-PLANTS = pytest.mark.parametrize("plant", [("sim",), ("analytic",), EMULATED], ids=lambda p: p[0])
 
 
 def ran(
@@ -29,7 +28,11 @@ def ran(
     return status, json.loads(seen.out), seen.err
 
 
-@PLANTS
+@pytest.mark.parametrize(
+    "plant",
+    [("sim",), *(pytest.param(p, marks=pytest.mark.long) for p in (("analytic",), EMULATED))],
+    ids=lambda plant: plant[0],
+)
 def test_it_runs_is_rated_and_its_signal_is_recorded_and_plotted(
     plant: tuple[str, ...], tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -101,8 +104,18 @@ WRONG = {
 """What goes wrong -> the line that does it, what is said of it, and the source that is shown."""
 
 
-@PLANTS
-@pytest.mark.parametrize("way", WRONG)
+@pytest.mark.parametrize(
+    ("plant", "way"),
+    [
+        *((("sim",), way) for way in WRONG),
+        *((plant, "raises") for plant in (("analytic",), EMULATED)),
+        *(
+            pytest.param(plant, way, marks=pytest.mark.long)
+            for plant in (("analytic",), EMULATED)
+            for way in ("nan", "shape")
+        ),
+    ],
+)
 def test_one_that_fails_is_the_cause_with_its_own_lines_and_the_recording_is_whole(
     way: str, plant: tuple[str, ...], tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -102,6 +102,7 @@ def entries(table: Mapping[str, Any], path: tuple[Any, ...] = ()) -> Iterator[tu
             yield (*path, key, 0)
 
 
+@pytest.mark.long
 def test_every_entry_of_a_manifest_may_be_nonsense(run: Path, tmp_path: Path) -> None:
     """Whatever an entry holds, a run is summarised and drawn, or refused by one line.
 

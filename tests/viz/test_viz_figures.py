@@ -22,7 +22,7 @@ def collection(figure: Figure, panel: int) -> LineCollection:
     return found
 
 
-@pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
+@pytest.mark.parametrize("suffix", [".png", ".svg", pytest.param(".pdf", marks=pytest.mark.long)])
 def test_figures_are_the_same_bytes_each_time(hop: Recording, tmp_path: Path, suffix: str) -> None:
     run = part(hop, 0, 900)
     first = save_figure(phase_figure(run), tmp_path / f"first{suffix}")

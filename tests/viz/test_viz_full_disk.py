@@ -51,7 +51,7 @@ def on_a_full_disk(run: Path, out: Path, *suffixes: str) -> list[str]:
 
 @pytest.fixture(scope="module")
 def short(tmp_path_factory: pytest.TempPathFactory) -> Recording:
-    run = record(tmp_path_factory.mktemp("short"), SetupKind.JUMP, 700)
+    run = record(tmp_path_factory.mktemp("short"), SetupKind.JUMP, 300)
     (run.path / "samples.arrows").write_bytes(b"".join(stream_of(run)))
     return run
 
@@ -64,10 +64,12 @@ def refused(suffixes: tuple[str, ...], run: Recording, out: Path) -> None:
     assert list(out.iterdir()) == []
 
 
+@pytest.mark.long
 def test_no_half_figure_or_view_stays(short: Recording, tmp_path: Path) -> None:
     refused((".png", ".svg", ".pdf", ".rrd"), short, tmp_path)
 
 
+@pytest.mark.long
 def test_no_half_film_stays(short: Recording, tmp_path: Path) -> None:
     if not gl_works():
         pytest.skip("no OpenGL without a display")

@@ -106,7 +106,7 @@ def test_own_signals_come_below_the_differences_and_those_of_both_runs_are_laid_
     assert len(figure.axes) == 8
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, 12])
+@pytest.mark.parametrize("count", [1, 2, 3, pytest.param(12, marks=pytest.mark.long)])
 def test_every_own_signal_has_a_panel_and_dollars_are_no_mathematics(
     guest: Recording, count: int, tmp_path: Path
 ) -> None:

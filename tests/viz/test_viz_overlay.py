@@ -88,6 +88,7 @@ def test_a_run_without_others_keeps_its_one_row(hop: Recording) -> None:
     assert figure.get_figheight() == phase_figure(hop).get_figheight()
 
 
+@pytest.mark.long
 def test_overlays_are_the_same_bytes_each_time(
     hop: Recording, other: Recording, tmp_path: Path
 ) -> None:

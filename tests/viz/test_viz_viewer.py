@@ -43,7 +43,8 @@ def listeners(port: int) -> set[str]:
     return {address for address, number in local if int(number, 16) == port}
 
 
-@pytest.mark.parametrize("name", ["hop", "swing"])
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["hop", pytest.param("swing", marks=pytest.mark.long)])
 def test_the_viewer_has_nothing_to_complain_about(
     name: str, port: int, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:

@@ -45,12 +45,14 @@ class ManyLegs:
         """
         pairs = [model.stance if standing else model.hanging for model in models]
         stops = [
-            Stop(sign=few[0].sign, limit=np.array([stop.limit for stop in few]), on=few[0].on)  # pyright: ignore[reportArgumentType]
+            # pyrefly: ignore[bad-argument-type]
+            Stop(sign=few[0].sign, limit=np.array([stop.limit for stop in few]), on=few[0].on)
             for few in zip(*(model.stops for model in models), strict=True)
         ]
         terms = PairTerms(
             inertia=_columns([terms.inertia for terms in pairs]),
-            coupling=np.array([terms.coupling for terms in pairs]),  # pyright: ignore[reportArgumentType]
+            # pyrefly: ignore[bad-argument-type]
+            coupling=np.array([terms.coupling for terms in pairs]),
             moment=_columns([terms.moment for terms in pairs]),
         )
         return cls(

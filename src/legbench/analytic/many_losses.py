@@ -66,7 +66,8 @@ class ManyLosses:
 
     def drag(self, q: Pair, v: Pair) -> Pair:
         """Torques of friction and guide on q1 and q2 [N m]."""
-        first, second = guide_torque(ARRAY, self.reach, self.guide, q, v)  # pyright: ignore[reportArgumentType]
+        # pyrefly: ignore[bad-argument-type]
+        first, second = guide_torque(ARRAY, self.reach, self.guide, q, v)
         return (
             first - self.friction[0] * np.tanh(v[0] / self.creep[0]),
             second - self.friction[1] * np.tanh(v[1] / self.creep[1]),

@@ -44,8 +44,8 @@ def versions() -> Mapping[str, str]:
         "python": platform.python_version(),
         "mujoco": mujoco.__version__,
         "numpy": np.__version__,
-        "pyarrow": pa.__version__,
-        "scipy": scipy.__version__,
+        "pyarrow": str(pa.__version__),
+        "scipy": str(scipy.__version__),
     }
 
 

@@ -7,8 +7,8 @@ import sys
 from importlib import import_module
 
 from legbench import __version__
-from legbench.cli.output import report_error
-from legbench.errors import LegbenchError
+from legbench.cli.output import WRONG_USAGE, report_error
+from legbench.errors import ConfigError, DesignError, LegbenchError, UnwritableError
 
 COMMANDS = {
     "run": "run a controller on a leg and record it",
@@ -51,7 +51,10 @@ def usage() -> str:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run a command; 0 when all went well, 1 for a refusal or a fault, 2 for wrong usage.
+    """Run a command; 0 when all went well, 2 when it was refused as it was asked, 1 otherwise.
+
+    Words, values and files that a command cannot take are refused before anything is done. What
+    fails later, or is answered by no, ends with 1: a fault, a full disk, a leg that violates.
 
     Every `LegbenchError` becomes one line on stderr, never a traceback; so does ^C outside of a
     run, with 130. Nobody reading any more, as under `head`, ends it with 141 and no word.
@@ -106,19 +109,20 @@ def _run(arguments: list[str] | None) -> int:
     arguments = sys.argv[1:] if arguments is None else arguments
     if not arguments or arguments[0] in ("-h", "--help", "help"):
         print(usage(), end="")
-        return 0 if arguments else 2
+        return 0 if arguments else WRONG_USAGE
     name, rest = arguments[0], arguments[1:]
     if name == "--version":
         print(f"legbench {__version__}")
         return 0
     if name not in COMMANDS:
         report_error(f"no command '{name}'; there are {', '.join(COMMANDS)}")
-        return 2
+        return WRONG_USAGE
     try:
         return import_module(f"legbench.cli.{name}").main(rest)
     except LegbenchError as error:
         report_error("; ".join([str(error), *_notes(error)]))
-        return 1
+        refused = isinstance(error, ConfigError | DesignError)
+        return WRONG_USAGE if refused and not isinstance(error, UnwritableError) else 1
     except KeyboardInterrupt as error:
         report_error("; ".join(["interrupted", *_notes(error)]))
         return 130

@@ -230,7 +230,7 @@ def _report(plan: "Plan", finished: "Finished", *, as_json: bool) -> int:
         print_json(
             {
                 "campaign": plan.campaign.name,
-                "folder": str(finished.folder),
+                "out": str(finished.folder),
                 "experiments": finished.total,
                 "done": finished.done,
                 "wanted": finished.wanted,

@@ -1,11 +1,18 @@
 """`legbench design`: from requirements to a leg that can be built."""
 
-import sys
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from legbench.cli.output import note, print_json
+from legbench.cli.output import (
+    duration_text,
+    end_status_line,
+    note,
+    pace,
+    print_json,
+    status_line,
+)
 from legbench.cli.parse import parse
 from legbench.design import load_design, save_design
 from legbench.design.dependent import INFEASIBLE
@@ -101,7 +108,7 @@ def main(arguments: list[str]) -> int:
         add_yield(solution.design, chosen.tolerances, chosen.legs, chosen.seed, content, lines)
     _write(chosen, solution, trace)
     if chosen.json:
-        print_json(content)
+        print_json(content | {"out": chosen.out and str(chosen.out)})
     else:
         print("\n".join(lines))
     return 0
@@ -164,7 +171,7 @@ def _solve(
             scatter_cost=scatter_cost,
             cross_check=chosen.cross_check,
             stop=stop,
-            progress=_progress,
+            progress=_progress(settings.evaluations),
         )
     if not solution.complete:
         again = f"; the same command continues {chosen.trace}" if chosen.trace else ""
@@ -177,17 +184,23 @@ def _solve(
     return solution, stop.is_set
 
 
-def _progress(evaluations: int, best: float) -> None:
-    if sys.stderr.isatty():
+def _progress(limit: int) -> Callable[[int, float], None]:
+    """Return a line that tells the best leg, and how long the rest takes at the most."""
+    left_after = pace()
+
+    def tell(evaluations: int, best: float) -> None:
         words = f"{best:.6f}" if best < INFEASIBLE else "no leg yet"
-        print(f"\r{evaluations:6d} evaluations, best {words} ", end="", file=sys.stderr, flush=True)
+        left = left_after(evaluations, limit)
+        rest = "" if left is None else f", {duration_text(max(left, 0.0))} left at the most"
+        status_line(f"{evaluations:6d} of at most {limit} evaluations, best {words}{rest}")
+
+    return tell
 
 
 def _lines(solution: "Solution", rows: Any) -> list[str]:
     from legbench.synthesis.report import condition_lines, solution_lines, table_lines
 
-    if sys.stderr.isatty():
-        print(file=sys.stderr)
+    end_status_line()
     angle = _angle(solution)
     return [
         f"leg '{solution.design.name}' for requirements '{solution.requirements.name}'",

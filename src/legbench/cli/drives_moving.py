@@ -77,7 +77,7 @@ class Zero:
             zeros = measure(session, self.posture)
         path = None if self.dry_run else write(bench.bus, zeros, self.out)
         if bench.json:
-            print_json({"zeros": [asdict(zero) for zero in zeros], "file": path and str(path)})
+            print_json({"zeros": [asdict(zero) for zero in zeros], "out": path and str(path)})
             return 0
         for zero in zeros:
             print(
@@ -85,7 +85,7 @@ class Zero:
                 f"link offset_counts = {zero.link_offset}"
             )
         if path is not None:
-            print(f"wrote {path}")
+            note(f"wrote {path}")
         return 0
 
 

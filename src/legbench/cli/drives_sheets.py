@@ -97,7 +97,7 @@ def _print(learned: "Learned", *, as_json: bool, out: Path | None) -> None:
         times = [f"{means.time_ms:.0f} ms by {means.name}" for means in one.means]
         print(f"  without master it reacts after {' or '.join(times) or 'no time that is known'}")
     if out is not None and not learned.problems:
-        print(f"wrote {out}")
+        note(f"wrote {out}")
         if not (out.parent / LIMITS_NAME).exists():
             note(
                 f"a run also needs limits: copy hardware/{LIMITS_NAME} beside it, or give --limits"

@@ -82,7 +82,7 @@ def main(arguments: list[str]) -> int:
         if flags.out is not None:
             write_explanation(found, flags.out)
     if flags.json:
-        print_json(explanation_content(found))
+        print_json(explanation_content(found) | {"out": flags.out and str(flags.out)})
     else:
         print("\n".join(explanation_lines(found)))
     if not found.complete:

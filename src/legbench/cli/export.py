@@ -50,10 +50,9 @@ def main(arguments: list[str]) -> int:
     path = chosen.out or recording.path / f"{recording.path.resolve().name}.{kind.value}"
     export(recording, path, kind, timed_progress())
     rows = len(recording.time)
+    note(f"wrote {path}: {rows} rows")
     if chosen.json:
         print_json({"out": str(path), "format": kind.value, "rows": rows})
-    else:
-        print(f"wrote {path}: {rows} rows")
     return 0
 
 

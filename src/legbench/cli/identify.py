@@ -114,7 +114,7 @@ def _answer(flags: IdentifyArguments, question: "Question", held_out: list[Recor
 
 def _show(flags: IdentifyArguments, lines: list[str], content: dict[str, Any]) -> None:
     if flags.json:
-        print_json(content)
+        print_json(content | {"out": flags.out and str(flags.out)})
     else:
         print("\n".join(lines))
 

@@ -8,10 +8,13 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
-from legbench.errors import ConfigError
+from legbench.errors import UnwritableError
 from legbench.strict_json import null_for_nan
+
+WRONG_USAGE: Final = 2
+"""Exit status of a command that was refused as it was asked, before anything was done."""
 
 
 def report_error(message: str) -> None:
@@ -39,7 +42,7 @@ def write_json(path: Path, content: Mapping[str, Any]) -> None:
     """Write one JSON object as a whole file; make its folder if need be.
 
     Raises:
-        ConfigError: it cannot be written; an older file is untouched.
+        UnwritableError: it cannot be written; an older file is untouched.
     """
     import json
 
@@ -58,7 +61,7 @@ def results_in(path: Path | None) -> Iterator[None]:
         path: the folder; none where nothing is to be written.
 
     Raises:
-        ConfigError: it cannot be made.
+        UnwritableError: it cannot be made.
     """
     made: list[Path] = []
     try:
@@ -83,7 +86,7 @@ def _make(path: Path, made: list[Path]) -> None:
         if not os.access(path, os.W_OK | os.X_OK):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
     except OSError as error:
-        raise ConfigError(
+        raise UnwritableError(
             f"cannot write {path}: {reason(error)}; name a folder that you can write"
         ) from error
 
@@ -111,19 +114,40 @@ def progress(done: int, total: int, left: float | None = None) -> None:
     _to_stderr(f"\r[{bar}] {100 * done // max(total, 1):3d} %{rest:<18}{end}")
 
 
+def status_line(text: str) -> None:
+    """Draw words that overwrite the ones before, on a terminal that takes them at once."""
+    if _draws():
+        _to_stderr(f"\r{text:<79}")
+
+
+def end_status_line() -> None:
+    """Leave the last words of `status_line` where they are."""
+    if _draws():
+        _to_stderr("\n")
+
+
 def timed_progress() -> Callable[[int, int], None]:
     """Return a progress line that tells the time left, by the pace since its first report."""
-    first: list[tuple[float, int]] = []
+    left_after = pace()
 
     def tell(done: int, total: int) -> None:
+        progress(done, total, left_after(done, total))
+
+    return tell
+
+
+def pace() -> Callable[[int, int], float | None]:
+    """Return what tells the time left [s] by the pace since it was first asked; none at first."""
+    first: list[tuple[float, int]] = []
+
+    def left_after(done: int, total: int) -> float | None:
         now = time.monotonic()
         begin, before = first[0] if first else (now, done)
         if not first:
             first.append((now, done))
-        left = (now - begin) * (total - done) / (done - before) if done > before else None
-        progress(done, total, left)
+        return (now - begin) * (total - done) / (done - before) if done > before else None
 
-    return tell
+    return left_after
 
 
 def duration_text(seconds: float) -> str:

@@ -3,19 +3,17 @@
 import io
 import os
 from contextlib import redirect_stderr
-from typing import Final, TypeVar, Union
+from typing import TypeVar, Union
 
 import tyro
 
-from legbench.cli.output import report_error
+from legbench.cli.output import WRONG_USAGE, report_error
 from legbench.errors import ConfigError
 
 Arguments = TypeVar("Arguments")
 T = TypeVar("T")
 OrNone = Union[None, T]  # noqa: UP007 tyro loads a library of 60 ms to check a default of `T | None`
 """Type of a flag that may be left out, for commands that have to start fast."""
-WRONG_USAGE: Final = 2
-"""Exit status of a command line that means nothing."""
 FRAME, RULE = " \u2502\u256d\u256e\u2570\u256f|+", "\u2500-"
 """Characters of the boxes in which tyro puts its errors, and of the rules within them."""
 STYLE = (
@@ -33,13 +31,18 @@ def parse(
     """Read a command's flags into its dataclass; `--help` comes from the docstrings.
 
     Raises:
-        ConfigError: a word is empty, or no text.
+        ConfigError: a word is empty, no text, or `-` where a file is to be named.
         SystemExit: help was asked for (0), or the flags make no sense (2).
     """
     for before, word in zip(["", *arguments], arguments, strict=False):
         if not word or word.endswith("="):
             name = word.removesuffix("=") or before or "a word of the command line"
             raise ConfigError(f"{name} is empty; give it a value, or leave it out")
+        if word == "-":
+            raise ConfigError(
+                "- is no file, and stands for neither standard input nor output; name a file "
+                "(./- for one that is called so)"
+            )
         if not word.isprintable() and any(0xDC80 <= ord(letter) <= 0xDCFF for letter in word):
             raise ConfigError(
                 f"{os.fsencode(word)!r} is no UTF-8 text; rename the file or folder, since run "

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from tyro.conf import Positional
 
-from legbench.cli.output import print_json, timed_progress
+from legbench.cli.output import note, print_json, timed_progress
 from legbench.cli.parse import parse
 from legbench.cli.playback_arguments import PlaybackArguments
 from legbench.recording.reader import load
@@ -37,8 +37,7 @@ def main(arguments: list[str]) -> int:
     written = render(
         recording, chosen.out, time=chosen.time, progress=timed_progress(), playback=playback
     )
+    note(f"wrote {written}")
     if chosen.json:
         print_json({"out": str(written)})
-    else:
-        print(f"wrote {written}")
     return 0

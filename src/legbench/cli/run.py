@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from legbench.cli.output import note, print_json, report_error, timed_progress
-from legbench.cli.run_chosen import UsageError, chosen_by
+from legbench.cli.run_chosen import chosen_by
 from legbench.errors import MissingExtraError
 from legbench.experiment.data import Experiment
 
@@ -84,14 +84,9 @@ def main(arguments: list[str]) -> int:
 
     Returns:
         0 when the run came to its end or was stopped by ^C after its first row, 1 when a fault
-        ended it or a drive kept its power, 2 for wrong usage, 130 when ^C came before the first
-        row.
+        ended it or a drive kept its power, 130 when ^C came before the first row.
     """
-    try:
-        asked = chosen_by(arguments)
-    except UsageError as error:
-        report_error(str(error))
-        return 2
+    asked = chosen_by(arguments)
     from legbench.cli.waived import note_waived_of
     from legbench.clock import WallClock
     from legbench.experiment.running import record

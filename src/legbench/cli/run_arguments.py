@@ -143,12 +143,13 @@ def arguments_with(flags: list[GuestFlag], defaults: Mapping[str, Any]) -> type[
     made: list[Any] = []
     for name, entry in common:
         value = _value(defaults.get(name, entry.default))
-        hint = Annotated[quick(hints[name]), tyro.conf.arg(help=docs[name])]
-        made.append((name, hint, field(default=value)))
+        shown, described = quick(hints[name]), tyro.conf.arg(help=docs[name])
+        made.append((name, Annotated[shown, described], field(default=value)))
     for flag in flags:
         given = field() if flag.default is MISSING else field(default=flag.default)
         described = tyro.conf.arg(name=flag.name.replace("_", "-"), help=flag.doc)
-        made.append((flag.attribute, Annotated[quick(flag.hint), described], given))
+        shown = quick(flag.hint)
+        made.append((flag.attribute, Annotated[shown, described], given))
     namespace = {"__doc__": CommonArguments.__doc__}
     return make_dataclass("RunArguments", made, kw_only=True, frozen=True, namespace=namespace)
 
@@ -160,10 +161,12 @@ def quick(hint: Any) -> Any:
     the first that a default fits, and asks its type checker about tuples.
     """
     if get_origin(hint) in (Union, UnionType):
-        members = sorted(get_args(hint), key=lambda each: each is not NoneType)
-        return Union[tuple(quick(each) for each in members)]  # noqa: UP007
+        sorted_hints = sorted(get_args(hint), key=lambda each: each is not NoneType)
+        members = tuple(quick(each) for each in sorted_hints)
+        # pyrefly: ignore[not-a-type]
+        return Union[members]  # noqa: UP007
     if isinstance(hint, type) and issubclass(hint, Enum):
-        return Literal[tuple(member.value for member in hint)]  # pyright: ignore
+        return Literal[tuple(member.value for member in hint)]  # pyrefly: ignore[invalid-literal]
     return hint
 
 

@@ -31,10 +31,6 @@ SCANNED = {"--setup": "setup.kind", "--linkage": "linkage.kind", "--plant": "pla
 """Flags that choose a kind: they decide which other flags there are."""
 
 
-class UsageError(ConfigError):
-    """Error for words of the command line that mean nothing."""
-
-
 @dataclass(slots=True, kw_only=True)
 class Scan:
     """Words of the command line that decide which flags there are."""
@@ -102,17 +98,17 @@ def first_tables(words: Scan) -> Tables:
 
     Raises:
         LegbenchError: there is no such file or run, or a setting is none.
-        UsageError: nothing was named.
+        ConfigError: nothing was named.
     """
     if "--again" in words.values:
         if words.subject is not None:
-            raise UsageError(f"--again runs its own experiment; leave '{words.subject}' out")
+            raise ConfigError(f"--again runs its own experiment; leave '{words.subject}' out")
         from legbench.experiment.runs import tables_of_run
 
         content, folder = tables_of_run(Path(words.values["--again"]))
         tables = Tables(content=content, folder=folder, json=True)
     elif words.subject is None:
-        raise UsageError(
+        raise ConfigError(
             f"run what? {', '.join(CONTROLLERS.names())}, path/to/mine.py:Class, an experiment "
             "FILE.toml, or --again RUN"
         )
@@ -159,7 +155,7 @@ def chosen_by(words: Sequence[str]) -> Chosen:
 
     Raises:
         LegbenchError: a file is not there, or an experiment makes no sense; all of it is told.
-        UsageError: it names no controller, file or plant that exists.
+        ConfigError: it names no controller, file or plant that exists.
         SystemExit: help was asked for (0), or the flags make no sense (2).
     """
     scanned = scan(words)
@@ -215,7 +211,7 @@ def _kind(registry: Registry, tables: Tables, room: str) -> type[Any]:
     place = placed(name, tables.folder)
     own = ":" in name or name.endswith(".py") or name in registry.builtin
     if not own and name not in registry.names():
-        raise UsageError(
+        raise ConfigError(
             f"no {room} '{name}'; there are {', '.join(registry.names())}, or a class of your own "
             "as path/to/mine.py:Class"
         )
@@ -277,12 +273,4 @@ def _put_flags(tables: Tables, arguments: Any, flags: list[GuestFlag]) -> None:
             if room in _ROOMS:
                 given[room][name] = value
     for room, kind in _ROOMS.items():
-        _check_room(kind, given[room])
-
-
-def _check_room(kind: type[Any], given: dict[str, Any]) -> None:
-    """Refuse flags that describe no servo or no imperfections, as wrong usage."""
-    try:
-        kind(**given)
-    except ConfigError as error:
-        raise UsageError(str(error)) from None
+        kind(**given[room])  # It refuses what describes no servo, or no imperfections.

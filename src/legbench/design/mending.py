@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -157,9 +158,11 @@ def _possible(design: LegDesign, name: str, value: float) -> bool:
             index = int(name[-2]) - 1
             pair = list(getattr(design, field))
             pair[index] = value
-            replace(design, **{field: tuple(pair)})
+            changes: dict[str, Any] = {field: tuple(pair)}
+            replace(design, **changes)
         else:
-            replace(design, **{group: replace(getattr(design, group), **{field: value})})
+            changes = {group: replace(getattr(design, group), **{field: value})}
+            replace(design, **changes)
     except DesignError:
         return False
     return True

@@ -125,7 +125,7 @@ class Reader:
         if special is not None:
             return self._special(hint, special, raw, at)
         if is_dataclass(hint):
-            return self.table(hint, raw, at)  # pyright: ignore[reportArgumentType]
+            return self.table(hint, raw, at)
         if isinstance(hint, type) and issubclass(hint, Enum):
             return self._enum(hint, raw, at)
         return self._plain(hint, raw, at)

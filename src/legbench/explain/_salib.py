@@ -8,10 +8,10 @@ from legbench.errors import MissingExtraError
 from legbench.signals import Floats
 
 try:
-    from SALib.analyze import morris as morris_analysis  # pyright: ignore[reportMissingImports]
-    from SALib.analyze import sobol as sobol_analysis  # pyright: ignore[reportMissingImports]
-    from SALib.sample import morris as morris_sample  # pyright: ignore[reportMissingImports]
-    from SALib.sample import sobol as sobol_sample  # pyright: ignore[reportMissingImports]
+    from SALib.analyze import morris as morris_analysis  # pyrefly: ignore[missing-import]
+    from SALib.analyze import sobol as sobol_analysis  # pyrefly: ignore[missing-import]
+    from SALib.sample import morris as morris_sample  # pyrefly: ignore[missing-import]
+    from SALib.sample import sobol as sobol_sample  # pyrefly: ignore[missing-import]
 except ImportError as error:
     raise MissingExtraError(
         "SALib is not installed; screening needs it: pip install 'legbench[screening]'"

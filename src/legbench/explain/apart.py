@@ -97,7 +97,7 @@ def resting(experiment: Experiment, legs: Sequence[Imperfections]) -> Floats:
     acting = [in_setup(leg, experiment.setup.kind) for leg in legs]
     targets = targets_of(experiment)
     before = make_controller(experiment.controller, targets).start_motor_pos
-    after = targets.motor_at(experiment.controller.z2, "z2")  # pyright: ignore[reportAttributeAccessIssue]
+    after = targets.motor_at(experiment.controller.z2, "z2")  # pyrefly: ignore[missing-attribute]
     zero = np.array([leg.link_zero or (0.0, 0.0) for leg in acting])
     shown = []
     for motor in (before, after):
@@ -117,8 +117,8 @@ def _proposal(
     controller = experiment.controller
     return Proposal(
         setup=experiment.setup.kind,
-        z2=controller.z2,  # pyright: ignore[reportAttributeAccessIssue]
-        dz2=controller.dz2,  # pyright: ignore[reportAttributeAccessIssue]
+        z2=controller.z2,  # pyrefly: ignore[missing-attribute]
+        dz2=controller.dz2,  # pyrefly: ignore[missing-attribute]
         told=sum(value > TOLD for value in apart),
         pairs=len(pairs),
         nearest=float(apart[least]),

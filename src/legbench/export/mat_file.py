@@ -35,7 +35,7 @@ def write_mat(recording: Recording, path: Path, progress: Progress) -> None:
         )
     savemat(
         str(path),
-        _Variables(recording, progress),  # pyright: ignore[reportArgumentType]
+        _Variables(recording, progress),
         appendmat=False,
         long_field_names=True,
         do_compression=True,

@@ -6,7 +6,7 @@ mass and inertia measured by its own size and each centre of mass by the length 
 """
 
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -127,7 +127,7 @@ def _combined(design: LegDesign, change: Floats, bars: Bars | None) -> Floats:
 
 def _changed(design: LegDesign, change: Floats) -> LegDesign:
     parts = zip(NAMES, design.segments, _parts(design, change), strict=True)
-    segments = {
+    segments: dict[str, Any] = {
         name: Segment(mass=mass, length=segment.length, com=com, inertia=inertia)
         for name, segment, (mass, com, inertia) in parts
     }

@@ -143,7 +143,7 @@ def _add_segments(spec: mujoco.MjSpec, design: LegDesign, numerics: Numerics) ->
         if joint == "hip":
             hinge.damping = np.array(linear_damping(design.damping[0]))
         if (span := limits[joint]) is not None:
-            hinge.limited, hinge.range = mujoco.mjtLimited.mjLIMITED_TRUE, span
+            hinge.limited, hinge.range = mujoco.mjtLimited.mjLIMITED_TRUE, np.array(span)
             hinge.solref_limit = np.array(numerics.stop_solref)
             hinge.solimp_limit = np.array(numerics.stop_solimp)
         _set_inertia(body, segment)

@@ -86,7 +86,8 @@ def _objects(spec: mujoco.MjSpec) -> dict[tuple[str, str], object]:
         "general": spec.actuators,
         "key": spec.keys,
     }
-    return {(tag, item.name): item for tag, items in lists.items() for item in items}  # pyright: ignore[reportAttributeAccessIssue]
+    # pyrefly: ignore[missing-attribute]
+    return {(tag, item.name): item for tag, items in lists.items() for item in items}
 
 
 def _write(element: ET.Element, held: object) -> None:

@@ -24,7 +24,7 @@ from legbench.analytic.taylor import MAP_TOLERANCE, TaylorLeg
 from legbench.control import JumpConfig
 from legbench.design import LegDesign
 from legbench.design.toml import design_to_mapping
-from legbench.errors import ConfigError
+from legbench.errors import ConfigError, UnwritableError
 from legbench.interrupts import children_without_interrupts, ignore_interrupts
 from legbench.modes.attraction import Attraction, find_attraction
 from legbench.modes.drive import AbstractDrive, JumpLaw, Passive
@@ -244,7 +244,7 @@ def map_basin(
                 if progress is not None:
                     progress(len(rows), question.up.count)
     except OSError as error:
-        raise ConfigError(f"{path} cannot be written: {error}") from error
+        raise UnwritableError(f"{path} cannot be written: {error}") from error
     return np.array([rows[index] for index in range(question.up.count)], dtype=np.int64)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pyarrow as pa
 from pyarrow import parquet
 
-from legbench.errors import ConfigError
+from legbench.errors import UnwritableError
 from legbench.modes.trajectory import COLUMNS, OrbitPath
 from legbench.writing import reason, write_whole
 
@@ -15,7 +15,7 @@ def write_paths(paths: list[OrbitPath], path: Path) -> None:
     """Write trajectories as one Parquet table, a row an instant, written whole or not at all.
 
     Raises:
-        ConfigError: it cannot be written.
+        UnwritableError: it cannot be written.
     """
     rows = np.vstack([one.rows for one in paths])
     counts = [len(one.rows) for one in paths]
@@ -36,6 +36,6 @@ def write_paths(paths: list[OrbitPath], path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, sink.getvalue().to_pybytes())
     except OSError as error:
-        raise ConfigError(
+        raise UnwritableError(
             f"cannot write {path}: {reason(error)}; name a folder that you can write"
         ) from error

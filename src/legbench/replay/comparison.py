@@ -99,9 +99,10 @@ class Replayed:
     def to_json(self, allowed: float = 0.0) -> dict[str, Any]:
         """Return the comparison as JSON's types, its deviations by column."""
         first = self.first()
-        found = {each.signal: asdict(each) for each in self.deviations(allowed)}
-        for entry in found.values():
-            del entry["signal"]
+        found = {}
+        for each in self.deviations(allowed):
+            entry: dict[str, Any] = asdict(each)
+            found[entry.pop("signal")] = entry
         return {
             "identical": first is None,
             "rows": len(self.time),

@@ -63,7 +63,7 @@ def write_report(
         for suffix in suffixes
     ]
     content = report_content(sources, judged, named)
-    content |= {"page": str(out), "figures": [str(path) for path in figures]}
+    content |= {"out": str(out), "figures": [str(path) for path in figures]}
     return Written(page=out, figures=tuple(figures), content=content)
 
 

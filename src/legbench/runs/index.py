@@ -51,7 +51,7 @@ def rows_of(directory: Path, progress: Progress | None = None) -> list[dict[str,
     known = _read(places)
     stale = [run for run, stamp in stamps.items() if known.get(run, {}).get("stamp") != stamp]
     measured = dict(_measured(directory, stale, progress))
-    current = {
+    current: dict[str, dict[str, Any]] = {
         run: {"stamp": stamp, "row": measured[run]} if run in measured else known[run]
         for run, stamp in stamps.items()
     }

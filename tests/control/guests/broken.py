@@ -4,7 +4,7 @@ import legbench.signals
 
 
 def half() -> float:
-    return legbench.signals.no_such_name  # pyright: ignore
+    return legbench.signals.no_such_name  # pyrefly: ignore[missing-attribute]
 
 
 LENGTH = half()

@@ -56,9 +56,11 @@ class WrongLaw:
             "nothing": None,
             "nan": Command(motor_pos=np.full(2, np.nan), phase=good.phase),
             "shape": Command(motor_pos=np.zeros(3), phase=good.phase),
-            "text": Command(motor_pos="north", phase=good.phase),  # pyright: ignore
-            "list": Command(motor_pos=self.start_motor_pos.tolist(), phase=0),  # pyright: ignore
+            # pyrefly: ignore[bad-argument-type]
+            "text": Command(motor_pos="north", phase=good.phase),
+            # pyrefly: ignore[bad-argument-type]
+            "list": Command(motor_pos=self.start_motor_pos.tolist(), phase=0),
             "phase": Command(motor_pos=good.motor_pos, phase=np.array(300)),
-            "float phase": Command(motor_pos=good.motor_pos, phase=np.array(0.5)),  # pyright: ignore
+            "float phase": Command(motor_pos=good.motor_pos, phase=np.array(0.5)),
             "signals": Command(motor_pos=good.motor_pos, phase=good.phase, signals=np.zeros(1)),
         }.get(self.way, good)

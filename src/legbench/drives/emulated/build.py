@@ -94,8 +94,9 @@ def _checked(bus: BusConfig, behaviours: Sequence[Behaviour] | None) -> list[Beh
 
 def _dictionaries(bus: BusConfig) -> list[Dictionary]:
     """Return the objects of every drive; a data sheet is read once."""
-    sheets = {path: load_sheet(path) for path in {node.eds for node in bus.nodes} if path}
-    return [dictionary_of(node, node.eds and sheets[node.eds], bus.period_us) for node in bus.nodes]
+    paths = {node.eds for node in bus.nodes}
+    sheets = {path: None if path is None else load_sheet(path) for path in paths}
+    return [dictionary_of(node, sheets[node.eds], bus.period_us) for node in bus.nodes]
 
 
 def emulate_channels(

@@ -29,10 +29,9 @@ class Notices:
 
     def note(self, name: str, now_ns: int, **detail: object) -> None:
         """Count something that has been seen; its detail is kept the first time."""
-        event = self.events.get(name)
-        if event is None:
-            event = self.events[name] = {"count": 0, "first": 1e-9 * now_ns, **detail}
-        event["count"] += 1
+        if name not in self.events:
+            self.events[name] = {"count": 0, "first": 1e-9 * now_ns, **detail}
+        self.events[name]["count"] += 1
 
     def statuswords(self, axes: Sequence[AxisLink], now_ns: int) -> None:
         """Count warnings (bit 7) and internal limits (bit 11) in the statuswords just received."""

@@ -38,7 +38,7 @@ def build(
     """A dataclass from keys: unknown and missing ones are named, plain types checked."""
     known = {
         field.name: field
-        for field in fields(kind)  # pyright: ignore[reportArgumentType]
+        for field in fields(kind)  # pyrefly: ignore[bad-argument-type]
         if field.init and NOT_IN_FILES not in field.metadata
     }
     unknown = sorted(set(given) - set(known))

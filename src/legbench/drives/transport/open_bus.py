@@ -67,14 +67,14 @@ def open_bus(config: BusConfig, adapter: Adapter) -> can.BusABC:
     """
     if adapter.interface == SOCKETCAN and adapter.channel is not None:
         check_interface(config, adapter.channel)
-    given = {
+    given: dict[str, Any] = {
         "interface": adapter.interface,
         "channel": adapter.channel,
         "bitrate": config.bitrate,
     }
     given = {key: value for key, value in given.items() if value is not None}
     try:
-        return _slcan(given) if adapter.interface == SLCAN else can.Bus(**given)  # pyright: ignore[reportArgumentType]
+        return _slcan(given) if adapter.interface == SLCAN else can.Bus(**given)
     except Exception as error:  # Such as a TypeError, where a driver wants more than a channel.
         raise _named(adapter.interface, adapter.channel, error) from error
 

@@ -1,6 +1,6 @@
 """The run's MuJoCo model in 3-D: each shape once, each body's pose over time."""
 
-from typing import final
+from typing import Any, final
 
 import mujoco
 import numpy as np
@@ -93,7 +93,7 @@ def _colour(model: mujoco.MjModel, geom: int) -> Colours:
 def _shape(model: mujoco.MjModel, geom: int) -> Shape | None:
     """The geom in its own frame; none for meshes and height fields, which no leg has."""
     x, y, z = model.geom_size[geom]
-    looks = {"colors": [_colour(model, geom)], "fill_mode": "solid"}
+    looks: dict[str, Any] = {"colors": [_colour(model, geom)], "fill_mode": "solid"}
     kinds = mujoco.mjtGeom
     match kinds(model.geom_type[geom]):
         case kinds.mjGEOM_BOX:
