@@ -39,6 +39,9 @@ from legbench.errors import PlantFault
 from legbench.limits.safety import SafetyLimits
 from legbench.limits.shortfall import Shortfall
 
+EXCHANGING = (LinkState.RUNNING, LinkState.CYCLIC)
+"""States in which process data is exchanged."""
+
 
 @final
 class Link(DriveLeader):
@@ -282,5 +285,5 @@ class Link(DriveLeader):
         status = self._status
         if status.fault is not None:
             raise status.fault
-        if status.state not in (LinkState.CYCLIC, LinkState.RUNNING):
+        if status.state not in EXCHANGING:
             raise DriveError(f"the link is {status.state.name.lower()}; start it first")

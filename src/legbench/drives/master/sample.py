@@ -8,8 +8,8 @@ from legbench.drives.master.cycle import Cycle
 from legbench.drives.master.joint import joint_of
 from legbench.drives.master.tick import Tick
 
-_MOTOR, _LINK = attrgetter("motor_pos"), attrgetter("link_pos")
-_STATUSWORD, _FRESH, _CELSIUS = map(attrgetter, ("statusword", "fresh", "celsius"))
+_SHOWN = attrgetter("motor_pos", "link_pos", "statusword", "fresh")
+_CELSIUS = attrgetter("celsius")
 
 
 class Sample(NamedTuple):
@@ -58,8 +58,8 @@ def sample_of(
         two_encoders: every drive has an encoder on both sides of its spring.
     """
     axes = cycle.axes
+    motor, links, statusword, fresh = zip(*map(_SHOWN, axes), strict=True)
     if two_encoders:
-        motor, links = tuple(map(_MOTOR, axes)), tuple(map(_LINK, axes))
         torque = tuple([k * (a - b) for k, a, b in zip(stiffness, motor, links, strict=True)])
     else:
         joints = [joint_of(axis, k) for axis, k in zip(axes, stiffness, strict=True)]
@@ -72,7 +72,7 @@ def sample_of(
         links,
         torque,
         applied_pos,
-        tuple(map(_STATUSWORD, axes)),
-        tuple(map(_FRESH, axes)),
+        statusword,
+        fresh,
         tuple(map(_CELSIUS, cycle.polls)),
     )
