@@ -73,7 +73,7 @@ class AxisLink:
         self.motor_counts = 0
         self.link_counts = 0
         units, link = node.motor, node.link
-        self._motor_rad = units.to_rad
+        self._motor_rad, self._motor_counts = units.to_rad, units.to_counts
         self._lowest, self._modulus = units.lowest, units.modulus
         self._link_rad = None if link is None else link.to_rad
         self.motor_pos = self._motor_rad(0)
@@ -190,7 +190,7 @@ class AxisLink:
 
     def aim(self, motor_pos: float) -> None:
         """Set the target [rad]."""
-        self.target_counts = self.node.motor.to_counts(motor_pos)
+        self.target_counts = self._motor_counts(motor_pos)
 
     def aim_at_actual(self) -> None:
         """Set the target to where the motor is."""

@@ -1,7 +1,7 @@
 """The measurements of one cycle."""
 
 from collections.abc import Sequence
-from operator import attrgetter
+from operator import attrgetter, mul, sub
 from typing import NamedTuple
 
 from legbench.drives.master.cycle import Cycle
@@ -9,7 +9,6 @@ from legbench.drives.master.joint import joint_of
 from legbench.drives.master.tick import Tick
 
 _SHOWN = attrgetter("motor_pos", "link_pos", "statusword", "fresh")
-_CELSIUS = attrgetter("celsius")
 
 
 class Sample(NamedTuple):
@@ -60,7 +59,7 @@ def sample_of(
     axes = cycle.axes
     motor, links, statusword, fresh = zip(*map(_SHOWN, axes), strict=True)
     if two_encoders:
-        torque = tuple([k * (a - b) for k, a, b in zip(stiffness, motor, links, strict=True)])
+        torque = tuple(map(mul, stiffness, map(sub, motor, links)))
     else:
         joints = [joint_of(axis, k) for axis, k in zip(axes, stiffness, strict=True)]
         motor, links, torque = zip(*joints, strict=True)
@@ -74,5 +73,5 @@ def sample_of(
         applied_pos,
         statusword,
         fresh,
-        tuple(map(_CELSIUS, cycle.polls)),
+        tuple([poll.celsius for poll in cycle.polls]),
     )
