@@ -252,5 +252,10 @@ def _judge(
         )
         for place, (fit, hop) in enumerate(zip(all_fits, hops, strict=True))
     ]
-    order = sorted(judged[1:], key=lambda one: (not one.fit.within, -one.held, one.fit.stretch))
-    return judged[0], order
+    return judged[0], sorted(judged[1:], key=_order)
+
+
+def _order(one: Judged) -> tuple[bool, int, float, float]:
+    """Order of merit: the target, then what else holds, then plausible sizes, then the misfit."""
+    # Sizes that are alike to a tenth of what is plausible are equally so.
+    return not one.fit.within, -one.held, round(one.fit.stretch, 1), one.fit.misfit

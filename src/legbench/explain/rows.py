@@ -9,6 +9,7 @@ from legbench.experiment import Experiment, targets_of
 from legbench.explain.rating import Rows
 from legbench.imperfections import Imperfections
 from legbench.kinematics import joint_to_modal
+from legbench.metrics.changes import rows_before_change
 from legbench.metrics.rating import link_equilibrium
 from legbench.plant.analytic import STRAIGHT_MARGIN
 from legbench.plant.start import PERIOD
@@ -69,11 +70,14 @@ def measured(
     support = experiment.setup.support
     flat = motors.reshape(-1, 2)
     equilibrium = link_equilibrium(experiment.design, flat, support).reshape(motors.shape)
+    # The leg is at rest until its motors move: such rows are not rated, as in `metrics`.
+    rests = np.arange(motors.shape[1]) < rows_before_change(motors)[:, np.newaxis]
+    rated = np.where(rests[..., np.newaxis], np.nan, shown)
     return Rows(
         radial=joint_to_modal(shown, convention)[..., 1],
         radial_rate=joint_to_modal(joint_vel, convention)[..., 1],
-        about_equilibrium=shown - equilibrium,
-        about_motor=shown - motors,
+        about_equilibrium=rated - equilibrium,
+        about_motor=rated - motors,
         broken=~kept[:, 0, 0],
     )
 

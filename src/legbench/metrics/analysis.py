@@ -7,6 +7,7 @@ from typing import Any, Final, final
 from numpy.typing import NDArray
 
 from legbench.metrics.budget import EnergyBudget, energy_budget
+from legbench.metrics.changes import rows_before_change
 from legbench.metrics.energy import Flows, energy_flows
 from legbench.metrics.jump import JumpFigures, jump_figures
 from legbench.metrics.modal import Trajectory, trajectory
@@ -74,6 +75,17 @@ class Analysis:
         return first_action(self)
 
     @cached_property
+    def first_answer(self) -> int:
+        """Row in which the motors are first seen to move after the first control action.
+
+        Row of that action itself if they never move, or if there is none.
+        """
+        action = self.first_action
+        if action == len(self.time):
+            return action
+        return action + int(rows_before_change(self["motor_pos"][action:]))
+
+    @cached_property
     def states(self) -> Ints:
         """STANCE, FLIGHT or UNKNOWN of every row (n,)."""
         return states_of(self)
@@ -92,7 +104,10 @@ class Analysis:
     def periods(self) -> Periods:
         """Oscillation periods that count in the rating."""
         # What a long run's coordinates take is given back: they are not asked for again.
-        return find_periods(trajectory(self), self.first_action, self.description.counting)
+        moved = trajectory(self)
+        return find_periods(
+            moved, self.first_action, self.description.counting, answer=self.first_answer
+        )
 
     @cached_property
     def ratings(self) -> RunRatings:

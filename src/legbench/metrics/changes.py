@@ -1,6 +1,8 @@
 """Rows at which a pair of columns changes."""
 
-from legbench.signals import Bools, Floats
+import numpy as np
+
+from legbench.signals import Bools, Floats, Ints
 
 
 def changes(pair: Floats) -> Bools:
@@ -10,3 +12,13 @@ def changes(pair: Floats) -> Bools:
     """
     first, second = pair[:, 0], pair[:, 1]
     return (first[1:] != first[:-1]) | (second[1:] != second[:-1])
+
+
+def rows_before_change(pair: Floats) -> Ints:
+    """Number of leading rows that equal the first one, in runs of rows (..., n, 2) (...).
+
+    It is 0 where nothing ever changes: there is no change to be before.
+    """
+    first, second = pair[..., 0], pair[..., 1]
+    moved = (first != first[..., :1]) | (second != second[..., :1])
+    return np.where(moved.any(axis=-1), np.argmax(moved, axis=-1), 0)

@@ -28,7 +28,7 @@ class Periods:
     amplitude: Floats
     """Half of z2's range within each period (m,) [rad]."""
     first: Ints
-    """First row of each period (m,)."""
+    """First row of each period that is rated (m,)."""
     stop: Ints
     """Row after the last one of each period (m,)."""
 
@@ -58,22 +58,24 @@ def turning_points(time: Floats, rate: Floats) -> Floats:
     return np.array(points, dtype=np.float64)
 
 
-def find_periods(moved: Trajectory, first: int, counting: Counting) -> Periods:
+def find_periods(moved: Trajectory, first: int, counting: Counting, answer: int = 0) -> Periods:
     """Oscillation periods of a run that count, from its first control action on.
 
     Args:
         moved: how the run moved.
         first: row of its first control action.
         counting: which of the leading periods count.
+        answer: row in which the motors first move; the leg is at rest in those before it, which
+            belong to the first period's time but not to its rating.
     """
     points = turning_points(moved.time[first:], moved.modal_rate[first:, 1])
-    periods = _between(moved.time, moved.modal[:, 1], points)
+    periods = _between(moved.time, moved.modal[:, 1], points, answer)
     small = np.flatnonzero(periods.amplitude <= counting.smallest)
     count = int(small[0]) if len(small) else len(periods)
     return _leading(periods, count if counting.most is None else min(count, counting.most))
 
 
-def _between(time: Floats, radial: Floats, points: Floats) -> Periods:
+def _between(time: Floats, radial: Floats, points: Floats, answer: int) -> Periods:
     rows = np.searchsorted(time, points)
     first, stop = rows[:-1], rows[1:]
     amplitude = [0.5 * np.ptp(radial[low:high]) for low, high in zip(first, stop, strict=True)]
@@ -81,7 +83,7 @@ def _between(time: Floats, radial: Floats, points: Floats) -> Periods:
         start=points[:-1],
         end=points[1:],
         amplitude=np.array(amplitude, dtype=np.float64),
-        first=first,
+        first=np.clip(answer, first, stop),
         stop=stop,
     )
 
