@@ -16,7 +16,9 @@ from legbench.shipped import locate
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from legbench.commissioning.emulate import Server
     from legbench.drives.emulated.body import Body
+    from legbench.drives.emulated.network import Network
     from legbench.drives.setup.config import BusConfig
 
 UNIX, SLCAN = "legbench_unix", "slcan"
@@ -92,9 +94,8 @@ class Emulate:
         """Serve until ^C or SIGTERM, printing every change of a drive's state."""
         _check_time("seconds", self.seconds)
         self._check_way(bench)
-        from legbench.commissioning.emulate import Server, serve
+        from legbench.commissioning.emulate import serve
         from legbench.drives.emulated.bus_server import BusServer
-        from legbench.drives.emulated.network import Network
         from legbench.drives.emulated.slcan_server import SlcanServer
         from legbench.drives.emulated.unix_server import ChannelsServer, UnixServer
         from legbench.interrupts import stop_on_interrupt
@@ -111,7 +112,7 @@ class Emulate:
 
         _tell_problems(config)
 
-        def serve_at(networks: "Sequence[Network]") -> Server:
+        def serve_at(networks: "Sequence[Network]") -> "Server":
             if len(paths) > 1:
                 return ChannelsServer(networks, paths)
             (network,) = networks
@@ -120,13 +121,6 @@ class Emulate:
             if paths:
                 return UnixServer(network, paths[0])
             return BusServer(network, open_session(config, bench.choice, leads=False).bus)
-
-        def ready(server: Server) -> None:
-            interface, channel = bench.interface or UNIX, bench.channel
-            if isinstance(server, SlcanServer):
-                interface, channel = SLCAN, server.path
-            at = f" --bitrate {config.bitrate}" if isinstance(server, SlcanServer) else ""
-            note(f"serving {channel}; use it with --interface {interface} --channel {channel}{at}")
 
         with stop_on_interrupt() as stop:
             serve(
@@ -137,10 +131,20 @@ class Emulate:
                 patience=self.patience,
                 split=len(paths) > 1,
                 report=partial(_print_state, bench.json),
-                ready=ready,
+                ready=partial(self._tell_ready, bench, config.bitrate),
                 stop=lambda: stop.is_set or time.monotonic() > end,
             )
         return 0
+
+    @staticmethod
+    def _tell_ready(bench: Bench, bitrate: int, server: "Server") -> None:
+        """Say how a program reaches the drives."""
+        from legbench.drives.emulated.slcan_server import SlcanServer
+
+        interface, channel, at = bench.interface or UNIX, bench.channel, ""
+        if isinstance(server, SlcanServer):
+            interface, channel, at = SLCAN, server.path, f" --bitrate {bitrate}"
+        note(f"serving {channel}; use it with --interface {interface} --channel {channel}{at}")
 
     def _paths(self, bench: Bench, config: "BusConfig") -> tuple[Path, ...]:
         """Socket files to serve, one a channel; none where it is another bus.

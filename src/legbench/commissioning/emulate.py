@@ -7,6 +7,7 @@ from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.body import Body, stiff_body
 from legbench.drives.emulated.build import emulate, emulate_channels, on_bench
 from legbench.drives.emulated.bus_server import BusServer
+from legbench.drives.emulated.drive import EmulatedDrive
 from legbench.drives.emulated.network import Network
 from legbench.drives.emulated.slcan_server import SlcanServer
 from legbench.drives.emulated.unix_server import ChannelsServer, UnixServer
@@ -54,16 +55,9 @@ def serve(
         BusError: the bus cannot be opened, or has failed.
         PlantFault: the leg has come apart.
     """
-    behaviours = _behaviours(config, start_pos, patience)
     # A master on the same processor goes first, as it would on one of its own.
     ask(priority=PRIORITY - 1)
-    if split:
-        nodes = [node for channel in config.channels for node in config.nodes_on(channel)]
-        networks = emulate_channels(config, behaviours, body=body, body_period_ns=BODY_PERIOD_NS)
-    else:
-        nodes = config.nodes
-        networks = (emulate(config, behaviours, body=body, body_period_ns=BODY_PERIOD_NS),)
-    drives = [drive for network in networks for drive in network.drives]
+    networks, drives = _emulated(config, _behaviours(config, start_pos, patience), body, split)
     # A terminal that is closed must not take the drives from a master that leads them.
     reporting = Onlooker("report", report)
     shown: dict[str, DriveState] = {}
@@ -72,11 +66,25 @@ def serve(
         ready(server)
         while not stop():
             server.poll()
-            for node, drive in zip(nodes, drives, strict=True):
+            for name, drive in drives:
                 state = drive.axis.power.state
-                if shown.get(node.name) is not state:
-                    shown[node.name] = state
-                    reporting(time.monotonic() - began, node.name, state.value)
+                if shown.get(name) is not state:
+                    shown[name] = state
+                    reporting(time.monotonic() - began, name, state.value)
+
+
+def _emulated(
+    config: BusConfig, behaviours: Sequence[Behaviour], body: Body, split: bool
+) -> tuple[tuple[Network, ...], list[tuple[str, EmulatedDrive]]]:
+    """Networks of a bus file, one a channel if they are split, and their drives by name."""
+    if split:
+        nodes = [node for channel in config.channels for node in config.nodes_on(channel)]
+        networks = emulate_channels(config, behaviours, body=body, body_period_ns=BODY_PERIOD_NS)
+    else:
+        nodes = config.nodes
+        networks = (emulate(config, behaviours, body=body, body_period_ns=BODY_PERIOD_NS),)
+    drives = [drive for network in networks for drive in network.drives]
+    return networks, [(node.name, drive) for node, drive in zip(nodes, drives, strict=True)]
 
 
 def _behaviours(config: BusConfig, start_pos: tuple[float, ...], patience: int) -> list[Behaviour]:

@@ -70,7 +70,7 @@ class PdoMap:
         self.size = self._layout.size
         """Length of the frame's data [bytes]."""
         self.values_of = self._layout.unpack
-        """As `unpack`, once a cycle: raises `struct.error` where the length is wrong."""
+        """Function that unpacks as `unpack` does, but raises `struct.error` for a wrong length."""
         if not self.entries or self.size > MAX_BYTES:
             names = ", ".join(map(str, self.entries)) or "nothing"
             raise CodecError(f"a PDO of {names} has {self.size} bytes; it must have 1 to 8")
