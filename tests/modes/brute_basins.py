@@ -11,7 +11,7 @@ from legbench.analytic.taylor import TaylorLeg
 from legbench.control import JumpConfig
 from legbench.design import LegDesign
 from legbench.errors import ConfigError
-from legbench.modes.basin import Fate, GridAxis, Question, fate_of
+from legbench.modes.basin import Fate, GridAxis, Question, attraction_in, fate_of
 from legbench.modes.drive import JumpLaw
 from legbench.modes.fixed_point import UNITS, fixed_point
 from legbench.modes.hop import NAMES, Apex, settle
@@ -90,7 +90,7 @@ def differing(question: Question, dense: int, seed: int) -> tuple[list[str], int
 
     All cells are compared with the finest tolerance, `dense` random ones with DOP853, too.
     """
-    leg, drive = question.tools()
+    (leg, drive), attraction = question.tools(), attraction_in(question)
     fine, _ = replace(question, tolerance=FINEST).tools()
     random, wrong, edges = np.random.default_rng(seed), [], 0
     count = question.across.count * question.up.count
@@ -98,7 +98,7 @@ def differing(question: Question, dense: int, seed: int) -> tuple[list[str], int
     for cell in range(count):
         row, column = divmod(cell, question.across.count)
         start = start_at(question, column, row)
-        told = fate_of(leg, drive, question, start)
+        told = fate_of(leg, drive, question, start, attraction)
         others = [fate_of(fine, drive, question, start)]
         if cell in chosen:
             others.append(fate_by_dense(question, start))

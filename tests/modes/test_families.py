@@ -31,7 +31,8 @@ from legbench.modes.linear import RADIAL
 from legbench.modes.response import Response, respond
 from legbench.modes.ridden import ride
 from legbench.modes.scene import Holding, Scene, make_scene
-from legbench.modes.trajectory import branch_paths, family_paths, paths_to_json, write_paths
+from legbench.modes.trajectory import branch_paths, family_paths, paths_to_json
+from legbench.modes.trajectory_file import write_paths
 from legbench.plant.analytic import AnalyticPlant
 from legbench.plant.start import Start
 

@@ -45,6 +45,8 @@ TOLERANCE = 1e-15
 COOLDOWN = 1e-8
 """Time within which an event cannot occur again; long against rounding, short against the leg's
 motion [s]."""
+OPTIMISED = 1
+"""Level of the compiler's optimisation, whose code is as fast as that of the highest, 3."""
 PARAMETERS = LEVEL + len(Event)
 """Length of the array of parameters of a leg."""
 
@@ -61,6 +63,11 @@ def varied_integrator(tolerance: float = TOLERANCE) -> Any:
     order, one row a state.
     """
     return copy.deepcopy(_varied(tolerance))
+
+
+def free_integrator(tolerance: float = TOLERANCE) -> Any:
+    """New integrator of one leg without stops, events and derivatives."""
+    return copy.deepcopy(_free(tolerance))
 
 
 def smooth_integrator(
@@ -95,9 +102,10 @@ def _events(kind: Kind, tolerance: float) -> Any:
             t_events=[hy.t_event(one, direction=rising, cooldown=COOLDOWN) for one in watched],
             tol=tolerance,
             fast_math=True,  # a third faster, without loss of accuracy
+            opt_level=OPTIMISED,
         )
 
-    return kept(f"events {tolerance!r} {COOLDOWN!r} {system} {watched}", build)
+    return kept(f"events {OPTIMISED} {tolerance!r} {COOLDOWN!r} {system} {watched}", build)
 
 
 @cache
@@ -112,10 +120,22 @@ def _varied(tolerance: float) -> Any:
             tol=tolerance,
             fast_math=True,
             compact_mode=True,  # slower, but compiled in a second instead of a minute
-            opt_level=1,  # no slower than the highest, and compiled in half the time
+            opt_level=OPTIMISED,
         )
 
     return kept(f"varied {tolerance!r} {system} {seeds}", build)
+
+
+@cache
+def _free(tolerance: float) -> Any:
+    system = smooth_system(friction=False)
+
+    def build() -> Any:
+        return hy.taylor_adaptive(
+            system, [0.0] * len(system), tol=tolerance, fast_math=True, opt_level=OPTIMISED
+        )
+
+    return kept(f"free {tolerance!r} {system}", build)
 
 
 @cache
@@ -147,7 +167,7 @@ def _sensitive(tolerance: float, lanes: int, friction: bool) -> Any:
             tol=tolerance,
             fast_math=True,
             compact_mode=True,  # as in `_varied`, for the sake of compilation
-            opt_level=1,
+            opt_level=OPTIMISED,
         )
 
     return kept(f"sensitive {tolerance!r} {lanes} {system} {seeds}", build)

@@ -12,13 +12,16 @@ until the function is `NUDGE` below zero; the event then happens that much later
 from typing import final
 
 from legbench.analytic.compiled import event_integrator
-from legbench.analytic.parameters import GAIN, LEVEL, Event, Kind
+from legbench.analytic.equations import Pair
+from legbench.analytic.parameters import GAIN, LEVEL, MOTOR, Event, Kind
 from legbench.signals import Floats
 
 NUDGE = 1e-13
 """Distance from zero beyond which a sign is no rounding error, in units of the readings."""
 BACK = 2.0 * NUDGE
 """Distance by which the level of a falling angle is below that of a rising one [rad]."""
+LAST_LOWERED = int(Event.HIP_HIGH)
+"""Number of the last event whose level is lowered for falling."""
 OFF = (0.0, 1.0)
 """Gain and level of an event that is not watched."""
 
@@ -33,8 +36,10 @@ class CompiledRegime:
         flies: whether the leg is in the air.
         pushed: whether a joint is beyond a limit.
         integrator: heyoka's integrator of (q1, q2, v1, v2).
+        run: its integration to a time, or to the first event.
         state: view of its state (4,).
         pars: view of its parameters (n,).
+        slots: view of them into which single numbers are written in half the time.
         gain: gain of each event.
         level: level of each event, before the guard moves it.
         moved: events whose levels the guard has moved.
@@ -47,34 +52,58 @@ class CompiledRegime:
         self.flies = kind is Kind.FLIGHT
         self.pushed = False
         self.integrator = event_integrator(kind, tolerance)
+        self.run = self.integrator.propagate_until
         self.state: Floats = self.integrator.state
         self.pars: Floats = self.integrator.pars
         self.pars[:] = values[: len(self.pars)]
+        self._state, self.slots = _slots(self.state), _slots(self.pars)
         self.gain, self.level = [0.0] * len(Event), [1.0] * len(Event)
+        self._laid = list(self.level)
         self.moved: list[int] = []
         self.version = -1
+
+    def put(self, q: Pair, v: Pair, motor: Pair) -> None:
+        """Set angles [rad], rates [rad/s] and motors [rad] at time zero of the integrator."""
+        state = self._state
+        state[0], state[1] = q
+        state[2], state[3] = v
+        self.hold(motor)
+        self.integrator.time = 0.0
+        self.integrator.reset_cooldowns()
+
+    def hold(self, motor: Pair) -> None:
+        """Set the motor positions [rad]."""
+        self.slots[MOTOR], self.slots[MOTOR + 1] = motor
 
     def lay(self, event: int, gain: float, level: float) -> None:
         """Set an event to the rise of `gain * reading` through a level."""
         self.gain[event], self.level[event] = gain, level
-        self.pars[GAIN + event] = gain
-        back = BACK if gain < 0.0 and event <= Event.HIP_HIGH else 0.0
-        self.pars[LEVEL + event] = level + back
+        self.slots[GAIN + event] = gain
+        if gain < 0.0 and event <= LAST_LOWERED:
+            level += BACK
+        self.slots[LEVEL + event] = self._laid[event] = level
 
     def lay_bounds(self, fall: int, rise: int, lower: float, upper: float, never: float) -> None:
         """Set two events: a reading falls through `lower`, and rises through `upper`.
 
         An event whose level is as far from zero as `never` is switched off.
         """
-        if upper != self.level[rise] or self.gain[rise] == 0.0:
-            self.lay(rise, *((1.0, upper) if upper < never else OFF))
-        if -lower != self.level[fall] or self.gain[fall] == 0.0:
-            self.lay(fall, *((-1.0, -lower) if lower > -never else OFF))
+        gain, level = self.gain, self.level
+        if upper >= never:
+            if gain[rise] != 0.0:
+                self.lay(rise, *OFF)
+        elif upper != level[rise] or gain[rise] == 0.0:
+            self.lay(rise, 1.0, upper)
+        if lower <= -never:
+            if gain[fall] != 0.0:
+                self.lay(fall, *OFF)
+        elif -lower != level[fall] or gain[fall] == 0.0:
+            self.lay(fall, -1.0, -lower)
 
     def restore(self) -> None:
         """Restore the levels that the guard has moved."""
         for event in self.moved:
-            self.lay(event, self.gain[event], self.level[event])
+            self.slots[LEVEL + event] = self._laid[event]
         self.moved.clear()
 
     def guard(self, event: int, reading: float) -> bool:
@@ -82,6 +111,11 @@ class CompiledRegime:
         ahead = self.gain[event] * reading - self.level[event]
         if ahead <= -NUDGE:
             return False
-        self.pars[LEVEL + event] = self.gain[event] * reading + NUDGE
+        self.slots[LEVEL + event] = self.gain[event] * reading + NUDGE
         self.moved.append(event)
         return ahead > NUDGE
+
+
+def _slots(values: Floats) -> "memoryview[float]":
+    """View of an array of floats into which single ones are written fast."""
+    return values.data.cast("B").cast("d")

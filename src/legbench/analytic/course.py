@@ -28,8 +28,10 @@ from legbench.analytic.dual import DUAL, floats, without_gradients
 from legbench.analytic.equations import Pair, sweep, sweep_rate, touchdown_rates
 from legbench.analytic.event_detector import (
     CONTACT,
+    HIP_HIGH,
     KINDS,
     NEVER,
+    RECOVER,
     SEEN,
     SILENT,
     TIE,
@@ -38,7 +40,7 @@ from legbench.analytic.event_detector import (
     Levels,
 )
 from legbench.analytic.model import LegModel
-from legbench.analytic.parameters import HEIGHT, MOTOR, SPEED, Event, Kind, Watched
+from legbench.analytic.parameters import HEIGHT, SPEED, Event, Kind, Watched
 from legbench.analytic.state import LegState, Regime
 from legbench.analytic.stop_switches import StopSwitches
 from legbench.analytic.variation import Variation
@@ -52,6 +54,7 @@ one any number."""
 TIME_LIMIT = int(hy.taylor_outcome.time_limit)
 EVENTS = len(Event)
 """Number of events that an integrator may watch [-]."""
+TOUCHED, TURNED = Watched.CONTACT, Watched.TURN
 
 
 @final
@@ -91,6 +94,7 @@ class Course:
         self._tolerance, self._min_phase = tolerance, min_phase
         self._arm = foot_from_centre(model)
         self._regimes: dict[tuple[Regime, bool], CompiledRegime] = {}
+        self._terms = {regime: terms_of(self.plain, regime) for regime in Regime}
         self._variation = Variation(tolerance) if model.ops is DUAL else None
         self.detector = EventDetector(self, self.plain, min_phase)
         self.motor: Pair = (0.0, 0.0)
@@ -151,11 +155,8 @@ class Course:
         """Set the motor positions, which are held until the next call [rad]."""
         if motor != self.motor:
             self.motor, self.plain_motor = motor, floats(motor)
-            self.compiled.pars[MOTOR : MOTOR + 2] = motor
-            if self.stop_switches.touched:
-                self.stop_switches.decide(
-                    self.compiled, self.terms, self.plain_motor, self.plain_q, self.plain_v
-                )
+            self.compiled.hold(self.plain_motor)
+            self._decide()
 
     def switch(self) -> None:
         """Apply a touchdown or lift-off: change the regime, and the rates by eq. (12)."""
@@ -182,12 +183,13 @@ class Course:
             PlantFault: the integration failed.
         """
         self.told = None
-        if levels is not self.detector.levels:
-            self.detector.lay(levels)
+        detector = self.detector
+        if levels is not detector.levels:
+            detector.lay(levels)
         for _ in range(MAX_EVENTS):
-            event = self.detector.due()
+            event = detector.due()
             if event is None:
-                end = min(self.detector.blind, until) if self.time < self.detector.blind else until
+                end = detector.blind if self.time < detector.blind < until else until
                 if end > self.time:
                     event = self._piece(end)
             if event is not None:
@@ -214,22 +216,22 @@ class Course:
 
     def _piece(self, until: float) -> int | None:
         """Integrate to `until` or to the next event."""
-        integrator = self.compiled.integrator
+        compiled = self.compiled
         # max_steps is passed by position: a keyword costs a fifth of a short call.
-        outcome = int(integrator.propagate_until(float(until - self.began), MAX_STEPS)[0])
+        outcome = int(compiled.run(float(until - self.began), MAX_STEPS)[0])
         event = None if outcome == TIME_LIMIT else -outcome - 1
         if event is not None and not 0 <= event < EVENTS:
-            at = self.began + float(integrator.time)
+            at = self.began + float(compiled.integrator.time)
             why = f"integration failed at t = {at:.6f} s: the state runs away"
             raise PlantFault("integration failed", why)
-        q1, q2, v1, v2 = self.compiled.state.tolist()
+        q1, q2, v1, v2 = compiled.state.tolist()
         self.plain_q, self.plain_v = (q1, q2), (v1, v2)
         if self._variation is not None:
             self._variation.carry(self, self.plain_q, self.plain_v, until, event)
             return event
         self.q, self.v = self.plain_q, self.plain_v
         # Exactly `until`, since a time that is short of it by rounding would never be reached.
-        self.time = until if event is None else self.began + float(integrator.time)
+        self.time = until if event is None else self.began + compiled.integrator.time
         return event
 
     def _meaning(self, event: int) -> Watched | None:
@@ -239,19 +241,17 @@ class Course:
             return SEEN[event]
         if event == TURN:
             self.detector.turned()
-            return Watched.TURN
-        if event <= Event.HIP_HIGH:
+            return TURNED
+        if event <= HIP_HIGH:
             self.stop_switches.cross(event)
             self.stop_switches.lay(compiled)
-            self.stop_switches.decide(
-                self.compiled, self.terms, self.plain_motor, self.plain_q, self.plain_v
-            )
-        elif event == Event.RECOVER:
+            self._decide()
+        elif event == RECOVER:
             self._load(held=False)
         elif event != CONTACT:
             self.stop_switches.flip(compiled, event)
         elif compiled.flies or compiled.held or self.detector.released() > -TIE:
-            return Watched.CONTACT
+            return TOUCHED
         else:
             self._load(held=True)
         return None
@@ -267,26 +267,29 @@ class Course:
     def _enter(self, regime: Regime) -> None:
         """Begin a regime at the present time."""
         self.regime, self.told = regime, None
-        self.terms = terms_of(self.plain, regime)
+        self.terms = self._terms[regime]
         self.detector.enter(regime, self.since)
         self._load(held=False)
 
     def _load(self, *, held: bool) -> None:
         """Load the present state into the integrator of the regime."""
         compiled = self.compiled = self._compiled_for(held=held)
-        self.plain_q, self.plain_v = floats(self.q), floats(self.v)
-        self.plain_motor = floats(self.motor)
+        self.plain_q, self.plain_v, self.plain_motor = self.q, self.v, self.motor
+        if self._variation is not None:
+            self.plain_q, self.plain_v = floats(self.q), floats(self.v)
+            self.plain_motor = floats(self.motor)
         self.began = self.time
-        compiled.integrator.time = 0.0
-        compiled.integrator.reset_cooldowns()
-        compiled.state[:] = (*self.plain_q, *self.plain_v)
-        compiled.pars[MOTOR : MOTOR + 2] = self.plain_motor
+        compiled.put(self.plain_q, self.plain_v, self.plain_motor)
         if compiled.flies:
-            compiled.pars[HEIGHT], compiled.pars[SPEED] = self.point[1], self.drift[1]
+            compiled.slots[HEIGHT], compiled.slots[SPEED] = self.point[1], self.drift[1]
         self.detector.move_to(compiled)
-        self.stop_switches.decide(
-            self.compiled, self.terms, self.plain_motor, self.plain_q, self.plain_v
-        )
+        self._decide()
+
+    def _decide(self) -> None:
+        """Decide which stops push, after something has jumped."""
+        switches, compiled = self.stop_switches, self.compiled
+        if switches.touched or compiled.pushed:
+            switches.decide(compiled, self.terms, self.plain_motor, self.plain_q, self.plain_v)
 
     def _compiled_for(self, *, held: bool) -> CompiledRegime:
         found = self._regimes.get((self.regime, held))

@@ -120,10 +120,12 @@ def spring_energy(stiffness: Pair, motor: Pair, q: Pair) -> Term:
 
 def sweep(ops: Ops, q: Pair, along: Pair) -> Pair:
     """`along_1 dir(q1) + along_2 dir(q2)`, with `dir(a) = (sin a, -cos a)` (forward, up)."""
-    return (
-        along[0] * ops.sin(q[0]) + along[1] * ops.sin(q[1]),
-        -along[0] * ops.cos(q[0]) - along[1] * ops.cos(q[1]),
-    )
+    return along[0] * ops.sin(q[0]) + along[1] * ops.sin(q[1]), sweep_height(ops, q, along)
+
+
+def sweep_height(ops: Ops, q: Pair, along: Pair) -> Term:
+    """Upward component of `sweep` alone."""
+    return -along[0] * ops.cos(q[0]) - along[1] * ops.cos(q[1])
 
 
 def sweep_rate(ops: Ops, q: Pair, v: Pair, along: Pair) -> Pair:

@@ -15,7 +15,7 @@ from legbench.analytic.equations import (
     contact_force,
     free_foot_acceleration,
     pair_acceleration,
-    sweep,
+    sweep_height,
     sweep_rate,
 )
 from legbench.analytic.model import LegModel
@@ -31,11 +31,9 @@ NEVER = 1e6
 TIE = 1e-7
 """Tolerance of acceleration over gravity and of force over weight when the foot is released [-]: on
 the radial mode both vanish together, and rounding decides their signs."""
-RISE, FALL, FELL, FELL_BACK, TURN, CONTACT = map(
-    int, (Event.RISE, Event.FALL, Event.FELL, Event.FELL_BACK, Event.TURN, Event.CONTACT)
-)
-ANGLES = (RISE, FALL, FELL, FELL_BACK, *range(Event.KNEE_LOW, Event.HIP_HIGH + 1))
-"""Events whose readings are angles: two of the probe, of q1 + q2, of the knee, and of q1 each."""
+RISE, FALL, TURN, FELL, FELL_BACK = range(Event.RISE, Event.FELL_BACK + 1)
+KNEE_LOW, KNEE_HIGH, HIP_LOW, HIP_HIGH = range(Event.KNEE_LOW, Event.HIP_HIGH + 1)
+CONTACT, RECOVER = int(Event.CONTACT), int(Event.RECOVER)
 SEEN = {
     RISE: Watched.RISE,
     FALL: Watched.FALL,
@@ -75,6 +73,7 @@ class EventDetector:
         self._arm = floats(foot_from_centre(model))
         self._weight = model.floating.mass * GRAVITY
         self.levels, self.lean, self.blind = SILENT, NEVER, 0.0
+        self._below, self._above = -NEVER, NEVER
         self._turn, self._free = 0.0, False
 
     def enter(self, regime: Regime, since: float) -> None:
@@ -93,8 +92,10 @@ class EventDetector:
     def lay(self, levels: Levels) -> None:
         """Replace the levels of the probe."""
         self.levels, compiled = levels, self._compiled
-        compiled.lay_bounds(FALL, RISE, levels.lower, levels.upper, NEVER)
-        if not levels.turns:
+        upper, lower, turns = levels
+        compiled.lay_bounds(FALL, RISE, lower, upper, NEVER)
+        self._below, self._above = lower + NUDGE, upper - NUDGE
+        if not turns:
             self._turn = 0.0
             if compiled.gain[TURN] != 0.0:
                 compiled.lay(TURN, *OFF)
@@ -123,22 +124,26 @@ class EventDetector:
 
     def _near(self) -> int | None:
         """Guard the events of angles, and return one whose condition holds already, or None."""
-        course, compiled = self._course, self._compiled
-        (p1, p2), (q1, q2), gain, level = (
-            course.probe,
-            course.plain_q,
-            compiled.gain,
-            compiled.level,
-        )
-        reading, lean, knee = p1 * q1 + p2 * q2, q1 + q2, q2 - q1
+        course = self._course
+        (p1, p2), (q1, q2) = course.probe, course.plain_q
+        reading, lean = p1 * q1 + p2 * q2, q1 + q2
         due = None
-        for event, value in zip(
-            ANGLES, (reading, reading, lean, lean, knee, knee, q1, q1), strict=True
-        ):
-            if gain[event] * value - level[event] > -NUDGE:
-                beyond = compiled.guard(event, value)
-                if beyond and due is None and event in SEEN:
-                    due = event
+        if not self._below < reading < self._above:
+            due = self._guard_two(RISE, FALL, reading)
+        if abs(lean) > self.lean - NUDGE:
+            fell = self._guard_two(FELL, FELL_BACK, lean)
+            due = fell if due is None else due
+        if not course.stop_switches.clear(q2 - q1, q1):
+            self._guard_two(KNEE_LOW, KNEE_HIGH, q2 - q1)
+            self._guard_two(HIP_LOW, HIP_HIGH, q1)
+        return due
+
+    def _guard_two(self, first: int, second: int, value: float) -> int | None:
+        """Guard two events of an angle, and return the one whose condition holds already."""
+        compiled, due = self._compiled, None
+        for event in (first, second):
+            if compiled.guard(event, value) and due is None:
+                due = event
         return due
 
     def _contact(self) -> int | None:
@@ -158,8 +163,8 @@ class EventDetector:
             return None
         released = self.released()
         if force > TIE or released > -TIE:
-            return Event.RECOVER if force > TIE else CONTACT
-        for event, reading in ((CONTACT, released), (Event.RECOVER, force)):
+            return RECOVER if force > TIE else CONTACT
+        for event, reading in ((CONTACT, released), (RECOVER, force)):
             compiled.lay(event, 1.0, 0.0)
             compiled.guard(event, reading)
         return None
@@ -171,7 +176,7 @@ class EventDetector:
         z, dz = float(course.point[1]), float(course.drift[1])
         fallen = self._plain.floating.gravity * elapsed
         height = z + (dz - 0.5 * fallen) * elapsed
-        height += sweep(self._plain.ops, course.plain_q, self._arm)[1]
+        height += sweep_height(self._plain.ops, course.plain_q, self._arm)
         if height > 0.0:
             self._expect(height)
             return None

@@ -7,9 +7,11 @@ and by its own event otherwise, never by the sign of a number that is zero up to
 stop can pull.
 """
 
+import math
+from operator import is_
 from typing import final
 
-from legbench.analytic.compiled_regime import OFF, CompiledRegime
+from legbench.analytic.compiled_regime import NUDGE, OFF, CompiledRegime
 from legbench.analytic.equations import SCALAR, Ops, Pair, Term, pair_acceleration, pair_share
 from legbench.analytic.model import LegModel
 from legbench.analytic.parameters import FREE_PUSHES, PUSHES, Event
@@ -20,6 +22,8 @@ AT_LIMIT = 1e-12
 """Largest depth that may be rounding; the speed then says whether the stop is touched [rad]."""
 FIRST = int(Event.KNEE_LOW)
 """Number of the first of the four events in which a joint meets or leaves a limit."""
+KNEE_PUSH, KNEE_FREE = int(Event.KNEE_PUSH), int(Event.KNEE_FREE)
+"""Numbers of the events of the knee's stop; those of the hip's come next."""
 
 
 @final
@@ -39,6 +43,16 @@ class StopSwitches:
         self._acting: list[Stop | None] = [None, None]
         """Stop that acts on each joint, or none within the limits."""
         self.touched, self._version = False, 0
+        self._asked_at: tuple[PairTerms, Pair, Pair, Pair] | None = None
+        """Objects for which `_answer` has been computed."""
+        self._answer: list[float] = [0.0, 0.0]
+        ends = [stop.limit + stop.sign * NUDGE for stop in model.stops]
+        self._ends = tuple(ends) or (-math.inf, math.inf) * 2
+
+    def clear(self, knee: float, hip: float) -> bool:
+        """Whether no joint at these angles [rad] is at a limit or beyond one."""
+        knee_low, knee_high, hip_low, hip_high = self._ends
+        return not self.touched and knee_low < knee < knee_high and hip_low < hip < hip_high
 
     def find(self, q: Pair, v: Pair) -> None:
         """Determine by the law which limits a joint is beyond, for a leg set to a new state."""
@@ -55,10 +69,10 @@ class StopSwitches:
         if compiled.version == self._version:
             return
         compiled.version = self._version
-        for index, (stop, beyond) in enumerate(zip(self._stops, self._touched, strict=True)):
+        for event, (stop, beyond) in enumerate(zip(self._stops, self._touched, strict=True), FIRST):
             gain = stop.sign if beyond else -stop.sign
-            if compiled.gain[FIRST + index] != gain:
-                compiled.lay(FIRST + index, gain, gain * stop.limit)
+            if compiled.gain[event] != gain:
+                compiled.lay(event, gain, gain * stop.limit)
 
     def cross(self, event: int) -> None:
         """Note that a joint has gone beyond a limit, or has come back."""
@@ -72,6 +86,7 @@ class StopSwitches:
                 self._acting[index // 2] = stop
         self.touched = True in self._touched
         self._version += 1
+        self._asked_at = None
 
     def decide(
         self, compiled: CompiledRegime, terms: PairTerms, motor: Pair, q: Pair, v: Pair
@@ -91,48 +106,51 @@ class StopSwitches:
 
     def flip(self, compiled: CompiledRegime, event: int) -> None:
         """Note that a stop begins or ends to push, or would if the foot were released."""
-        if event >= Event.KNEE_FREE:
-            self._free[event - Event.KNEE_FREE] ^= True
+        if event >= KNEE_FREE:
+            self._free[event - KNEE_FREE] ^= True
         else:
-            self._pushing[event - Event.KNEE_PUSH] ^= True
+            self._pushing[event - KNEE_PUSH] ^= True
         self._switch(compiled)
 
     def guard(
         self, compiled: CompiledRegime, terms: PairTerms, motor: Pair, q: Pair, v: Pair
     ) -> None:
         """Set and guard the events of the pushes, for the joints that are beyond a limit."""
-        found = [(Event.KNEE_PUSH, terms, self._pushing)]
+        found = [(KNEE_PUSH, terms, self._pushing)]
         if compiled.held:
-            found.append((Event.KNEE_FREE, self._model.falling, self._free))
+            found.append((KNEE_FREE, self._model.falling, self._free))
         for first, inertia, pushing in found:
             asked = self._asked(inertia, motor, q, v)
             for joint in (0, 1):
-                stop = self._acting[joint]
+                stop, event = self._acting[joint], first + joint
                 if stop is None:
-                    compiled.lay(first + joint, *OFF)
+                    if compiled.gain[event] != 0.0:
+                        compiled.lay(event, *OFF)
                     continue
-                compiled.lay(first + joint, -stop.sign if pushing[joint] else stop.sign, 0.0)
-                compiled.guard(first + joint, stop.sign * asked[joint])
+                gain = -stop.sign if pushing[joint] else stop.sign
+                if compiled.gain[event] != gain:
+                    compiled.lay(event, gain, 0.0)
+                compiled.guard(event, stop.sign * asked[joint])
 
     def _silence(self, compiled: CompiledRegime) -> None:
         """Switch all pushes and their events off, as no joint is beyond a limit."""
         compiled.pushed = False
-        compiled.pars[PUSHES : PUSHES + 4 : 2] = 0.0
-        for event in (Event.KNEE_PUSH, Event.HIP_PUSH):
+        compiled.slots[PUSHES] = compiled.slots[PUSHES + 2] = 0.0
+        for event in (KNEE_PUSH, KNEE_PUSH + 1):
             compiled.lay(event, *OFF)
         if compiled.held:
-            compiled.pars[FREE_PUSHES : FREE_PUSHES + 2] = 0.0
-            for event in (Event.KNEE_FREE, Event.HIP_FREE):
+            compiled.slots[FREE_PUSHES] = compiled.slots[FREE_PUSHES + 1] = 0.0
+            for event in (KNEE_FREE, KNEE_FREE + 1):
                 compiled.lay(event, *OFF)
 
     def _switch(self, compiled: CompiledRegime) -> None:
         for joint in (0, 1):
             stop = self._acting[joint]
             place = PUSHES + 2 * joint
-            compiled.pars[place] = float(stop is not None and self._pushing[joint])
-            compiled.pars[place + 1] = 0.0 if stop is None else stop.limit
+            compiled.slots[place] = float(stop is not None and self._pushing[joint])
+            compiled.slots[place + 1] = 0.0 if stop is None else stop.limit
             if compiled.held:
-                compiled.pars[FREE_PUSHES + joint] = float(stop is not None and self._free[joint])
+                compiled.slots[FREE_PUSHES + joint] = float(stop is not None and self._free[joint])
 
     def turns(
         self, ops: Ops, terms: PairTerms, torque: Pair, q: Pair, v: Pair, *, free: bool = False
@@ -151,8 +169,11 @@ class StopSwitches:
 
     def _asked(self, terms: PairTerms, motor: Pair, q: Pair, v: Pair) -> list[float]:
         """Readings of the events of each joint's stop where every stop acts that would push."""
-        torque = self._model.torque(motor, q, v)
-        return self._turns(SCALAR, terms, torque, q, v, None)[0]
+        at = (terms, motor, q, v)
+        if self._asked_at is None or not all(map(is_, at, self._asked_at)):
+            torque = self._model.torque(motor, q, v)
+            self._asked_at, self._answer = at, self._turns(SCALAR, terms, torque, q, v, None)[0]
+        return self._answer
 
     def _turns(
         self,

@@ -7,7 +7,7 @@ from typing import Annotated
 import tyro
 
 from legbench.cli.output import note, print_json, results_in, write_json
-from legbench.cli.parse import parse
+from legbench.cli.parse import OrNone, parse
 from legbench.control import JumpConfig
 from legbench.design import load_design
 from legbench.modes.settings import Setting
@@ -24,15 +24,15 @@ class HopArguments:
     rest: float = 0.9
     """Set point z2 of the standing leg, orthonormal, for passive hops [rad]."""
     jump: JumpConfig = field(default_factory=JumpConfig)
-    height: float | None = None
+    height: OrNone[float] = None
     """Apex of the centre of mass to start from [m]; none: 30 mm over standing."""
     hops: int = 60
     """Number of hops after which the leg should be periodic."""
-    period: int | None = None
+    period: OrNone[int] = None
     """Number of hops after which the motion is to repeat; none: as it settles."""
-    family: Setting | None = None
+    family: OrNone[Setting] = None
     """Setting over which the periodic hop is followed, from its present value to --to."""
-    to: float | None = None
+    to: OrNone[float] = None
     """Value of that setting at which the family ends [rad, or a factor]."""
     basin: int = 0
     """Number of points on each side of the basin map; 0 makes none."""
@@ -48,7 +48,7 @@ class HopArguments:
     """Whether to map a basin of more than 250 000 cells all the same."""
     workers: int = 2
     """Number of processes that compute the basin map."""
-    out: Path | None = None
+    out: OrNone[Path] = None
     """Folder for hop.json, pictures and the basin's rows; a map begun there is continued."""
     json: bool = False
     """Whether to print one JSON object instead of tables."""

@@ -135,7 +135,8 @@ def _found(flags: ModesArguments, scene: Scene) -> "ModesFound":
 
 def _write(out: Path, found: "ModesFound") -> None:
     from legbench.cli.modes_content import content_of
-    from legbench.modes.trajectory import paths_to_json, write_paths
+    from legbench.modes.trajectory import paths_to_json
+    from legbench.modes.trajectory_file import write_paths
     from legbench.viz.print.modes import plot_modes
     from legbench.viz.print.responses import plot_responses
 

@@ -3,7 +3,7 @@
 import io
 import os
 from contextlib import redirect_stderr
-from typing import Final, TypeVar
+from typing import Final, TypeVar, Union
 
 import tyro
 
@@ -11,6 +11,9 @@ from legbench.cli.output import report_error
 from legbench.errors import ConfigError
 
 Arguments = TypeVar("Arguments")
+T = TypeVar("T")
+OrNone = Union[None, T]  # noqa: UP007 tyro loads a library of 60 ms to check a default of `T | None`
+"""Type of a flag that may be left out, for commands that have to start fast."""
 WRONG_USAGE: Final = 2
 """Exit status of a command line that means nothing."""
 FRAME, RULE = " \u2502\u256d\u256e\u2570\u256f|+", "\u2500-"

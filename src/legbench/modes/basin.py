@@ -5,24 +5,28 @@ it stopped. The file begins with everything that decides the map; another map is
 """
 
 import json
+import math
 import multiprocessing
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from enum import IntEnum
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from legbench.analytic import LegModel
+from legbench.analytic.compiled import TOLERANCE
 from legbench.analytic.taylor import MAP_TOLERANCE, TaylorLeg
 from legbench.control import JumpConfig
 from legbench.design import LegDesign
 from legbench.design.toml import design_to_mapping
 from legbench.errors import ConfigError
 from legbench.interrupts import children_without_interrupts, ignore_interrupts
+from legbench.modes.attraction import Attraction, find_attraction
 from legbench.modes.drive import AbstractDrive, JumpLaw, Passive
 from legbench.modes.fixed_point import UNITS
 from legbench.modes.hop import NAMES, Apex, Ending, return_map
@@ -30,6 +34,8 @@ from legbench.reading import parse_json
 from legbench.signals import Floats, Ints
 
 Progress = Callable[[int, int], None]
+LARGE = 1000
+"""Number of cells from which on it pays to look for the neighbourhood that attracts [-]."""
 
 
 class Fate(IntEnum):
@@ -123,20 +129,47 @@ class Question:
         return TaylorLeg(model, probe=drive.probe, tolerance=self.tolerance), drive
 
 
-def fate_of(leg: TaylorLeg, drive: AbstractDrive, question: Question, start: Apex) -> Fate:
-    """Outcome of the hops from a start, followed until it is known."""
-    wanted, at = question.centre.vector(), start
-    for _ in range(question.hops):
+def fate_of(
+    leg: TaylorLeg,
+    drive: AbstractDrive,
+    question: Question,
+    start: Apex,
+    attraction: Attraction | None = None,
+) -> Fate:
+    """Outcome of the hops from a start, followed until it is known.
+
+    An `attraction` tells of many legs some hops earlier that they will return.
+    """
+    wanted, at, before = question.centre.vector(), start, math.inf
+    for hop in range(question.hops):
         try:
             done = return_map(leg, drive, at)
         except ConfigError:
             return Fate.BURIED
         if done.after is None:
             return ENDINGS[done.ending]
-        at = done.after
-        if np.max(np.abs(at.vector() - wanted) / UNITS) < question.near:
+        at, vector = done.after, done.after.vector()
+        if np.max(np.abs(vector - wanted) / UNITS) < question.near:
             return Fate.RETURNS
+        if attraction is not None:
+            distance = attraction.distance(vector)
+            if max(before, distance) <= attraction.radius:
+                left = question.hops - 1 - hop
+                if attraction.hops_to(question.near, distance) <= left:
+                    return Fate.RETURNS
+            before = distance
     return Fate.WANDERS
+
+
+def attraction_in(question: Question) -> Attraction | None:
+    """Neighbourhood of the periodic hop from which every leg returns, if there is one.
+
+    Motors that are held give no derivative at a touchdown without speed, and so no neighbourhood.
+    """
+    if question.jump is None:
+        return None
+    (leg, drive), (exact, _) = question.tools(), replace(question, tolerance=TOLERANCE).tools()
+    return find_attraction(leg, exact, drive, question.centre, question.near, question.hops)
 
 
 _worker: tuple[Question, TaylorLeg, AbstractDrive] | None = None
@@ -154,7 +187,7 @@ def _start_process(question: Question) -> None:
     _start_worker(question)
 
 
-def _row(index: int) -> tuple[int, list[int]]:
+def _row(attraction: Attraction | None, index: int) -> tuple[int, list[int]]:
     if _worker is None:
         raise RuntimeError("the worker was not started")
     question, leg, drive = _worker
@@ -164,7 +197,7 @@ def _row(index: int) -> tuple[int, list[int]]:
     fates = []
     for value in question.across.values():
         vector[places[question.across.name]] = value
-        fates.append(int(fate_of(leg, drive, question, Apex.of(vector))))
+        fates.append(int(fate_of(leg, drive, question, Apex.of(vector), attraction)))
     return index, fates
 
 
@@ -222,15 +255,20 @@ def _line(index: int, fates: list[int]) -> str:
 def _rows(question: Question, todo: list[int], workers: int) -> Iterator[tuple[int, list[int]]]:
     if not todo:
         return
+    large = len(todo) * question.across.count >= LARGE
     if workers == 1:
         _start_worker(question)
-        yield from map(_row, todo)
+        yield from map(partial(_row, attraction_in(question) if large else None), todo)
         return
     with _pool(question, workers) as pool:
-        # The first submission starts all workers; one that ^C reached while it loads its modules
-        # would die before it could ignore it.
+        # A submission starts a worker if none is idle; one that ^C reached while it loads its
+        # modules would die before it could ignore it. They load while the neighbourhood is sought.
         with children_without_interrupts():
-            futures = [pool.submit(_row, index) for index in todo]
+            for _ in range(workers):
+                pool.submit(int)
+        row = partial(_row, attraction_in(question) if large else None)
+        with children_without_interrupts():
+            futures = [pool.submit(row, index) for index in todo]
         for future in as_completed(futures):
             yield future.result()
 

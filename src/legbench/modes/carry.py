@@ -11,7 +11,7 @@ from typing import Any, final
 import numpy as np
 
 from legbench.analytic import equations
-from legbench.analytic.compiled import varied_integrator
+from legbench.analytic.compiled import free_integrator, varied_integrator
 from legbench.analytic.course import TIME_LIMIT
 from legbench.analytic.equations import Pair
 from legbench.analytic.parameters import DAMPING, MOTOR, PUSHES, SMOOTH
@@ -54,7 +54,7 @@ class Carrier:
     def __init__(self, scene: Scene, damping: Pair = (0.0, 0.0)) -> None:
         self.scene = scene
         self.damping: Floats = np.array(damping)
-        self._integrator = varied_integrator(TOLERANCE)
+        self._varied, self._free = varied_integrator(TOLERANCE), free_integrator(TOLERANCE)
         terms = scene.terms
         self._parameters = np.array(
             [
@@ -91,7 +91,10 @@ class Carrier:
         Raises:
             ConfigError: the leg runs away from there.
         """
-        integrator = self._load(start, extra, motor)
+        integrator = self._load(self._varied, start, extra, motor)
+        # The identity is the derivative by the start.
+        integrator.state[STATES:] = np.eye(STATES, STATES + SMOOTH).ravel()
+        integrator.pars[PUSHES:] = 0.0
         outcome = int(integrator.propagate_until(float(time), MAX_STEPS)[0])
         state = integrator.state.copy()
         if outcome != TIME_LIMIT or not np.all(np.isfinite(state)):
@@ -117,20 +120,17 @@ class Carrier:
         Raises:
             ConfigError: the leg runs away from there.
         """
-        integrator = self._load(start, extra, motor)
+        integrator = self._load(self._free, start, extra, motor)
         outcome, *_, states = integrator.propagate_grid(times)
         if int(outcome) != TIME_LIMIT:
             raise ConfigError(f"the leg cannot be followed for {times[-1]:.3g} s: it runs away")
-        return np.asarray(states)[:, :STATES]
+        return np.asarray(states)
 
-    def _load(self, start: Floats, extra: float, motor: Floats | None) -> Any:
-        """Set the integrator to a start, with the identity as derivative by the start."""
-        integrator = self._integrator
+    def _load(self, integrator: Any, start: Floats, extra: float, motor: Floats | None) -> Any:
+        """Set an integrator to a start and to the parameters of the leg."""
         integrator.time = 0.0
         integrator.state[:STATES] = start
-        integrator.state[STATES:] = np.eye(STATES, STATES + SMOOTH).ravel()
         integrator.pars[:SMOOTH] = self._parameters
-        integrator.pars[PUSHES:] = 0.0
         integrator.pars[DAMPING:MOTOR] += extra
         if motor is not None:
             integrator.pars[MOTOR:SMOOTH] = motor

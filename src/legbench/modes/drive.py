@@ -7,6 +7,7 @@ from typing import final
 import numpy as np
 
 from legbench.analytic.equations import Pair
+from legbench.analytic.event_detector import NEVER
 from legbench.analytic.taylor import SILENT, Levels, Watched
 from legbench.control import JumpConfig, LegTargets
 from legbench.control.jump_rules import JumpPhase, phase_exits
@@ -15,6 +16,9 @@ from legbench.design.statics import Support
 from legbench.kinematics import ModalConvention
 
 SCALE = math.sqrt(0.5)
+FLIGHT, COMPRESS, PUSH = JumpPhase.FLIGHT, JumpPhase.COMPRESS, JumpPhase.PUSH
+RISE, FALL, TURN = Watched.RISE, Watched.FALL, Watched.TURN
+"""Members that are asked for at every event; the enumerations themselves take longer."""
 
 
 class AbstractDrive(ABC):
@@ -105,14 +109,20 @@ class JumpLaw(AbstractDrive):
         self._stretched = (float(stretched[0]), float(stretched[1]))
         rest = targets.link_at_rest(folded)
         torque = np.asarray(design.stiffness) * (folded - rest)
-        self._standing = -float(targets.radial(torque))
+        standing = -float(targets.radial(torque))
+        self._at_load = {
+            phase: self._load_level(end.load * standing, self._motor_in(phase))
+            for phase, end in self._exits.items()
+        }
+        self._in_flight = Levels(upper=self._at_load[FLIGHT])
+        self._in_doubt = Levels(lower=self._at_load[FLIGHT])
         self._extreme, self._loaded = 0.0, False
         self._levels: Levels | None = None
-        self._enter(JumpPhase.FLIGHT)
+        self._enter(FLIGHT)
 
     def restart(self) -> None:
         """Begin in flight, unloaded and settled."""
-        self._enter(JumpPhase.FLIGHT)
+        self._enter(FLIGHT)
 
     def levels(self) -> Levels:
         """Levels that end the phase; the same object as long as they do not change."""
@@ -121,38 +131,34 @@ class JumpLaw(AbstractDrive):
         return self._levels
 
     def _new_levels(self) -> Levels:
-        match self.phase:
-            case JumpPhase.FLIGHT if self._loaded:
-                return Levels(lower=self._at_load())
-            case JumpPhase.FLIGHT:
-                return Levels(upper=self._at_load())
-            case JumpPhase.COMPRESS:
-                return Levels(lower=self._extreme - self._turn, turns=True)
-            case JumpPhase.PUSH:
-                return Levels(lower=self._at_load(), upper=self._extreme + self._turn, turns=True)
-            case _:
-                return SILENT
+        if self.phase is FLIGHT:
+            return self._in_doubt if self._loaded else self._in_flight
+        if self.phase is COMPRESS:
+            return Levels(NEVER, self._extreme - self._turn, True)
+        if self.phase is PUSH:
+            return Levels(self._extreme + self._turn, self._at_load[PUSH], True)
+        return SILENT
 
     def on_event(self, what: Watched, value: float, time: float) -> None:
         """Advance the phase after an event of the probe."""
         self._levels = None
-        match (self.phase, what):
-            case (JumpPhase.FLIGHT, Watched.RISE):
+        if self.phase is FLIGHT:
+            if what is RISE:
                 self._load(time)
-            case (JumpPhase.FLIGHT, Watched.FALL):
-                self._enter(JumpPhase.FLIGHT)
-            case (JumpPhase.COMPRESS, Watched.TURN):
+            elif what is FALL:
+                self._enter(FLIGHT)
+        elif self.phase is COMPRESS:
+            if what is TURN:
                 self._extreme = max(self._extreme, value)
-            case (JumpPhase.COMPRESS, Watched.FALL):
+            elif what is FALL:
                 self._leave(value)
-                if value < self._at_load():
+                if value < self._at_load[PUSH]:
                     self._release(time)
-            case (JumpPhase.PUSH, Watched.TURN):
+        elif self.phase is PUSH:
+            if what is TURN:
                 self._extreme = min(self._extreme, value)
-            case (JumpPhase.PUSH, Watched.FALL | Watched.RISE):
+            else:
                 self._release(time)
-            case _:
-                pass
 
     def on_alarm(self, value: float, time: float) -> None:
         """Advance the phase after the alarm: the release is over, or a load has lasted."""
@@ -160,8 +166,8 @@ class JumpLaw(AbstractDrive):
         if self._loaded:
             self._leave(value)
             return
-        self._enter(JumpPhase.FLIGHT)
-        if value > self._at_load():
+        self._enter(FLIGHT)
+        if value > self._at_load[FLIGHT]:
             self._load(time)
 
     @property
@@ -183,11 +189,13 @@ class JumpLaw(AbstractDrive):
 
     def _enter(self, phase: JumpPhase) -> None:
         self.phase, self._exit = phase, self._exits[phase]
-        self.motor = self._stretched if phase is JumpPhase.PUSH else self._folded
+        self.motor = self._motor_in(phase)
         self.alarm, self._loaded, self._levels = math.inf, False, None
 
-    def _at_load(self) -> float:
-        """The y of the load that ends the phase, at the present motor position."""
+    def _motor_in(self, phase: JumpPhase) -> Pair:
+        return self._stretched if phase is PUSH else self._folded
+
+    def _load_level(self, load: float, motor: Pair) -> float:
+        """The y of a load [N m] at a motor position."""
         k1, k2 = self._stiffness
-        offset = SCALE * (k2 * self.motor[1] - k1 * self.motor[0])
-        return (self._exit.load * self._standing + offset) / self._k
+        return (load + SCALE * (k2 * motor[1] - k1 * motor[0])) / self._k

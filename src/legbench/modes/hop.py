@@ -13,7 +13,7 @@ import numpy as np
 from legbench.analytic.course import Course
 from legbench.analytic.equations import Pair, pair_kinetic
 from legbench.analytic.model import LegModel
-from legbench.analytic.state import LegState, Regime, flying
+from legbench.analytic.state import LegState, flying
 from legbench.analytic.taylor import TaylorLeg, Watched
 from legbench.errors import PlantFault
 from legbench.modes.drive import AbstractDrive
@@ -27,6 +27,8 @@ CALLS = 400
 """Largest number of events in one hop [-]."""
 NAMES = ("height", "speed", "z1", "z2", "dz1", "dz2")
 SCALE = math.sqrt(0.5)
+CONTACT, FELL = Watched.CONTACT, Watched.FELL
+"""Members that are asked for at every event; the enumeration itself takes longer to find them."""
 
 
 class Ending(StrEnum):
@@ -133,24 +135,24 @@ def hop(leg: TaylorLeg, drive: AbstractDrive, start: Apex) -> Hop:
     course = leg.course
     _launch(course, start)
     touchdown = liftoff = math.nan
-    lost, ending = 0.0, None
+    lost, landed, flew, ending = 0.0, False, False, None
     try:
         for _ in range(CALLS):
-            what, ending = _pause(course, drive, flew=not math.isnan(liftoff))
+            what, ending = _pause(course, drive, flew=flew)
             if ending is not None:
                 break
-            if what is Watched.CONTACT and course.regime is Regime.FLIGHT:
+            if what is None:
+                drive.on_alarm(_probe(drive, course.q), course.time)
+            elif what is not CONTACT:
+                drive.on_event(what, _probe(drive, course.q), course.time)
+            elif course.compiled.flies:
                 lost += _kinetic(course)
                 course.switch()
                 lost -= _kinetic(course)
-                touchdown = course.time if math.isnan(touchdown) else touchdown
-            elif what is Watched.CONTACT:
-                course.switch()
-                liftoff = course.time
-            elif what is None:
-                drive.on_alarm(_probe(drive, course.q), course.time)
+                touchdown, landed = touchdown if landed else course.time, True
             else:
-                drive.on_event(what, _probe(drive, course.q), course.time)
+                course.switch()
+                liftoff, flew = course.time, True
     except PlantFault:
         ending = Ending.FAULT
     return Hop(
@@ -167,16 +169,16 @@ def _pause(
     course: Course, drive: AbstractDrive, *, flew: bool
 ) -> tuple[Watched | None, Ending | None]:
     """Go on to the next event, alarm or ending; `flew` if the leg has lifted off."""
-    until, apex = min(HORIZON, drive.alarm), math.inf
-    if flew and course.regime is Regime.FLIGHT:
-        apex = course.apex_time()
-        if course.time <= apex <= until:
-            until = apex
+    alarm = drive.alarm
+    until = alarm if alarm < HORIZON else HORIZON
+    apex = course.apex_time() if flew and course.compiled.flies else math.inf
+    if course.time <= apex <= until:
+        until = apex
     course.hold(drive.motor)
     what = course.go(until, drive.levels())
-    if what is Watched.FELL:
+    if what is FELL:
         return what, Ending.FELL
-    if what is not None or course.time >= drive.alarm:
+    if what is not None or course.time >= alarm:
         return what, None
     if until == apex:
         return what, Ending.APEX if drive.settled else Ending.FAULT
@@ -204,7 +206,7 @@ def _reached(course: Course) -> Apex:
 def _kinetic(course: Course) -> float:
     """Kinetic energy of a leg in flight or stance [J]."""
     model, ops = course.model, course.model.ops
-    if course.regime is not Regime.FLIGHT:
+    if not course.compiled.flies:
         return pair_kinetic(ops, model.stance, course.q, course.v)
     dx, dz = course.centre()[1]
     own = 0.5 * model.floating.mass * (dx * dx + dz * dz)

@@ -2,19 +2,14 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
-from pyarrow import parquet
 
-from legbench.errors import ConfigError
 from legbench.modes.branches import Branch
 from legbench.modes.carry import Carrier
 from legbench.modes.damped import DampedFamily
 from legbench.modes.family import Family
 from legbench.signals import Floats
-from legbench.writing import reason, write_whole
 
 ROWS = 101
 """Number of instants of a period, both ends included [-]."""
@@ -85,36 +80,6 @@ def damped_paths(family: DampedFamily, carrier: Carrier) -> Iterator[OrbitPath]:
 def _rows(carrier: Carrier, start: Floats, period: float, extra: float = 0.0) -> Floats:
     times = np.linspace(0.0, period, ROWS)
     return np.column_stack([times, carrier.path(start, times, extra=extra)])
-
-
-def write_paths(paths: list[OrbitPath], path: Path) -> None:
-    """Write trajectories as one Parquet table, a row an instant, written whole or not at all.
-
-    Raises:
-        ConfigError: it cannot be written.
-    """
-    rows = np.vstack([one.rows for one in paths])
-    counts = [len(one.rows) for one in paths]
-    columns: dict[str, pa.Array] = {
-        "family": pa.array(np.repeat([one.family for one in paths], counts)),
-        "orbit": pa.array(np.repeat([one.index for one in paths], counts)),
-        "energy": pa.array(np.repeat([one.energy for one in paths], counts)),
-        "period": pa.array(np.repeat([one.period for one in paths], counts)),
-        "stable": pa.array(
-            [one.stable for one, count in zip(paths, counts, strict=True) for _ in range(count)],
-            type=pa.bool_(),
-        ),
-    }
-    columns |= {name: pa.array(rows[:, place]) for place, name in enumerate(COLUMNS)}
-    sink = pa.BufferOutputStream()
-    parquet.write_table(pa.table(columns), sink)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(path, sink.getvalue().to_pybytes())
-    except OSError as error:
-        raise ConfigError(
-            f"cannot write {path}: {reason(error)}; name a folder that you can write"
-        ) from error
 
 
 def paths_to_json(paths: list[OrbitPath]) -> list[dict[str, object]]:
