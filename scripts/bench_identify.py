@@ -5,12 +5,15 @@
 Three steps of 3 s of the prototype, noise of 0.1 deg, start 30 % off. Times are of processor and
 wall; on a machine that others use, ratios and evaluations are what counts. pycma minimises the very
 sum of squares, in the same logarithms, from the same start, until it is within 1 % of a standard
-error of our optimum in every parameter. `--peer` runs `mujoco.sysid`, too.
+error of our optimum in every parameter. `--peer` runs `mujoco.sysid` instead. A peer that has taken
+`ENOUGH` times our time without arriving is ended: it is at least so many times slower.
 """
 
 import argparse
 import os
 import pickle
+import resource
+import signal
 import subprocess
 import sys
 import tempfile
@@ -37,6 +40,8 @@ from legbench.mjcf.options import Linkage, LinkageKind
 
 DESIGN = load_design(Path(__file__).parents[1] / "models" / "prototype.toml")
 OFF = replace(DESIGN, stiffness=(3.0, 1.7), damping=(0.0065, 0.0095))
+ENOUGH = 50.0
+"""Processor time, as a multiple of ours, at which a peer is ended [-]."""
 CLOSE = 0.01
 """Part of a standard error within which pycma counts as having arrived [-]."""
 FREED = {
@@ -83,16 +88,21 @@ def against_cma(trials: tuple[Trial, ...], name: str) -> None:
         except PlantFault:
             return float("inf")
 
-    options = {"verbose": -9, "seed": 1, "maxfevals": 20_000, "ftarget": close, "tolfun": 0.0,
-               "tolfunhist": 0.0, "tolx": 1e-12}  # fmt: skip
     before = time.process_time()
+
+    def enough(_: object) -> bool:
+        return time.process_time() - before > ENOUGH * mine
+
+    options = {"verbose": -9, "seed": 1, "ftarget": close, "tolfun": 0.0, "tolfunhist": 0.0,
+               "tolx": 1e-12, "termination_callback": enough}  # fmt: skip
     search = cma.CMAEvolutionStrategy(len(matrix) * [0.0], 0.2, options)
     search.optimize(cost)
     theirs = time.process_time() - before
     arrived = "arrived" if search.result.fbest <= close else "did not arrive"
     print(
         f"{name}: ours {ours.evaluations} evaluations, {mine:.2f} s of CPU; pycma "
-        f"{search.result.evaluations}, {theirs:.1f} s ({arrived}): {theirs / mine:.1f} times"
+        f"{search.result.evaluations}, {theirs:.1f} s ({arrived}): {theirs / mine:.1f} times",
+        flush=True,
     )
 
 
@@ -120,27 +130,81 @@ def cold(trials: tuple[Trial, ...], folder: Path) -> None:
         subprocess.run([sys.executable, "-c", COLD, str(path)], env=environment, check=True)
 
 
+PEER = """
+import pickle, resource, sys
+trials, design = pickle.load(open(sys.argv[1], "rb"))
+from legbench.identify import Question
+from legbench.identify.peer import ask_peer
+limit = int(resource.getrusage(resource.RUSAGE_SELF).ru_utime + float(sys.argv[2])) + 1
+resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
+answer = ask_peer(Question(design=design, trials=trials))
+pickle.dump(answer, open(sys.argv[1] + ".answer", "wb"))
+"""
+
+
+def against_sysid(trials: tuple[Trial, ...], name: str, folder: Path) -> None:
+    """Compare the whole of an identification with the search of `mujoco.sysid` alone."""
+    identify(Question(design=OFF, trials=trials))  # compiled
+    before = time.process_time()
+    outcome = identify(Question(design=OFF, trials=trials))
+    mine = time.process_time() - before
+    path = folder / "peer.pickle"
+    path.write_bytes(pickle.dumps((trials, OFF)))
+    before = cpu_of_children()
+    command = [sys.executable, "-c", PEER, str(path), str(ENOUGH * mine)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    theirs = cpu_of_children() - before
+    said = f"mujoco.sysid, {name}: {theirs:.0f} s of CPU against {mine:.2f} s of ours"
+    answer = path.with_name(path.name + ".answer")
+    if not answer.exists():
+        ended = "has not arrived" if done.returncode == -signal.SIGXCPU else done.stderr[-500:]
+        print(f"{said}, {ended}: more than {theirs / mine:.0f} times", flush=True)
+        return
+    found = pickle.loads(answer.read_bytes())
+    off = [
+        (each.name, round((found.values[each.name] - each.value) / each.error, 2))
+        for each in outcome.estimates
+    ]
+    print(f"{said}: {theirs / mine:.0f} times; off ours by {off} standard errors", flush=True)
+
+
+def cpu_of_children() -> float:
+    """Processor time of all processes that were started and have ended [s]."""
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
+
+
+def shortened(trials: tuple[Trial, ...], duration: float) -> tuple[Trial, ...]:
+    """First part of runs [s]."""
+    rows = round(duration / trials[0].period)
+    return tuple(
+        replace(
+            each,
+            time=each.time[:rows],
+            motor_pos=each.motor_pos[:rows],
+            joint_pos=each.joint_pos[:rows],
+            applied_pos=each.applied_pos[:rows],
+        )
+        for each in trials
+    )
+
+
 def main() -> None:
     """Run the comparisons."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--peer", action="store_true", help="run mujoco.sysid, too")
+    parser.add_argument("--peer", action="store_true", help="run mujoco.sysid instead")
     asked = parser.parse_args()
     print("load", os.getloadavg())
     trials = steps()
     with tempfile.TemporaryDirectory() as folder:
+        if asked.peer:
+            for duration in (0.6, 3.0):
+                name = f"three steps of {duration:g} s"
+                against_sysid(shortened(trials, duration), name, Path(folder))
+            return
         cold(trials, Path(folder))
     for name in FREED:
         against_cma(trials, name)
-    if asked.peer:
-        from legbench.identify.peer import ask_peer  # noqa: PLC0415
-
-        question = Question(design=OFF, trials=trials)
-        before = time.perf_counter()
-        outcome = identify(question)
-        mine = time.perf_counter() - before
-        answer = ask_peer(question)
-        print("\n".join(answer.lines(outcome)))
-        print(f"mujoco.sysid over all of ours: {answer.seconds / mine:.1f} times")
 
 
 if __name__ == "__main__":

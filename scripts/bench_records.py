@@ -1,6 +1,7 @@
 """Long runs and many runs: peak memory and time of what reads recordings.
 
-    scripts/bench_records.py long [FOLDER]   replay, figure, rrd and export of 600 s and 3600 s
+    scripts/bench_records.py long [FOLDER [NAME ...]]   replay, figure, rrd and export of 600 s
+                                             and 3600 s, also of part of a run beside another
     scripts/bench_records.py runs [FOLDER]   `legbench runs` over 1000 runs, cold and warm
 
 A long run is a recorded jump whose limit cycle is repeated. Each command is a process of its own;
@@ -32,6 +33,9 @@ SHORT, LONG = 600.0, 3600.0
 """Lengths of the two runs [s]."""
 PEAK_MIB, RATIO = 1024.0, 6.5
 RUNS, COLD, WARM = 1000, 10.0, 1.0
+ITSELF = "the run itself"
+"""Stands for the folder of the run that is read."""
+PART = ["replay", "--json", "--from", "10"]
 RECORDED = 8.0
 """Length of the jump that is recorded and repeated [s]."""
 
@@ -121,6 +125,9 @@ def long(folder: Path) -> bool:
         ("replay", ["replay", "--json"]),
         ("figure", ["replay", "--json", "--figure", folder / "figure.png"]),
         ("rrd", ["replay", "--json", "--rrd", folder / "run.rrd"]),
+        ("beside", ["replay", "--json", "--rrd", folder / "two.rrd", "--against", ITSELF]),
+        ("part", [*PART, "--rrd", folder / "part.rrd", "--against", ITSELF]),
+        ("figures", ["replay", "--json", "--figure", folder / "two.png", "--against", ITSELF]),
         ("parquet", ["export", "--parquet", "--out", folder / "run.parquet"]),
         ("csv", ["export", "--csv", "--out", folder / "run.csv"]),
         ("mat", ["export", "--mat", "--out", folder / "run.mat"]),
@@ -128,7 +135,10 @@ def long(folder: Path) -> bool:
     ):
         if ONLY and name not in ONLY:
             continue
-        short, whole = (cost_of(arguments[0], run, *arguments[1:]) for run in runs)
+        first, *rest = arguments
+        short, whole = (
+            cost_of(first, run, *(run if each == ITSELF else each for each in rest)) for run in runs
+        )
         ratio = whole.cpu / short.cpu
         fine = whole.peak_mib <= PEAK_MIB and ratio <= RATIO
         met &= fine

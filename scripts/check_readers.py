@@ -17,13 +17,15 @@ from typing import Any
 
 import numpy as np
 
-from legbench.control import JumpConfig
+from legbench.control import JumpConfig, PositionJumpConfig
 from legbench.design import load_design
 from legbench.design.setup import Setup, SetupKind
 from legbench.experiment import Experiment
-from legbench.experiment.running import record
+from legbench.experiment.running import record, record_in_memory
 from legbench.export.formats import Format, export
+from legbench.imperfections import Imperfections
 from legbench.recording.reader import load
+from legbench.recording.saved import save_recording
 from legbench.recording.writer import RunWriter
 from legbench.signals import Command, Observation
 
@@ -50,6 +52,24 @@ def torn_streams(folder: Path) -> None:
     (folder / "torn.arrows").write_bytes(stream[:-100])
 
 
+def kept_of_a_campaign(folder: Path) -> None:
+    """Leave what a campaign keeps of a run, with noise on the encoders, and what was recorded."""
+    noise = (1e-4, 1e-4)
+    recording = record_in_memory(
+        Experiment(
+            design=load_design(ROOT / "models/prototype.toml"),
+            controller=PositionJumpConfig(z2=1.0, dz2=0.2),
+            setup=Setup(kind=SetupKind.FFS),
+            duration=0.5,
+            imperfections=Imperfections(motor_noise=noise, link_noise=noise),
+        )
+    )
+    save_recording(recording, folder / "kept")
+    stiffness = recording.description.design.stiffness
+    columns: dict[str, Any] = dict(recording.columns)
+    np.savez(folder / "kept.npz", stiffness=stiffness, **columns)
+
+
 def main(arguments: list[str]) -> int:
     """Record, export, and have the other Python compare; its exit status."""
     if len(arguments) != 1 or shutil.which(arguments[0]) is None:
@@ -69,6 +89,7 @@ def main(arguments: list[str]) -> int:
         shutil.copy(recording.path / "samples.parquet", folder)
         columns: dict[str, Any] = dict(recording.columns)
         np.savez(folder / "run.npz", **columns)
+        kept_of_a_campaign(folder)
         torn_streams(folder)
         command = [arguments[0], str(ROOT / "scripts/readers.py"), str(folder)]
         return subprocess.run(command, check=False).returncode

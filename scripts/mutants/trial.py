@@ -1,55 +1,43 @@
-"""Tests in forks of one process: which functions each enters, and which notice a fault.
+"""Faults planted in forks of a session of pytest whose tests were collected once.
 
-The libraries are imported once. A child gets the changed module from memory, before any test is
-imported, and ends with the status of pytest; nothing is written into the source tree.
+A fault inside a function is planted by giving the function its changed code. One that runs when
+its module is imported needs a fork in which nothing of the package is imported yet; that fork gets
+the changed module from memory and collects its few tests anew. Nothing is written into the tree.
 """
 
-import hashlib
+import gc
 import importlib
 import importlib.abc
 import importlib.machinery
-import json
 import os
-import resource
 import shutil
-import signal
 import sys
 import tempfile
-import threading
-import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection
 from pathlib import Path
-from types import CodeType, FrameType, ModuleType
-from typing import Any
+from types import CodeType, FunctionType, ModuleType
 
 import pytest
+from forks import FAILED, in_fork
+from tracing import PACKAGE, ROOT, LineTrace, Passed, Timed, load, save
 
-ROOT = Path(__file__).parents[2]
-PACKAGE = ROOT / "src" / "legbench"
-CACHE = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "legbench-mutants"
 HEAVY = (
     *("can", "canopen", "durand", "serial", "numpy", "scipy.integrate", "pyarrow.parquet"),
     *("mujoco", "tyro", "hypothesis", "_hypothesis_pytestplugin", "unittest.mock", "pdb"),
 )
-TIMES, GRACE = 3.0, 20.0
+TIMES, GRACE = 3.0, 5.0
 """A child may take this many times the time of its tests without faults, and this long more [s]."""
-QUICK = 3
-"""Files of tests that are tried before all others."""
-CHILD_FAILED = 70
-"""Status of a child in which pytest could not be run."""
+COLLECTING = 15.0
+"""The time that it may take to import and to collect the files of a few tests [s]."""
 UNNOTICED = (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED)
-UNUSABLE = (pytest.ExitCode.USAGE_ERROR, CHILD_FAILED)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Passed:
-    """A test that passes without faults."""
-
-    name: str
-    seconds: float
-    entered: frozenset[tuple[str, str]]
-    """Functions of the package that it entered: module and qualified name."""
+NOT_SO = 71
+"""Status of a child in which a fault cannot be planted by exchanging code."""
+TIME, IMPORT = "its time was up", "a module could not be imported"
+"""What shows a fault besides a test that fails."""
+UNUSABLE = (pytest.ExitCode.USAGE_ERROR, FAILED)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,16 +46,20 @@ class Fault:
 
     path: Path
     changed: str
+    """The whole source with the fault in it."""
+    scope: str
+    """Qualified name of the function that holds it; empty where an import runs it."""
+    line: int
     text: str
     """Place, and the lines before and after."""
-    tests: Sequence[Passed]
+    tests: Sequence[Timed]
 
 
 class _Planted(importlib.abc.MetaPathFinder, importlib.abc.Loader):
     """Gives one module of the package from a changed text."""
 
-    def __init__(self, module: str, path: Path, source: str) -> None:
-        self._module, self._path, self._source = module, path, source
+    def __init__(self, path: Path, source: str) -> None:
+        self._module, self._path, self._source = _name_of(path), path, source
 
     def find_spec(self, fullname: str, *_: object) -> importlib.machinery.ModuleSpec | None:
         if fullname != self._module:
@@ -79,166 +71,221 @@ class _Planted(importlib.abc.MetaPathFinder, importlib.abc.Loader):
         exec(compile(self._source, str(self._path), "exec"), module.__dict__)
 
 
-class _Select:
+def _name_of(path: Path) -> str:
+    return ".".join(path.relative_to(ROOT / "src").with_suffix("").parts)
+
+
+def _codes(code: CodeType) -> Iterator[CodeType]:
+    """A code object and all those inside it."""
+    yield code
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _codes(constant)
+
+
+Key = tuple[str, str, int]
+
+
+def _key(code: CodeType) -> Key:
+    return (code.co_filename, code.co_qualname, code.co_firstlineno)
+
+
+def _functions() -> dict[Key, list[FunctionType]]:
+    """All functions of the package that exist now."""
+    found: dict[Key, list[FunctionType]] = {}
+    for thing in gc.get_objects():
+        if type(thing) is FunctionType and thing.__code__.co_filename.startswith(str(PACKAGE)):
+            found.setdefault(_key(thing.__code__), []).append(thing)
+    return found
+
+
+class _Outcome:
+    """Writes down which test failed first."""
+
+    def __init__(self, failed: Path) -> None:
+        self.failed = False
+        self._file = failed
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        if report.failed and not self.failed:
+            self.failed = True
+            self._file.write_text(report.nodeid)
+
+
+class _Select(_Outcome):
     """Keeps chosen tests only, those that were fast first."""
 
-    def __init__(self, chosen: Sequence[Passed]) -> None:
-        self._seconds = {test.name: test.seconds for test in chosen}
+    def __init__(self, failed: Path, chosen: Sequence[Timed]) -> None:
+        super().__init__(failed)
+        self._places = {test.name: place for place, test in enumerate(chosen)}
 
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
-        kept = [item for item in items if item.nodeid in self._seconds]
-        # Tests of one speed stay together, so that their fixtures are made once.
-        kept.sort(key=lambda item: sum(self._seconds[item.nodeid] > s for s in (0.03, 0.3, 1.0)))
+        kept = [item for item in items if item.nodeid in self._places]
+        kept.sort(key=lambda item: self._places[item.nodeid])
         items[:] = kept
 
 
-class _Trace:
-    """Notes which functions of the package each passing test of a file enters."""
+class _Serve:
+    """A plugin that does not run the tests that were collected, but waits for wishes."""
 
-    def __init__(self) -> None:
-        self._entered: set[CodeType] = set()
-        self._prepared: set[CodeType] = set()
-        """Entered by fixtures; what they made may serve later tests, too."""
-        self.passed: list[dict[str, Any]] = []
+    def __init__(self, wishes: Connection, failed: Path) -> None:
+        self._wishes = wishes
+        self._failed = failed
 
-    def _note(self, frame: FrameType, event: str, _: object) -> None:
-        self._entered.add(frame.f_code)
+    def pytest_sessionstart(self) -> None:
+        """A failing example is enough, it need not be the smallest."""
+        hypothesis = importlib.import_module("hypothesis")
+        kept = (hypothesis.Phase.explicit, hypothesis.Phase.generate)
+        hypothesis.settings.register_profile("mutants", phases=kept, database=None)
+        hypothesis.settings.load_profile("mutants")
 
-    @pytest.hookimpl(wrapper=True)
-    def pytest_runtest_protocol(self) -> Any:
-        self._entered = set()
-        threading.settrace(self._note)
-        sys.settrace(self._note)
-        try:
-            return (yield)
-        finally:
-            sys.settrace(None)
-
-    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        entered = self._entered.copy()
-        if report.when == "setup":
-            self._prepared |= entered
-        elif report.when == "call" and report.passed:
-            places = sorted(filter(None, map(_place, entered | self._prepared)))
-            test = {"name": report.nodeid, "seconds": report.duration, "entered": places}
-            self.passed.append(test)
-
-
-def _place(code: CodeType) -> tuple[str, str] | None:
-    """Module and qualified name of a function of the package."""
-    path = Path(code.co_filename)
-    if not path.is_relative_to(PACKAGE):
-        return None
-    return (path.relative_to(PACKAGE).as_posix(), code.co_qualname)
+    def pytest_runtestloop(self, session: pytest.Session) -> bool:
+        items = {item.nodeid: item for item in session.items}
+        functions = _functions()
+        gc.freeze()
+        self._wishes.send(None)
+        while (wish := self._wishes.recv()) is not None:
+            if isinstance(wish, Fault):
+                chosen = [items[test.name] for test in wish.tests]
+                seconds = GRACE + TIMES * sum(test.seconds for test in wish.tests)
+                work = _plant_and_run(functions, wish, chosen, _Outcome(self._failed))
+                self._wishes.send(in_fork(work, seconds))
+            else:
+                chosen = [item for item in session.items if item.path == wish]
+                self._wishes.send(in_fork(_trace_and_save(wish, chosen), 600.0))
+        return True
 
 
-def _child(work: Callable[[Path], int], seconds: float) -> int | None:
-    """Status of some work in a fork of this process; none when its time was up."""
-    folder = Path(tempfile.mkdtemp(prefix="mutant-"))
-    pid = os.fork()
-    if pid == 0:
-        os.setpgid(0, 0)
-        # Time of the processor for loops without an end, so that a busy machine fails nothing.
-        limit = int(seconds) + 1
-        resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
-        silent = os.open(os.devnull, os.O_RDWR)
-        for number in (0, 1, 2):
-            os.dup2(silent, number)
-        status = CHILD_FAILED
-        try:
-            status = int(work(folder))
-        finally:
-            os._exit(status)
-    until = time.monotonic() + 4.0 * seconds
-    try:
-        while time.monotonic() < until:
-            done, status = os.waitpid(pid, os.WNOHANG)
-            if done:
-                return os.waitstatus_to_exitcode(status) if os.WIFEXITED(status) else None
-            time.sleep(0.01)
-        os.killpg(pid, signal.SIGKILL)
-        os.waitpid(pid, 0)
-        return None
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
+def _run(items: Sequence[pytest.Item], plugin: object) -> Iterator[pytest.Item]:
+    for place, item in enumerate(items):
+        if place == 0:
+            item.config.pluginmanager.register(plugin)
+        following = items[place + 1] if place + 1 < len(items) else None
+        item.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
+        yield item
+
+
+def _plant_and_run(
+    functions: dict[Key, list[FunctionType]],
+    fault: Fault,
+    items: Sequence[pytest.Item],
+    outcome: _Outcome,
+) -> Callable[[], int]:
+    def work() -> int:
+        if _name_of(fault.path) in sys.modules:
+            if not _exchange(functions, fault):
+                return NOT_SO
+        else:
+            sys.meta_path.insert(0, _Planted(fault.path, fault.changed))
+        for item in _run(items, outcome):
+            if outcome.failed:
+                item.session._setupstate.teardown_exact(None)
+                break
+        return int(outcome.failed)
+
+    return work
+
+
+def _exchange(functions: dict[Key, list[FunctionType]], fault: Fault) -> bool:
+    """Give the function of a fault its changed code, where its closure allows."""
+    outermost = fault.scope.split(".<locals>.")[0]
+    changed = compile(fault.changed, str(fault.path), "exec")
+    fitting = [
+        code
+        for code in _codes(changed)
+        if code.co_qualname == outermost and code.co_firstlineno <= fault.line
+    ]
+    code = max(fitting, key=lambda code: code.co_firstlineno)
+    exchanged = functions.get(_key(code), [])
+    if any(function.__code__.co_freevars != code.co_freevars for function in exchanged):
+        return False
+    for function in exchanged:
+        function.__code__ = code
+    return bool(exchanged)
+
+
+def _trace_and_save(file: Path, items: Sequence[pytest.Item]) -> Callable[[], int]:
+    def work() -> int:
+        trace = LineTrace()
+        for _ in _run(items, trace):
+            pass
+        save(file, trace.passed)
+        return 0
+
+    return work
 
 
 def _pytest(folder: Path, files: Iterable[str], plugin: object, *more: str) -> int:
     os.chdir(ROOT)
-    hypothesis = importlib.import_module("hypothesis")
-    kept = (hypothesis.Phase.explicit, hypothesis.Phase.generate)
-    hypothesis.settings.register_profile("mutants", phases=kept, database=None)
-    hypothesis.settings.load_profile("mutants")
-    # Hypothesis is imported before pytest can rewrite its assertions, and that is no matter.
-    silent = ["-q", "-W", "ignore::pytest.PytestAssertRewriteWarning", "-p", "no:cacheprovider"]
-    usual = [*silent, f"--basetemp={folder / 't'}", *more]
-    return pytest.main([*usual, *sorted(files)], plugins=[plugin])
+    # A failure is not explained, only noticed: that takes ten times as long as to find it.
+    usual = ["-q", "--assert=plain", "--tb=native", "-p", "no:cacheprovider", *more]
+    return pytest.main([*usual, f"--basetemp={folder / 't'}", *files], plugins=[plugin])
 
 
-def _digest(paths: Iterable[Path]) -> str:
-    total = hashlib.sha256()
-    for path in sorted(paths):
-        total.update(path.read_bytes())
-    return total.hexdigest()[:32]
+class Trials:
+    """Plants faults: forks of this process and of one whose tests are collected already."""
 
+    def __init__(self, files: Sequence[Path]) -> None:
+        """Collect files of tests, and trace those that have not been."""
+        self._folder = Path(tempfile.mkdtemp(prefix="mutants-"))
+        self._failed = self._folder / "failed"
+        self._wishes, theirs = Pipe()
+        self._pid = os.fork()
+        if self._pid == 0:
+            self._wishes.close()
+            silent = os.open(os.devnull, os.O_RDWR)
+            os.dup2(silent, 1)
+            try:
+                names = [str(file.relative_to(ROOT)) for file in files]
+                os._exit(_pytest(self._folder, names, _Serve(theirs, self._failed)))
+            finally:
+                os._exit(FAILED)
+        theirs.close()
+        self._wishes.recv()
+        self.tests = [test for file in files for test in self._traced(file)]
 
-def trace(file: Path) -> list[Passed]:
-    """The passing tests of a file and what they enter; remembered until a test changes."""
-    helpers = [path for path in file.parent.glob("*.py") if not path.name.startswith("test_")]
-    kept = CACHE / f"{file.stem}-{_digest([file, *helpers])}.json"
-    if not kept.exists():
+    def close(self) -> None:
+        """End the session."""
+        self._wishes.send(None)
+        os.waitpid(self._pid, 0)
+        shutil.rmtree(self._folder, ignore_errors=True)
 
-        def work(folder: Path) -> int:
-            entered = _Trace()
-            status = _pytest(folder, [str(file.relative_to(ROOT))], entered)
-            part = folder / "part"
-            part.write_text(json.dumps(entered.passed))
-            shutil.move(part, kept)
-            return status
+    def _traced(self, file: Path) -> list[Passed]:
+        known = load(file)
+        if known is None:
+            self._wishes.send(file)
+            status = self._wishes.recv()
+            known = load(file)
+            if known is None:
+                sys.exit(f"{file}: its tests cannot be traced ({status}); run them with pytest")
+        return known
 
-        CACHE.mkdir(parents=True, exist_ok=True)
-        status = _child(work, 600.0)
-        if not kept.exists():
-            sys.exit(f"{file}: its tests cannot be traced; run them with pytest first")
-        if status != 0:
-            # Such as one that looks at a process of its own while all are slow under the trace.
-            print(f"{file.name}: a test fails under the trace and is left out", file=sys.stderr)
-    return [
-        Passed(
-            name=test["name"],
-            seconds=test["seconds"],
-            entered=frozenset((module, name) for module, name in test["entered"]),
-        )
-        for test in json.loads(kept.read_text())
-    ]
+    def noticed(self, fault: Fault) -> str | None:
+        """The test that fails under a fault, or what else shows it; none if nothing does."""
+        if not fault.tests:
+            return None
+        self._failed.unlink(missing_ok=True)
+        status = NOT_SO
+        if fault.scope:
+            self._wishes.send(fault)
+            status = self._wishes.recv()
+        if status == NOT_SO:
+            seconds = COLLECTING + TIMES * sum(test.seconds for test in fault.tests)
+            status = in_fork(lambda: self._import_and_run(fault), seconds)
+        if status in UNUSABLE:
+            sys.exit(f"{fault.path}: pytest ended with {status} under {fault.text}")
+        if status in UNNOTICED:
+            return None
+        if self._failed.exists():
+            return self._failed.read_text()
+        return TIME if status is None else IMPORT
 
-
-def noticed(fault: Fault) -> bool:
-    """Whether a test fails under a fault."""
-    tests = fault.tests
-    name = ".".join(fault.path.relative_to(ROOT / "src").with_suffix("").parts)
-    seconds: dict[str, float] = {}
-    for test in tests:
-        file = test.name.split("::")[0]
-        seconds[file] = seconds.get(file, 0.0) + test.seconds
-    # Those that name the module know it best.
-    files = sorted(seconds, key=lambda file: (name not in (ROOT / file).read_text(), seconds[file]))
-
-    def work(folder: Path) -> int:
-        sys.meta_path.insert(0, _Planted(name, fault.path, fault.changed))
-        # Most faults are noticed at once; the other files need not be imported for them.
-        for some in (files[:QUICK], files[QUICK:]):
-            status = _pytest(folder, some, _Select(tests), "-x") if some else 0
-            if status not in UNNOTICED:
-                return status
-        return 0
-
-    if not files:
-        return False
-    status = _child(work, GRACE + TIMES * sum(test.seconds for test in tests))
-    if status in UNUSABLE:
-        sys.exit(f"{fault.path}: pytest ended with {status} under {fault.text}")
-    return status not in UNNOTICED
+    def _import_and_run(self, fault: Fault) -> int:
+        sys.meta_path.insert(0, _Planted(fault.path, fault.changed))
+        files = dict.fromkeys(test.name.split("::")[0] for test in fault.tests)
+        status = _pytest(self._folder, files, _Select(self._failed, fault.tests), "-x")
+        # A module that cannot be imported is noticed, and pytest calls that a wrong usage.
+        return pytest.ExitCode.TESTS_FAILED if status == pytest.ExitCode.USAGE_ERROR else status
 
 
 def prepare() -> None:

@@ -49,7 +49,8 @@ class EncoderErrors:
     def reset(self) -> None:
         """Begin the noise anew."""
         self._random = [np.random.default_rng(self._seeds[leg]) for leg in self._noisy]
-        self._block: Floats = np.zeros((BLOCK, len(self._sigma), AXES))
+        drawn = BLOCK if self._random else 0
+        self._block: Floats = np.zeros((drawn, len(self._sigma), AXES))
         self._next = BLOCK
         self.motor: Floats = np.zeros_like(self._zero)
         self.link: Floats = self._zero

@@ -8,7 +8,7 @@ import pytest
 from legbench.control import BangBangConfig, JumpConfig, PositionJumpConfig
 from legbench.design import LegDesign, load_design
 from legbench.design.setup import Setup, SetupKind
-from legbench.errors import ConfigError, PlantFault
+from legbench.errors import PlantFault
 from legbench.experiment import ControllerSettings, Experiment, make_controller, targets_of
 from legbench.loop import Outcome, run
 from legbench.mjcf import BuildOptions, Linkage, LinkageKind
@@ -202,13 +202,6 @@ def test_first_flight_of_a_jump_is_that_of_the_simulation(
     crossings = [float(root.real) for root in curve.roots() if abs(root.imag) < 1e-9]
     met = 1e-3 * (row - 1 + min(root for root in crossings if root > 0.0))
     assert abs(met - touchdown) < 3e-4
-
-
-def test_a_boom_is_refused() -> None:
-    setup = Setup(kind=SetupKind.FFS, boom_radius=1.5)
-    start = Start(joint_pos=np.array([-0.6, 0.6]), motor_pos=np.array([-0.6, 0.6]))
-    with pytest.raises(ConfigError, match=r"no boom \(boom_radius 1.5 m\)"):
-        AnalyticPlant(PROTOTYPE, setup, start)
 
 
 def test_a_leg_driven_through_its_stop_is_a_named_fault() -> None:

@@ -58,6 +58,28 @@ def test_slopes_are_those_of_finite_differences(prototype: LegDesign, friction: 
         assert slopes[:, :, seed] == pytest.approx(found, abs=2e-4 * size, rel=2e-4)
 
 
+def test_restarts_change_no_slope_and_tell_those_since_them(prototype: LegDesign) -> None:
+    mine = track(prototype)
+    legs = SensitiveLegs(friction=False)
+    (plain,) = legs.follow([mine])
+    path, shorter = legs.follow(
+        [
+            replace(mine, restarts=(120, 250)),
+            replace(mine, times=TIMES[:200], motors=mine.motors[:199]),
+        ]
+    )
+    assert path.restarts == (120, 250)
+    assert shorter.restarts == (120,)  # those of a leg beside it
+    for each in (path, shorter):
+        rows = len(each.states)
+        assert each.states == pytest.approx(plain.states[:rows], abs=1e-9)
+        assert each.slopes == pytest.approx(plain.slopes[:rows], abs=1e-6)
+    (late,) = legs.follow(
+        [replace(mine, times=TIMES[120:251], motors=mine.motors[120:250], start=path.states[120])]
+    )
+    assert path.pieces[121:251] == pytest.approx(late.pieces[1:], abs=1e-6)
+
+
 def moved(mine: Track, seed: int, amount: float) -> Track:
     """Track with one state, parameter or motor moved by an amount."""
     start, parameters, motors = mine.start.copy(), mine.parameters.copy(), mine.motors.copy()

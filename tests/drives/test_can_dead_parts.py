@@ -6,14 +6,8 @@ import pytest
 from can_rig import BUS
 
 from legbench.commissioning.broken_plant import Part
-from legbench.commissioning.dead_parts import (
-    CONTROLLERS,
-    Bench,
-    Death,
-    Emulation,
-    try_dead_part,
-    watch_healthy,
-)
+from legbench.commissioning.dead_part_stage import CONTROLLERS, Bench, Death, Emulation
+from legbench.commissioning.dead_parts import try_dead_part, watch_healthy
 from legbench.design import load_design
 from legbench.servo import ServoConfig
 

@@ -21,6 +21,18 @@ def test_the_first_tick_is_the_next_whole_period_and_the_others_follow(period_us
         assert (it.silent_total, it.late_frames, missed(it)) == (0, 0, [0, 0])
 
 
+def test_what_drives_did_before_the_grid_was_laid_is_forgotten() -> None:
+    wire = Wire()
+    it = cycle(wire)
+    for watch in it.watches:
+        watch.take_emergency(bytes.fromhex("1023000000000000"))
+        watch.cycle(complete=False)
+    # Longer than any heartbeat may take.
+    wire.wait_until(60_000 * MS)
+    it.begin()
+    assert [watch.trouble(wire.time_ns, 1) for watch in it.watches] == [None, None]
+
+
 @pytest.mark.parametrize(
     ("late_us", "skipped"),
     [(1, 0), (499, 0), (500, 1), (1000, 1), (1499, 1), (1500, 2), (5200, 5)],

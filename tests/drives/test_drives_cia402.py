@@ -162,6 +162,32 @@ def test_fault_reset_is_one_edge_of_two_cycles_a_request() -> None:
     assert 0x80 in [machine.step(0x08).controlword for _ in range(6)]
 
 
+@pytest.mark.parametrize("gone", [0, 1, 30])
+def test_a_fault_that_comes_back_is_waited_for_as_long_as_one_that_stays(gone: int) -> None:
+    machine = PowerMachine()
+    machine.seek(Goal.FAULT_RESET)
+    words = [machine.step(0x08).controlword]
+    while words[-2:] != [0x80, 0x00]:
+        words.append(machine.step(0x08).controlword)
+    ways = [machine.step(0x40).way for _ in range(gone)]
+    assert ways == [Way.REACHED] * gone
+    ways += [machine.step(0x08).way for _ in range(60)]
+    # Refused in the 51st cycle after the bit was taken back.
+    assert ways.index(Way.REFUSED) == 50
+    assert machine.refused
+
+
+def test_a_drive_that_shows_zeros_after_it_was_enabled_is_lost() -> None:
+    machine = PowerMachine()
+    assert not machine.refused
+    machine.seek(Goal.ENABLED)
+    for statusword in (0x40, 0x40, 0x31, 0x31, 0x33, 0x33, 0x37, 0x37):
+        step = machine.step(statusword)
+    assert step.way is Way.REACHED
+    assert machine.step(0x00).way is Way.REFUSED
+    assert machine.lost
+
+
 def test_an_unknown_statusword_changes_nothing() -> None:
     unknown = [word for word in range(256) if decode_state(word) is None]
     assert unknown

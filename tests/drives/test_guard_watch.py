@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from guard_rig import REST, fault, pair, started
 
-from legbench.limits.guard import Guard
+from legbench.limits.guard import ALL, Guard
 from legbench.limits.safety import SafetyLimits
 
 LIMITS = SafetyLimits(
@@ -64,6 +64,24 @@ def test_the_ends_of_the_knee_range_of_the_links(
     told = seen(guard, joint_pos=further)
     assert told is not None
     assert told.startswith("joint range: q2 - q1 is at")
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_link_that_is_not_known_has_no_limits_and_the_other_one_keeps_its_own(axis: int) -> None:
+    nothing = frozenset[str]()
+    guard = Guard(LIMITS, 0.25, known=(nothing, ALL) if axis == 0 else (ALL, nothing))
+    guard.start_at(REST)
+    # Far beyond its own range, and the knee with it.
+    assert seen(guard, joint_pos=pair(axis, 9.0, REST[1 - axis])) is None
+    told = seen(guard, joint_pos=pair(axis, REST[axis], 9.0))
+    assert told is not None
+    assert told.startswith(f"joint range: joint {2 - axis} is at")
+
+
+def test_readings_of_another_number_of_links_are_refused() -> None:
+    for links in ((-0.5,), (-0.5, 0.5, 0.5)):
+        with pytest.raises(ValueError, match="zip"):
+            seen(started(LIMITS), joint_pos=links)
 
 
 @pytest.mark.parametrize("axis", [0, 1])

@@ -43,6 +43,7 @@ def test_a_limit_that_is_left_out_does_not_act_and_counts_have_their_numbers() -
         **dict.fromkeys(GIVEN, INF),
         "following_cycles": 5,
         "servo_bandwidth": 15.0,
+        "link_error": None,
         "temperature": INF,
         "overrun_cycles": 3,
         "lost_frames": 3,
@@ -57,7 +58,7 @@ def test_real_drives_are_led_with_all_seven_limits_and_not_without_any(name: str
     assert told == (f"limits leave out {name}; real drives are not led without: give each a value")
 
 
-@pytest.mark.parametrize("name", [*GIVEN, "temperature", "servo_bandwidth"])
+@pytest.mark.parametrize("name", [*GIVEN, "link_error", "temperature", "servo_bandwidth"])
 @pytest.mark.parametrize("value", [0.0, -1.0, math.nan])
 def test_a_limit_is_above_zero(name: str, value: float) -> None:
     told = refusal(SafetyLimits, **{name: value})
@@ -166,3 +167,18 @@ def test_bounds_are_the_limits_of_motion_and_the_period() -> None:
         standing=0.02,
         sway=0.05,
     )
+
+
+def test_a_limit_beyond_its_upper_end_is_refused_unless_it_is_waived_by_its_name() -> None:
+    assert str(refusal(SafetyLimits, lost_frames=51)).startswith("lost_frames is 51 cycles, the ")
+    assert SafetyLimits(lost_frames=51, waive=("lost_frames",)).lost_frames == 51
+    told = refusal(SafetyLimits, waive=("lost frames",))
+    assert str(told).startswith("waive in the limits file names 'lost frames'; it takes each of")
+
+
+def test_a_design_with_another_number_of_angles_is_refused() -> None:
+    for angles in ([ENDLESS], [ENDLESS] * 3):
+        with pytest.raises(ValueError, match="zip"):
+            SafetyLimits().check_within(angles, [ENDLESS] * 2)
+        with pytest.raises(ValueError, match="zip"):
+            SafetyLimits().check_within([ENDLESS] * 2, angles)

@@ -112,6 +112,12 @@ def test_the_first_command_of_all_may_be_changed() -> None:
     assert (told["first"], told["cycles"], told["of"]) == (0.0, 1, 1)
 
 
+def test_what_was_applied_to_another_number_of_motors_is_not_counted() -> None:
+    for applied in ((0.5,), (0.5, 0.5, 0.5)):
+        with pytest.raises(ValueError, match="zip"):
+            Shortfall(0.25).count((1.0, 2.0), (1.0, 1.5), applied)
+
+
 BOXES = ((-1.0, 0.5), (-0.5, 1.0))
 
 

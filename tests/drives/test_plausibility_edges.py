@@ -97,6 +97,12 @@ def test_a_new_start_closes_the_bounds_and_forgets_how_long_it_lasted() -> None:
     assert isinstance(doubts[5], Doubt)
 
 
+def test_a_watch_that_was_never_started_begins_at_zero_with_all_its_cycles() -> None:
+    watch = MotorWatch(BOUNDS)
+    assert [watch.see(1, 0.1, 0.0) for _ in range(5)] == [None] * 5
+    assert watch.see(1, 0.1, 0.0) is not None
+
+
 # --- speed of links --------------------------------------------------------------------------
 
 
@@ -133,6 +139,14 @@ def sways(it: Links, links: tuple[float, float], commands: tuple[float, float] =
     assert told[:3] == [None] * 3
     assert told[3] is None or told[3].startswith("sway: the links sway by")
     return told[3] is not None
+
+
+def test_commands_that_rest_anywhere_widen_nothing() -> None:
+    for sway, found in ((0.0500, False), (0.0504, True)):
+        it = Links()
+        for _ in range(300):
+            assert it.see(REST, commands=(1.0, 0.5)) is None
+        assert sways(it, turned(0, sway), (1.0, 0.5)) is found
 
 
 @pytest.mark.parametrize("axis", [0, 1])

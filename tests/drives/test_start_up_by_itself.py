@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, cast
 
 import pytest
@@ -12,6 +13,7 @@ from legbench.drives.master.axis_link import AxisLink
 from legbench.drives.master.cycle import Tick
 from legbench.drives.master.start_up import StartUp
 from legbench.drives.protocol.cia402 import Goal
+from legbench.drives.setup.quirks import Quirks
 from legbench.errors import PlantFault
 
 NAMES = ("hip", "knee")
@@ -159,7 +161,51 @@ def test_both_are_enabled_rung_by_rung_without_a_word_too_many() -> None:
     assert last.time_ns == it.ticks
     # Each word stands for two cycles; the start ends in the cycle that shows both enabled.
     assert it.done == [(0x06, 0x06)] * 2 + [(0x07, 0x07)] * 2 + [(0x0F, 0x0F)]
+    # No cycle is without a word but the last one, which is not ended.
+    assert it.ticks == 6
     assert all(axis.statusword == 0x1237 for axis in it.axes)
+
+
+def test_drives_that_are_found_switched_on_have_their_word_for_two_cycles_too() -> None:
+    it = Drives()
+    it.words = [0x07, 0x07]
+    enable(it)
+    assert it.done == [(0x07, 0x07)] * 2 + [(0x0F, 0x0F)]
+
+
+@pytest.mark.parametrize("place", [0, 1])
+def test_a_drive_that_never_shows_its_mode_is_named_after_its_own_patience(place: int) -> None:
+    it = Drives()
+    for number, axis in enumerate(it.axes):
+        patience_ms = 700 if number == place else 30
+        axis.node = replace(axis.node, quirks=Quirks(mode_patience_ms=patience_ms))
+        axis.in_mode = False
+    real = it.tick
+
+    def tick() -> Tick:
+        # The other one shows it soon.
+        it.axes[1 - place].in_mode = it.ticks >= 20
+        return real()
+
+    it.tick = tick
+    who = rf"^drive '{NAMES[place]}' \(node {place + 1}\) does not become enabled: 1237h: .*"
+    told = r"; mode 8 is not shown in 6061h within 700 ms: raise mode_patience_ms in \[node"
+    with pytest.raises(DriveError, match=who + told):
+        enable(it)
+    # 2000 ms until they are switched on, which takes five cycles, and as long again; with 700 ms.
+    assert it.ticks == 5 + 2700
+
+
+@pytest.mark.parametrize("place", [0, 1])
+def test_the_mode_is_not_blamed_for_a_drive_that_has_shown_it_or_is_not_enabled(place: int) -> None:
+    for in_mode in (True, False):
+        it = Drives()
+        it.axes[place].in_mode = in_mode
+        it.stuck[place] = 0x0218
+        with pytest.raises(DriveError) as caught:
+            enable(it)
+        assert str(caught.value).startswith(f"drive '{NAMES[place]}' (node {place + 1}) does not")
+        assert "mode 8" not in str(caught.value)
 
 
 @pytest.mark.parametrize("place", [0, 1])

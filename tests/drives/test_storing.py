@@ -101,3 +101,36 @@ def test_settings_of_store_have_two_ends(changes: dict[str, float], words: str) 
     with session, pytest.raises(ConfigError, match=words):
         store(session, session.config.nodes, **changes)  # pyright: ignore[reportArgumentType]
     assert written(network) == []
+
+
+@pytest.mark.parametrize(("part", "parks"), [(1, True), (2, True), (3, False)])
+def test_command_frames_are_off_before_a_part_that_holds_them_is_stored(
+    part: int, parks: bool
+) -> None:
+    session, network = opened()
+    with session:
+        done = store(session, session.config.nodes, part=part)
+    assert [(one.node, one.part) for one in done] == [("motor1", part), ("motor2", part)]
+    told = [(frame.data[1:4], frame.data[4:]) for frame in written(network)]
+    objects = [data for key, data in told if key == bytes((0x10, 0x10, part))]
+    assert objects == [b"save", b"save"]
+    off = [data for key, data in told if key[:2] == b"\x00\x14" and data[3] >> 7]
+    assert bool(off) is parks
+    if parks:
+        # All that is switched off is switched off before the first drive stores.
+        first = told.index((bytes((0x10, 0x10, part)), b"save"))
+        assert not [key for key, _ in told[first:] if key[:2] == b"\x00\x14"]
+
+
+def test_a_drive_that_stores_by_itself_says_so() -> None:
+    session, network = opened()
+    network.drives[1]._values[0x1010, 1] = 3
+    with session:
+        done = store(session, session.config.nodes, timeout=60.0)
+    assert [one.by_itself for one in done] == [False, True]
+
+
+def test_the_last_part_may_be_asked_for() -> None:
+    session, _ = opened()
+    with session, pytest.raises(DriveError, match="cannot store part 127"):
+        store(session, session.config.nodes, part=127)

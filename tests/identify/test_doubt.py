@@ -5,14 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from twins import OFF, experiments, frozen, late, question, stretched, trials
+from twins import OFF, PROTOTYPE, experiments, frozen, late, question, stretched, trials
 
+from legbench.analytic.terms import Bars
 from legbench.control import ChirpConfig
 from legbench.design.setup import SetupKind
 from legbench.identify import identify
 from legbench.identify.alternatives import named
 from legbench.identify.checks import check_data
 from legbench.identify.trial import Trial
+from legbench.mjcf.fitting import fitted_bar_density
 
 Harm = Callable[[Trial], Trial]
 
@@ -78,6 +80,17 @@ def test_bars_that_were_left_out_are_not_accepted(steps_of_bars: tuple[Trial, ..
     outcome = identify(question(steps_of_bars))
     assert not outcome.trusted
     assert any("residuals hang together" in each for each in outcome.reasons)
+    best = outcome.alternatives[0]
+    assert best.name == "bars"
+    assert best.value == fitted_bar_density(PROTOTYPE)
+    assert best.share > 0.9
+    assert any(f"wrong: bars of {best.value:.3g} kg/m explain" in each for each in outcome.reasons)
+
+
+def test_bars_that_are_not_there_are_named(steps: tuple[Trial, ...]) -> None:
+    outcome = identify(question(steps, bars=Bars(density=fitted_bar_density(PROTOTYPE))))
+    assert outcome.alternatives[0].text.startswith("bars without mass explain ")
+    assert outcome.alternatives[0].share > 0.9
 
 
 def test_a_held_out_run_judges_the_fit(steps: tuple[Trial, ...]) -> None:

@@ -35,6 +35,11 @@ def test_runs_that_share_one_instant_have_it_in_common() -> None:
     assert seen.joint_max == pytest.approx(0.05)
 
 
+def test_a_period_is_told_to_the_nanosecond() -> None:
+    time = np.arange(30.0) / 3000.0
+    assert compare(turning(time), turning(time)).period == 0.000333333
+
+
 def test_a_comparison_says_how_long_and_how_fine_it_is() -> None:
     seen = compare(turning(clock(100)), turning(0.002 * np.arange(30.0)))
     assert seen.period == 0.002

@@ -112,6 +112,16 @@ def test_each_stop_acts_from_its_margin_on(at: Callable[[float], Floats]) -> Non
     assert left_out(-0.1) == [2, 3, 4, 5]
 
 
+@pytest.mark.parametrize("height", [0.0, -1e-9])
+def test_a_foot_on_the_ground_is_down_with_or_without_a_contact(height: float) -> None:
+    joint_pos, foot_pos = np.tile(posture(*FREE), (9, 1)), np.full((9, 2), 0.25)
+    for contact, row in ((np.arange(9) == 4, 0.25), (np.zeros(9), height), (np.zeros(9), 1e-9)):
+        foot_pos[4, 1] = row
+        run = recording(clock(9), joint_pos=joint_pos, foot_pos=foot_pos, contact=contact)
+        down = [] if row == 1e-9 else [2, 3, 4, 5]
+        assert np.flatnonzero(~clean_intervals(run)).tolist() == down
+
+
 def test_the_residual_is_the_worst_drift_within_one_clean_stretch() -> None:
     """Losses at a stop count for nothing, and what is lost before it is no part of what follows."""
     joint_pos = np.tile(posture(*FREE), (20, 1))
@@ -127,3 +137,15 @@ def test_the_residual_is_the_worst_drift_within_one_clean_stretch() -> None:
     assert np.flatnonzero(~clean_intervals(run)).tolist() == [7, 8, 9, 10]
     # 0.3 J before the stop and 0.25 J after it, over 2 J of kinetic energy.
     assert energy_residual(run, flows) == pytest.approx(0.3 / 2.0, abs=1e-12)
+
+
+@pytest.mark.parametrize(("share", "moves"), [(0.9e-6, False), (1.1e-6, True)])
+def test_a_leg_moves_from_a_millionth_of_its_weight_times_its_length_on(
+    share: float, moves: bool
+) -> None:
+    free = np.tile(posture(*FREE), (9, 1))
+    energy = np.ones((9, 2))
+    energy[:, 1] = 0.0
+    energy[4, 1] = share * 9.81 * PROTOTYPE.total_mass * PROTOTYPE.shank.length
+    run = recording(clock(9), HFTS, joint_pos=free, motor_pos=free, energy=energy)
+    assert np.isfinite(energy_residual(run, energy_flows(run))) == moves

@@ -8,7 +8,7 @@ from metrics_runs import PROTOTYPE, Hop, clock, manifest, recording, truncated
 
 from legbench.errors import FormatError, RecordingError
 from legbench.kinematics import modal_to_joint
-from legbench.metrics import Comparison, compare, differences, summarise
+from legbench.metrics import Analysis, Comparison, compare, differences, summarise
 from legbench.recording.reader import Recording
 from legbench.signals import Floats
 
@@ -33,6 +33,14 @@ def test_a_run_against_itself_differs_in_nothing() -> None:
     assert len(same.liftoff) == len(summarise(run).rating_flight)
     assert (same.rating_stance, same.rating_flight) == (0.0, 0.0)
     assert same.unlike == []
+
+
+def test_signals_of_two_runs_are_not_kept_together() -> None:
+    run, other = Analysis(Hop().recording()), Analysis(Hop().recording())
+    for each in (run, other):
+        assert len(each["joint_vel"]) == len(each.time)
+    assert compare(run, other).joint_max == 0.0
+    assert set(run._signals) == set(other._signals) == {"joint_pos"}
 
 
 def test_a_known_difference_is_measured() -> None:

@@ -17,6 +17,8 @@ def test_a_row_counts_from_a_billionth_of_a_radian_on(size: float) -> None:
     rows = size * np.array([[0.6, 0.8], [-1.0, 0.0]])
     np.testing.assert_allclose(alignment(rows), [0.2 / np.sqrt(2.0), np.sqrt(0.5)], rtol=1e-9)
     assert np.isnan(alignment(0.5 * AT_REST * rows / size)).all()
+    # The edge itself has no direction.
+    assert np.isnan(alignment(np.array([[AT_REST, 0.0], [0.0, -AT_REST]]))).all()
 
 
 @pytest.mark.parametrize("support", SUPPORTED)
@@ -39,6 +41,12 @@ def test_a_motor_that_is_unknown_leaves_its_row_alone_unknown(unknown: tuple[flo
     known = [0, 1, 3, 4]
     expected = equilibrium(PROTOTYPE, motor_pos[known], Support.FOOT)
     np.testing.assert_allclose(found[known], expected, atol=1e-12)
+
+
+def test_a_leg_that_nothing_loads_is_at_its_motors_as_far_as_they_are_known() -> None:
+    motor_pos = np.array([[-0.8, 0.7], [-0.8, np.nan]])
+    found = link_equilibrium(PROTOTYPE, motor_pos, Support.NONE)
+    np.testing.assert_array_equal(found, motor_pos)
 
 
 def test_motors_that_stand_still_for_a_while_keep_their_own_equilibria() -> None:

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType
+from types import MappingProxyType, SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from legbench.kinematics import modal_to_joint
 from legbench.metrics import Analysis, compare, summarise
 from legbench.metrics.events import CommonEvent, common_event, event_time, event_times
 from legbench.metrics.side_by_side import side_by_side
+from legbench.metrics.stance import MINIMUM_PHASE
 from legbench.phases import PhaseInfo, Role
 from legbench.recording.reader import Recording
 
@@ -43,6 +44,22 @@ def test_touchdowns_and_liftoffs_are_those_of_the_closed_form() -> None:
     assert event_time(run, CommonEvent.TOUCHDOWN, 2) == down[1]
     assert event_time(run, CommonEvent.TOUCHDOWN, -1) == down[-1]
     assert event_time(run, CommonEvent.CLOCK) == 0.0
+
+
+def test_a_leg_that_is_put_down_in_its_first_rows_does_not_land() -> None:
+    at = 1.0 + MINIMUM_PHASE
+    later = float(np.nextafter(at, 2.0))
+    ends = np.array([1.0, at, later, 1.5])
+    phases = SimpleNamespace(start=ends, end=ends)
+    run: Any = SimpleNamespace(
+        time=np.array([1.0, 1.25]), gait=SimpleNamespace(stance=phases, flight=phases)
+    )
+    for event in (CommonEvent.TOUCHDOWN, CommonEvent.LIFTOFF):
+        assert event_times(run, event).tolist() == [later, 1.5]
+    nothing = Analysis(recording(np.zeros(0), manifest()))
+    assert event_times(nothing, CommonEvent.TOUCHDOWN).tolist() == []
+    # Time zero is there once, and always.
+    assert event_times(nothing, CommonEvent.CLOCK).tolist() == [0.0]
 
 
 def test_switches_lie_between_acting_phases() -> None:
@@ -93,6 +110,17 @@ def test_a_known_distance_is_measured_in_each_coordinate() -> None:
     assert second.duration == pytest.approx(0.999)
 
 
+def test_runs_are_compared_from_50_ms_before_to_1_s_after_their_first_event() -> None:
+    entries = manifest(setup={"kind": "ffs"}, controller={"kind": "position-jump", "dz2": 0.1})
+    run = Analysis(recording(clock(3000) - 1.0, entries))
+    (apart,) = side_by_side([run, run], event=CommonEvent.CLOCK).apart
+    assert apart.duration == pytest.approx(1.049, abs=1e-9)
+    hop = Analysis(HOP.recording())
+    found = side_by_side([hop, hop])
+    assert (found.event, found.number) == (CommonEvent.TOUCHDOWN, 1)
+    assert found.times[0] == pytest.approx(HOP.touchdown(0), abs=1e-4)
+
+
 def test_different_legs_are_told_from_different_settings() -> None:
     run = HOP.recording()
     optimal = remade(run, manifest(load_design(MODELS / "optimal.toml")))
@@ -121,5 +149,6 @@ def test_events_that_are_not_there_are_refused() -> None:
         with pytest.raises(RecordingError, match=rf"has {count} events of kind touchdown, so none"):
             side_by_side([run, run], event=CommonEvent.TOUCHDOWN, number=number)
     early = Analysis(replace(HOP.recording(), time=HOP.recording().time + 9.0))
-    with pytest.raises(RecordingError, match="no rows around their event"):
-        side_by_side([early, early], event=CommonEvent.CLOCK, span=0.5)
+    for runs in ([early, early], [run, early], [early, run]):
+        with pytest.raises(RecordingError, match="no rows around their event"):
+            side_by_side(runs, event=CommonEvent.CLOCK, span=0.5)

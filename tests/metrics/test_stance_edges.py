@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from metrics_runs import clock
 
-from legbench.metrics.stance import loaded_by_contact
+from legbench.metrics.stance import loaded_by_contact, without_bounces
 from legbench.signals import Bools, Floats
 
 
@@ -93,3 +93,17 @@ def test_a_run_that_begins_in_contact_has_not_landed_and_stands() -> None:
     time, contact, foot = flown()
     foot[:100] = np.linspace(0.0, 0.001, 100)
     np.testing.assert_array_equal(loaded(time, contact, foot), contact)
+
+
+def test_a_leg_has_bounced_if_its_hip_only_fell_until_the_row_before_it_is_back() -> None:
+    contact = np.ones(12, dtype=np.bool_)
+    contact[:2] = contact[5:7] = False
+    # Landed in row 2, away in 5 and 6, back in row 7.
+    for rises, bounced in ((1, True), (2, False), (4, False), (5, False), (6, True), (7, True)):
+        steps = np.full(11, -0.25)
+        steps[rises] = 0.25
+        hip = np.concatenate([[1.0], 1.0 + np.cumsum(steps)])
+        found = without_bounces(contact, hip)
+        expected = contact.copy()
+        expected[5:7] = bounced
+        assert found.tolist() == expected.tolist(), rises

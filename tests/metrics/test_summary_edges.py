@@ -38,6 +38,30 @@ def test_a_run_is_as_fast_as_its_cycles(rows: int, cycle_us: float, factor: floa
     assert seen.real_time_factor == pytest.approx(factor, abs=0.01)
 
 
+@pytest.mark.parametrize(
+    ("rows", "step", "period", "verdict"),
+    [
+        (9, 0.25, 0.25, "unsound"),
+        (2, 0.25, 0.25, "unsound"),
+        (1, 0.25, 0.25, "unknown"),
+        (9, 0.3749, 0.25, "unsound"),
+        (9, 0.375, 0.25, "unknown"),  # One and a half periods: rows have been left out.
+        (9, 4.0, 0.25, "unknown"),
+        (9, 4.0, None, "unsound"),  # Nobody knows how many rows there were.
+    ],
+)
+def test_energy_from_nowhere_is_judged_where_every_cycle_has_its_row(
+    rows: int, step: float, period: float | None, verdict: str
+) -> None:
+    energy = np.ones((rows, 2))
+    energy[1:, 0] += 0.5
+    entries = manifest(setup={"kind": "hfts"}, period=period)
+    free = np.tile([-0.6, 0.6], (rows, 1))
+    time = step * np.arange(rows, dtype=np.float64)
+    run = recording(time, entries, energy=energy, joint_pos=free, motor_pos=free)
+    assert summarise(run).numerics == verdict
+
+
 def test_cycles_without_a_duration_have_no_factor() -> None:
     run = recording(clock(9), manifest(), cycle_us=np.zeros(9))
     assert np.isnan(summarise(run).real_time_factor)
@@ -85,6 +109,11 @@ def test_each_caveat_is_told_where_it_holds_and_only_there() -> None:
     assert told == UNRATED
     (told,) = warnings_of(Analysis(short.real()))
     assert told == UNRATED
+    stays = np.ones(len(short.signals()["time"]), dtype=np.bool_)
+    (told,) = warnings_of(Analysis(short.recording(contact=stays)))
+    assert told == (
+        "nothing was rated: the leg never leaves the ground; push harder (a larger dz2)"
+    )
 
 
 def test_what_an_analysis_has_read_cannot_be_changed_and_the_recording_stays_as_it_was() -> None:

@@ -52,6 +52,26 @@ def test_signals_that_are_forgotten_are_read_again(monkeypatch: pytest.MonkeyPat
     assert sum(each.nbytes for each in run._signals.values()) <= 3 * 16 * COUNT
 
 
+def test_as_many_signals_are_kept_as_fit_and_the_one_asked_for_longest_ago_goes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # Usually 268 MB: 27 numbers a row, with what is computed of them, over 20 minutes at 1 kHz.
+    assert analysis_module.KEPT_BYTES == 268_435_456
+    monkeypatch.setattr(analysis_module, "KEPT_BYTES", 2 * 16 * COUNT)
+    run = Analysis(Hop().recording())
+    for name in ("joint_pos", "motor_pos", "joint_pos"):
+        assert run[name].nbytes == 16 * COUNT
+    assert list(run._signals) == ["motor_pos", "joint_pos"]
+    assert run["joint_vel"].nbytes == 16 * COUNT
+    assert list(run._signals) == ["joint_pos", "joint_vel"]
+
+
+def test_windows_are_four_minutes_long_and_one_is_there_without_rows() -> None:
+    assert list(spans(300_000)) == [(0, 262_144), (262_144, 300_000)]
+    assert list(spans(0, 1)) == [(0, 0)]
+    assert list(spans(1, 1)) == [(0, 1)]
+
+
 def test_windows_cover_the_rows_once() -> None:
     for count in (0, 1, 5, 6):
         rows = [row for first, stop in spans(count, 3) for row in range(first, stop)]

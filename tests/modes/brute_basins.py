@@ -30,9 +30,22 @@ def random_question(design: LegDesign, seed: int, points: int) -> Question:
     start = Apex(height=0.27, speed=0.0, z1=0.0, z2=0.6, dz1=0.0, dz2=0.0)
     centre = fixed_point(leg, law, settle(leg, law, start, 60)[-1]).apex
     first, second = random.choice(6, 2, replace=False).tolist()
+    return question_around(design, config, centre, (first, second), points, random)
+
+
+def question_around(
+    design: LegDesign,
+    config: JumpConfig,
+    centre: Apex,
+    pair: tuple[int, int],
+    points: int,
+    random: np.random.Generator,
+    spans: tuple[float, float] = (1.0, 6.0),
+) -> Question:
+    """A window of random size, within `spans` map units, over two coordinates around a hop."""
     axes = []
-    for place in (first, second):
-        span = float(random.uniform(1.0, 6.0)) * float(UNITS[place])
+    for place in pair:
+        span = float(random.uniform(*spans)) * float(UNITS[place])
         middle = float(centre.vector()[place] + random.uniform(-0.5, 0.5) * span)
         axes.append(
             GridAxis(name=NAMES[place], low=middle - span, high=middle + span, count=points)

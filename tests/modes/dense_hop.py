@@ -46,9 +46,11 @@ class Story:
 class DenseHop:
     """One hop from an apex to the next."""
 
-    def __init__(self, model: LegModel, rules: Rules, longest: float = 4e-3) -> None:
+    def __init__(
+        self, model: LegModel, rules: Rules, longest: float = 4e-3, tolerance: float = 1e-11
+    ) -> None:
         self.model, self.rules, self.story = model, rules, Story()
-        self.longest = longest
+        self.longest, self.tolerance = longest, tolerance
         first, mass = model.floating.first, model.floating.mass
         self.arm = tuple(model.floating.reach - s / mass for s in first)
         self.gravity = model.floating.gravity
@@ -106,7 +108,7 @@ class DenseHop:
         for stop, past in zip(model.stops, beyond, strict=True):
             sign = -1.0 if past else 1.0
             conditions[f"{stop} {past}"] = lambda _, y, stop=stop, sign=sign: (
-                sign * stop.depth(_pairs(y)[0]) - 1e-12
+                sign * stop.depth(_pairs(y)[0]) - 1e-13
             )
             if past:
                 pushes = self._asked(stop, self.y)[0] > 0.0
@@ -188,7 +190,13 @@ class DenseHop:
             return [*state[2:], *self._asked(None, state)[1]]
 
         solver = DOP853(
-            rates, self.time, np.array(self.y), end, rtol=1e-11, atol=1e-13, max_step=longest
+            rates,
+            self.time,
+            np.array(self.y),
+            end,
+            rtol=self.tolerance,
+            atol=0.01 * self.tolerance,
+            max_step=longest,
         )
         while solver.status == "running":
             solver.step()
@@ -263,7 +271,7 @@ class DenseHop:
 
 def _root(at: Any, begin: float, end: float) -> float:
     solve: Any = brentq
-    return float(solve(at, begin, end, xtol=1e-14, rtol=1e-14))
+    return float(solve(at, begin, end, xtol=1e-16, rtol=1e-15))
 
 
 def _pairs(y: Sequence[float]) -> tuple[tuple[float, float], tuple[float, float]]:

@@ -9,7 +9,12 @@ from recorded_rows import append_rows
 
 from legbench.errors import RecordingError
 from legbench.recording import reader
-from legbench.recording.archive_columns import ArchiveColumns
+from legbench.recording.archive_columns import (
+    ArchiveColumns,
+    ArchiveRows,
+    column_windows,
+    rows_of,
+)
 from legbench.recording.reader import Recording, load
 from legbench.recording.writer import RunWriter
 
@@ -65,6 +70,29 @@ def test_windows_are_the_rows_in_order(both: tuple[Recording, Recording], rows: 
         for name in ("joint_pos", "contact_force", "phase", "contact"):
             joined = np.concatenate([part[name] for part in parts])
             np.testing.assert_array_equal(joined, recording[name])
+
+
+@pytest.mark.parametrize("rows", [slice(0, ROWS), slice(65, 400), slice(600, 900), slice(5, 5)])
+def test_some_rows_of_a_long_run_stay_in_its_file(
+    both: tuple[Recording, Recording], rows: slice
+) -> None:
+    short, long = (rows_of(each.columns, rows) for each in both)
+    assert isinstance(long, ArchiveRows)
+    assert (list(long), len(long)) == (list(short), len(short))
+    assert "joint_pos_1" in long
+    assert "no_such" not in long
+    inner = slice(10, 40)
+    for part, mine, theirs in (
+        (slice(None), long, short),
+        (inner, rows_of(long, inner), rows_of(short, inner)),
+    ):
+        for name, values in theirs.items():
+            assert mine[name].base is None  # keeps no column of the whole run
+            np.testing.assert_array_equal(mine[name], values)
+            windows = [each[name] for each in column_windows(mine, 64)]
+            joined = np.concatenate(windows) if windows else values[:0]
+            np.testing.assert_array_equal(joined, short[name][part])
+            assert max(map(len, windows), default=0) <= 64
 
 
 def test_the_temporary_file_of_a_torn_run_goes_with_it(

@@ -44,6 +44,13 @@ def test_a_run_lasts_from_its_first_to_its_last_row(tmp_path: Path) -> None:
     assert not unknown & manifest.keys()
 
 
+def test_a_run_without_rows_lasts_for_no_time(tmp_path: Path) -> None:
+    with RunWriter.create(tmp_path, {}) as writer:
+        pass
+    manifest = load(writer.path).manifest
+    assert (manifest["duration"], manifest["rows"]) == (0.0, 0)
+
+
 def test_an_interruption_says_how_much_was_kept(tmp_path: Path) -> None:
     for error in (KeyboardInterrupt(), GeneratorExit()):
         writer = RunWriter.create(tmp_path, {})

@@ -74,9 +74,9 @@ def test_the_figure_of_a_long_run_shows_the_same_ranges(
 def test_windows_publish_what_the_whole_run_publishes(
     hop: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    whole = rrd.write_rrd(hop, tmp_path / "whole.rrd")
+    whole = rrd.write_rrd(hop, tmp_path / "whole.rrd", [hop])
     monkeypatch.setattr(rrd, "WINDOW_ROWS", 711)
-    parts = rrd.write_rrd(hop, tmp_path / "parts.rrd")
+    parts = rrd.write_rrd(hop, tmp_path / "parts.rrd", [hop])
     ours, theirs = viz_rrd.temporal(parts), viz_rrd.temporal(whole)
     assert ours.keys() == theirs.keys()
     for path, columns in theirs.items():

@@ -260,7 +260,7 @@ class Course:
         self, regime: Regime, q: Pair, v: Pair, point: Pair, drift: Pair, lean: float = NEVER
     ) -> None:
         self.q, self.v, self.point, self.drift = q, v, point, drift
-        self.detector.lean = lean
+        self.detector.begin(lean)
         self.stop_switches.find(floats(q), floats(v))
         self._enter(regime)
 

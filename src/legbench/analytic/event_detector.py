@@ -31,6 +31,8 @@ NEVER = 1e6
 TIE = 1e-7
 """Tolerance of acceleration over gravity and of force over weight when the foot is released [-]: on
 the radial mode both vanish together, and rounding decides their signs."""
+JUMPED = 1e-9
+"""Rate beyond zero that a turning point cannot leave by rounding, only an impact [rad/s]."""
 RISE, FALL, TURN, FELL, FELL_BACK = range(Event.RISE, Event.FELL_BACK + 1)
 KNEE_LOW, KNEE_HIGH, HIP_LOW, HIP_HIGH = range(Event.KNEE_LOW, Event.HIP_HIGH + 1)
 CONTACT, RECOVER = int(Event.CONTACT), int(Event.RECOVER)
@@ -76,9 +78,13 @@ class EventDetector:
         self._below, self._above = -NEVER, NEVER
         self._turn, self._free = 0.0, False
 
+    def begin(self, lean: float) -> None:
+        """Begin with a leg in a new state, whose turning points are those after it."""
+        self.lean, self._turn = lean, 0.0
+
     def enter(self, regime: Regime, since: float) -> None:
         """Begin a regime, in which contact is not watched for the shortest phase at first."""
-        self._free, self._turn = regime in KINDS, 0.0
+        self._free = regime in KINDS
         self.blind = since + self._min_phase if self._free else since
 
     def move_to(self, compiled: CompiledRegime) -> None:
@@ -111,8 +117,8 @@ class EventDetector:
         if compiled.moved:
             compiled.restore()
         due = self._near()
-        if self.levels.turns:
-            self._guard_turn()
+        if self.levels.turns and self._guard_turn() and due is None:
+            due = TURN
         if course.stop_switches.touched:
             course.stop_switches.guard(
                 compiled, course.terms, course.plain_motor, course.plain_q, course.plain_v
@@ -218,8 +224,11 @@ class EventDetector:
             return course.stop_switches.turns(plain.ops, course.terms, torque, q, v)[1]
         return pair_acceleration(plain.ops, course.terms, q, v, torque)
 
-    def _guard_turn(self) -> None:
-        """Watch the probe's next turning point, the kind of which follows from its present rate."""
+    def _guard_turn(self) -> bool:
+        """Watch the probe's next turning point, the kind of which follows from its present rate.
+
+        Returns whether an impact has just turned the probe, which is a turning point, too.
+        """
         course = self._course
         (p1, p2), (v1, v2) = course.probe, course.plain_v
         rate = p1 * v1 + p2 * v2
@@ -233,3 +242,4 @@ class EventDetector:
             self._compiled.lay(TURN, self._turn, 0.0)
         if self._turn * rate > -NUDGE:
             self._compiled.guard(TURN, rate)
+        return self._turn * rate > JUMPED

@@ -124,8 +124,7 @@ def _flight(model: LegModel, state: LegState, motor: Pair) -> _Leg:
 
 
 def _stance(model: LegModel, state: LegState, motor: Pair) -> _Leg:
-    foot = model.foot_from_hip(state.q)
-    anchor = state.trunk_pos[0] + foot[0]
+    anchor = state.trunk_pos[0] - model.hip_over_foot(state.q)[0]
 
     def rates(_time: float, y: Floats) -> list[float]:
         q1, q2, v1, v2 = y.tolist()
@@ -133,13 +132,13 @@ def _stance(model: LegModel, state: LegState, motor: Pair) -> _Leg:
 
     def unpack(time: float, y: list[float]) -> LegState:
         q, v = (y[0], y[1]), (y[2], y[3])
-        tip, tip_vel = model.foot_from_hip(q), model.foot_vel_from_hip(q, v)
+        hip = model.hip_over_foot(q)
         return state._replace(
             time=time,
             q=q,
             v=v,
-            trunk_pos=(anchor - tip[0], -tip[1]),
-            trunk_vel=(-tip_vel[0], -tip_vel[1]),
+            trunk_pos=(anchor + hip[0], hip[1]),
+            trunk_vel=model.hip_vel_over_foot(q, v),
         )
 
     def force(y: list[float]) -> float:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from legbench.analytic.boom import Boom, BoomMotion
 from legbench.analytic.equations import (
     SCALAR,
     Ops,
@@ -14,6 +15,7 @@ from legbench.analytic.equations import (
     pair_acceleration,
     pair_kinetic,
     pair_potential,
+    pair_solve,
     spring_energy,
     spring_torque,
     sweep,
@@ -54,6 +56,8 @@ class LegModel:
     """The kind of numbers that the methods work on."""
     losses: Losses | None = None
     """Dry friction, damped guide and backlash, for plain floats alone; none for a perfect leg."""
+    boom: Boom | None = None
+    """Boom that guides the trunk over a pinned foot, for plain floats alone; none: a plane."""
 
     @classmethod
     def of(
@@ -65,6 +69,7 @@ class LegModel:
         stops: bool = True,
         undamped: bool = False,
         losses: Losses | None = None,
+        boom: Boom | None = None,
     ) -> "LegModel":
         """Collect the terms of a design; `gravity` in [m/s^2], bars without mass if not given."""
         floating = floating_terms(design, gravity, bars)
@@ -77,6 +82,7 @@ class LegModel:
             damping=(0.0, 0.0) if undamped else design.damping,
             stops=make_stops(design.limits) if stops else (),
             losses=losses,
+            boom=boom,
         )
 
     def torque(self, motor: Pair, q: Pair, v: Pair) -> Pair:
@@ -100,11 +106,22 @@ class LegModel:
     ) -> tuple[list[float], Pair]:
         """Torque of each touched stop [N m], and the accelerations that result [rad/s^2]."""
         a = pair_acceleration(self.ops, terms, q, v, self.torque(motor, q, v))
-        return pushes(self.ops, terms, self.stops, beyond, q, v, a)
+
+        def solve(torque: Pair) -> Pair:
+            return pair_solve(self.ops, terms, q, torque)
+
+        return pushes(solve, self.stops, beyond, q, v, a)
 
     def stance_acceleration(self, motor: Pair, q: Pair, v: Pair) -> Pair:
         """Accelerations of q1 and q2 while the foot stands [rad/s^2]."""
-        return self.acceleration(self.stance, motor, q, v)
+        if self.boom is None:
+            return self.acceleration(self.stance, motor, q, v)
+        return self._on_boom(self.boom.motion(q, v), motor, q, v)
+
+    def _on_boom(self, motion: BoomMotion, motor: Pair, q: Pair, v: Pair) -> Pair:
+        a = motion.acceleration(self.torque(motor, q, v))
+        beyond = [stop.depth(q) > 0.0 for stop in self.stops]
+        return pushes(motion.solve, self.stops, beyond, q, v, a)[1] if any(beyond) else a
 
     def hanging_acceleration(self, motor: Pair, q: Pair, v: Pair) -> Pair:
         """Accelerations of q1 and q2 while the trunk is held [rad/s^2]."""
@@ -117,6 +134,9 @@ class LegModel:
 
     def stance_force(self, motor: Pair, q: Pair, v: Pair) -> Pair:
         """Contact force on the standing foot (forward, up) [N]."""
+        if self.boom is not None:
+            motion = self.boom.motion(q, v)
+            return motion.force(self._on_boom(motion, motor, q, v))
         a = self.stance_acceleration(motor, q, v)
         force = contact_force(self.ops, self.floating, q, v, a)
         if self.losses is None:
@@ -136,6 +156,20 @@ class LegModel:
     def foot_vel_from_hip(self, q: Pair, v: Pair) -> Pair:
         """Velocity of the foot tip seen from the hip [m/s]."""
         return sweep_rate(self.ops, q, v, (self.floating.reach, self.floating.reach))
+
+    def hip_over_foot(self, q: Pair) -> Pair:
+        """Hip seen from a foot tip that stands (forward, up) [m]."""
+        if self.boom is not None:
+            return self.boom.hip(q)
+        foot = self.foot_from_hip(q)
+        return -foot[0], -foot[1]
+
+    def hip_vel_over_foot(self, q: Pair, v: Pair) -> Pair:
+        """Velocity of the hip over a foot tip that stands (forward, up) [m/s]."""
+        if self.boom is not None:
+            return self.boom.hip_vel(q, v)
+        foot_vel = self.foot_vel_from_hip(q, v)
+        return -foot_vel[0], -foot_vel[1]
 
     def mass_centre_from_hip(self, q: Pair) -> Pair:
         """Centre of mass seen from the hip [m]."""

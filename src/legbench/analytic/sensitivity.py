@@ -8,7 +8,7 @@ Derivatives come from heyoka's variational equations. Legs are integrated side b
 each instruction; stretches in which no motor moves are one call.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Final, final
@@ -46,6 +46,8 @@ class Track:
     """Angles and rates at the start (4,) [rad, rad/s]."""
     parameters: Floats
     """Parameters as in `analytic.parameters`, up to the sharpness of friction (14,)."""
+    restarts: tuple[int, ...] = ()
+    """Rows from which derivatives are wanted by the state there, too."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,6 +59,11 @@ class Path:
     slopes: Floats
     """Derivatives of the angles (n, 2, seeds), by the four states at the start and then by the
     parameters in their order."""
+    pieces: Floats
+    """Such derivatives of angles and rates (n, 4, seeds), by the state and the parameters since the
+    last restart before each row."""
+    restarts: tuple[int, ...]
+    """Rows of the restarts, those of legs that were followed alongside among them."""
 
 
 @final
@@ -91,8 +98,11 @@ class SensitiveLegs:
         whole = np.empty((length, len(block.state), LANES))
         whole[0] = block.state
         moves = np.any(motors[1:] != motors[:-1], axis=(1, 2))
-        edges = [0, *(np.flatnonzero(moves) + 1), length - 1]
+        restarts = {row for track in tracks for row in track.restarts if 0 < row < length - 1}
+        edges = sorted({0, *(np.flatnonzero(moves) + 1).tolist(), *restarts, length - 1})
         for begin, end in pairwise(edges):
+            if begin in restarts:
+                self._restart(block)
             block.pars[MOTOR : MOTOR + 2] = motors[begin]
             most = SPARE_STEPS + STEPS_PER_INTERVAL * (end - begin)
             if end == begin + 1:
@@ -102,24 +112,42 @@ class SensitiveLegs:
             else:
                 reached = block.propagate_grid(times[begin : end + 1], max_steps=most)[-1]
                 _check(block, float(times[begin].min()))
-                whole[begin : end + 1] = reached
-        shape = (length, STATES, self._seeds, LANES)
-        slopes = whole[:, STATES:].reshape(shape)[:, :2]
+                whole[begin + 1 : end + 1] = reached[1:]
+        pieces = whole[:, STATES:].reshape(length, STATES, self._seeds, LANES)
         return [
-            Path(
-                states=whole[: len(track.times), :STATES, lane],
-                slopes=slopes[: len(track.times), :, :, lane],
-            )
+            _path(whole[: len(track.times), :STATES, lane], pieces[..., lane], restarts)
             for lane, track in enumerate(tracks)
         ]
 
     def _begin(self, block: Any, lanes: Sequence[Track]) -> None:
-        """Load starts and parameters; the derivative of the start by itself is one."""
+        """Load starts and parameters."""
         block.set_time([float(track.times[0]) for track in lanes])
         block.state[:STATES] = np.stack([track.start for track in lanes], axis=1)
-        block.state[STATES:] = np.eye(STATES, self._seeds).ravel()[:, np.newaxis]
+        self._restart(block)
         values = np.stack([track.parameters for track in lanes], axis=1)
         block.pars[:] = values[: len(block.pars)]
+
+    def _restart(self, block: Any) -> None:
+        """Begin derivatives anew: that of a state by itself is one."""
+        block.state[STATES:] = np.eye(STATES, self._seeds).ravel()[:, np.newaxis]
+
+
+def _path(states: Floats, pieces: Floats, restarts: Collection[int]) -> Path:
+    """Path of one leg, whose derivatives are chained over the restarts.
+
+    Args:
+        states: angles and rates (n, 4).
+        pieces: derivatives since the last restart, of n rows or more (m, 4, seeds).
+        restarts: rows of the restarts.
+    """
+    pieces, last = pieces[: len(states)], len(states) - 1
+    chosen = tuple(sorted(row for row in restarts if row < last))
+    chained = pieces.copy() if chosen else pieces
+    for begin, end in pairwise([*chosen, last]):
+        rows = slice(begin + 1, end + 1)
+        chained[rows] = pieces[rows, :, :STATES] @ chained[begin]
+        chained[rows, :, STATES:] += pieces[rows, :, STATES:]
+    return Path(states=states, slopes=chained[:, :2], pieces=pieces, restarts=chosen)
 
 
 def _check(block: Any, time: float) -> None:

@@ -66,14 +66,13 @@ def standing(
     model: LegModel, q: Pair, v: Pair = (0.0, 0.0), *, time: float = 0.0, pinned: bool = False
 ) -> LegState:
     """State of a leg whose foot stands at the origin."""
-    foot, foot_vel = model.foot_from_hip(q), model.foot_vel_from_hip(q, v)
     return LegState(
         time=time,
         regime=Regime.PINNED if pinned else Regime.STANCE,
         q=q,
         v=v,
-        trunk_pos=(-foot[0], -foot[1]),
-        trunk_vel=(-foot_vel[0], -foot_vel[1]),
+        trunk_pos=model.hip_over_foot(q),
+        trunk_vel=model.hip_vel_over_foot(q, v),
     )
 
 
@@ -102,7 +101,9 @@ def energy(model: LegModel, state: LegState, motor: Pair) -> float:
     It is constant while no damper, impact, joint stop or command acts.
     """
     spring = model.spring_energy(motor, state.q)
-    if state.regime is Regime.HANGING:
+    if model.boom is not None:
+        potential, kinetic = model.boom.energy(state.q, state.v)
+    elif state.regime is Regime.HANGING:
         potential, kinetic = model.pair_energy(model.hanging, state.q, state.v)
     else:
         potential, kinetic = model.floating_energy(

@@ -10,11 +10,10 @@ touched at the same time act one after the other, each on the acceleration that 
 left.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from legbench.analytic.equations import Ops, Pair, Term, pair_solve
-from legbench.analytic.terms import PairTerms
+from legbench.analytic.equations import Pair, Term
 from legbench.design import Limits
 
 TIME_CONSTANT = 0.01
@@ -89,8 +88,7 @@ def make_stops(limits: Limits) -> tuple[Stop, ...]:
 
 
 def pushes(
-    ops: Ops,
-    terms: PairTerms,
+    solve: Callable[[Pair], Pair],
     stops: Sequence[Stop],
     beyond: Sequence[bool],
     q: Pair,
@@ -100,13 +98,13 @@ def pushes(
     """Torque of each stop, zero if it does not act [N m], and the final accelerations [rad/s^2].
 
     The angles of the leg accelerate by `a` without stops, and its joints are `beyond` the limits
-    of these stops.
+    of these stops. `solve` gives the accelerations that torques on q1 and q2 add.
     """
     found = []
     for stop, past in zip(stops, beyond, strict=True):
         force = 0.0
         if past:
-            answer = pair_solve(ops, terms, q, stop.normal)
+            answer = solve(stop.normal)
             force = max(stop.push(q, v, a, answer), 0.0)
             a = a[0] + answer[0] * force, a[1] + answer[1] * force
         found.append(force)

@@ -100,20 +100,46 @@ class FloatingTerms:
         return (self.first[0] - self.mass * self.reach, self.first[1] - self.mass * self.reach)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Body:
+    """Body of the leg below the trunk, with its centre of mass at `hip + sum along_i dir(q_i)`."""
+
+    mass: float
+    """Mass [kg]."""
+    along: tuple[float, float]
+    """Distance of the centre of mass from the hip along dir(q1) and dir(q2) [m]."""
+    inertia: float
+    """Inertia about an axis across the body through its centre of mass [kg m^2]."""
+    turns: tuple[float, float]
+    """Whether it turns with q1 or with q2: (1, 0) or (0, 1)."""
+
+
+FIRST, SECOND = (1.0, 0.0), (0.0, 1.0)
+"""Angle that a body turns with."""
+
+
+def bodies_of(design: LegDesign, bars: Bars | None = None) -> tuple[Body, ...]:
+    """Return the bodies of a design below its trunk: thigh, shank, foot, and bars if given."""
+    thigh, shank, foot = design.segments
+    l1, l2, _ = design.lengths
+    rods = () if bars is None else _rods(bars, l1, l2)
+    return (
+        Body(mass=thigh.mass, along=(thigh.com, 0.0), inertia=thigh.inertia, turns=FIRST),
+        Body(mass=shank.mass, along=(l1, shank.com), inertia=shank.inertia, turns=SECOND),
+        Body(mass=foot.mass, along=(l1 + foot.com, l2), inertia=foot.inertia, turns=FIRST),
+        *rods,
+    )
+
+
 def floating_terms(
     design: LegDesign, gravity: float = GRAVITY, bars: Bars | None = None
 ) -> FloatingTerms:
     """Sum the bodies of a design: trunk, thigh, shank, foot, and bars if given."""
-    thigh, shank, foot = design.segments
-    l1, l2, _ = design.lengths
     # (mass, inertia on q1, inertia on q2, along_1, along_2)
     bodies = [
-        (thigh.mass, thigh.inertia, 0.0, thigh.com, 0.0),
-        (shank.mass, 0.0, shank.inertia, l1, shank.com),
-        (foot.mass, foot.inertia, 0.0, l1 + foot.com, l2),
+        (body.mass, body.inertia * body.turns[0], body.inertia * body.turns[1], *body.along)
+        for body in bodies_of(design, bars)
     ]
-    if bars is not None:
-        bodies += _rods(bars, l1, l2)
     return FloatingTerms(
         mass=design.total_mass,
         first=(sum(m * a for m, _, _, a, _ in bodies), sum(m * b for m, _, _, _, b in bodies)),
@@ -122,24 +148,24 @@ def floating_terms(
             sum(m * b * b + i for m, _, i, _, b in bodies),
         ),
         coupling=sum(m * a * b for m, _, _, a, b in bodies),
-        reach=l2,
+        reach=design.lengths[1],
         gravity=gravity,
     )
 
 
-def _rods(bars: Bars, l1: float, l2: float) -> list[tuple[float, float, float, float, float]]:
+def _rods(bars: Bars, l1: float, l2: float) -> tuple[Body, ...]:
     """Rods of the linkage: crank (turning with q2), bars along thigh (q1) and along shank (q2)."""
-    arm = bars.crank_length
+    arm, density = bars.crank_length, bars.density
 
-    def rod(length: float) -> tuple[float, float]:
-        return bars.density * length, bars.density * length**3 / 12.0
+    def rod(length: float, along: tuple[float, float], turns: tuple[float, float]) -> Body:
+        inertia = density * length**3 / 12.0
+        return Body(mass=density * length, along=along, inertia=inertia, turns=turns)
 
-    (crank, crank_i), (thigh, thigh_i), (shank, shank_i) = rod(arm), rod(l1), rod(l2)
-    return [
-        (crank, 0.0, crank_i, 0.0, 0.5 * arm),
-        (thigh, thigh_i, 0.0, 0.5 * l1, arm),
-        (shank, 0.0, shank_i, l1 + arm, 0.5 * l2),
-    ]
+    return (
+        rod(arm, (0.0, 0.5 * arm), SECOND),
+        rod(l1, (0.5 * l1, arm), FIRST),
+        rod(l2, (l1 + arm, 0.5 * l2), SECOND),
+    )
 
 
 def stance_terms(design: LegDesign, gravity: float = GRAVITY) -> PairTerms:

@@ -1,11 +1,17 @@
 """Executor that runs shards as an array of Slurm jobs."""
 
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from subprocess import CalledProcessError
 from typing import Any, final
 
-from legbench.campaign._submitit import AutoExecutor, FailedJobError, UncompletedJobError
+from legbench.campaign._submitit import (
+    AutoExecutor,
+    FailedJobError,
+    FailedSubmissionError,
+    UncompletedJobError,
+)
 from legbench.campaign.executor import AbstractExecutor, Done, Note
 from legbench.campaign.work import Work, do_work
 from legbench.errors import CampaignError, LegbenchError
@@ -52,15 +58,21 @@ class SlurmExecutor(AbstractExecutor):
             raise CampaignError(f"no jobs can be submitted: {error}") from error
 
     def run(self, works: Sequence[Work], stop: StopFlag, note: Note) -> Iterator[Done]:
-        """Submit the shards, wait for them, and cancel what is left when somebody asks."""
+        """Submit the shards, wait for them, and cancel what is left when somebody asks.
+
+        Jobs that are not over are cancelled however the iteration ends.
+
+        Raises:
+            CampaignError: Slurm refuses the jobs.
+        """
         for at in range(0, len(works), MOST_JOBS):
             running = self._submit(works[at : at + MOST_JOBS])
             again: list[Work] = []
-            yield from self._wait(running, stop, again)
+            yield from self._wait(running, stop, note, again)
             if again and not stop.is_set:
                 note(f"jobs that died, whose shards are run again: {len(again)}")
                 dead: list[Work] = []
-                yield from self._wait(self._submit(again), stop, dead)
+                yield from self._wait(self._submit(again), stop, note, dead)
                 for work in dead:
                     first = work.hashes[0][:12]
                     yield Done(
@@ -70,28 +82,47 @@ class SlurmExecutor(AbstractExecutor):
                     )
 
     def _submit(self, works: Sequence[Work]) -> dict[Any, Work]:
-        jobs = self._executor.map_array(_job, works)
+        try:
+            jobs = self._executor.map_array(_job, works)
+        except (FailedJobError, FailedSubmissionError, OSError) as error:
+            why = " ".join(str(error).split()) or "sbatch failed without a word"
+            raise CampaignError(
+                f"Slurm refuses the jobs: {why}; parameters are given as --slurm NAME=VALUE"
+            ) from error
         return dict(zip(jobs, works, strict=True))
 
-    def _wait(self, running: dict[Any, Work], stop: StopFlag, dead: list[Work]) -> Iterator[Done]:
+    def _wait(
+        self, running: dict[Any, Work], stop: StopFlag, note: Note, dead: list[Work]
+    ) -> Iterator[Done]:
         """Yield what comes to its end; jobs without a result go to `dead`."""
-        while running:
-            if stop.is_set:
-                for job in running:
-                    job.cancel()
-                return
-            over = [job for job in running if job.done()]
-            for job in over:
-                work = running.pop(job)
-                try:
-                    yield job.result()
-                except FailedJobError:
-                    # Its work has raised something that is not ours, which it would do again.
-                    yield Done(work=work, failure=f"its job failed; see {job.paths.stderr}")
-                except UncompletedJobError:
-                    dead.append(work)
-            if not over:
-                time.sleep(self._look_every)
+        try:
+            while running and not stop.is_set:
+                over = [job for job in running if job.done()]
+                for job in over:
+                    work = running.pop(job)
+                    try:
+                        yield job.result()
+                    except FailedJobError:
+                        # Its work has raised something not ours, which it would do again.
+                        yield Done(work=work, failure=f"its job failed; see {job.paths.stderr}")
+                    except UncompletedJobError:
+                        dead.append(work)
+                if not over:
+                    time.sleep(self._look_every)
+        finally:
+            _cancel(running, note)
+
+
+def _cancel(jobs: Iterable[Any], note: Note) -> None:
+    """Cancel jobs; one that cannot be, as when it has just ended, keeps none of the others."""
+    kept = []
+    for job in jobs:
+        try:
+            job.cancel()
+        except (OSError, CalledProcessError):
+            kept.append(job.job_id)
+    if kept:
+        note(f"scancel has failed for jobs that may have ended: {' '.join(kept)}; see squeue")
 
 
 def _job(work: Work) -> Done:

@@ -40,7 +40,7 @@ class IdentifyArguments:
     at_rest: bool = False
     """Whether runs begin exactly at the rest posture of the fitted leg, as simulated ones do."""
     starts: int = 3
-    """Number of starts of the fit; the first is the design."""
+    """Number of starts of the fit: the design, a regression, and legs beside it."""
     held_out: UseAppendAction[tuple[Path, ...]] = ()
     """Run to predict and not to fit, a hop too; may be repeated."""
     plan: Path | None = None

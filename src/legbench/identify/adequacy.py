@@ -63,14 +63,13 @@ class Score:
     value: float
     """Value that it would take, about, with all others as they are [unit]."""
     gain: float
-    """Fall of the sum of squares, against what coloured noise and rounded motors make of it [-]."""
+    """Fall of the sum of squares, against what coloured noise makes of it [-]."""
 
 
 def residuals_of(misfit: Misfit, trials: Sequence[Trial]) -> list[Residual]:
     """Residuals of a fit by run and joint."""
     found = []
-    runs = zip(trials, misfit.residuals, misfit.rounding, strict=True)
-    for trial, residuals, rounding in runs:
+    for trial, residuals in zip(trials, misfit.residuals, strict=True):
         for joint in (0, 1):
             own, sigma = residuals[:, joint], float(trial.sigma[joint])
             square, chance = _of_means(own)
@@ -81,7 +80,7 @@ def residuals_of(misfit: Misfit, trials: Sequence[Trial]) -> list[Residual]:
                     rms=sigma * float(np.sqrt(np.mean(np.delete(own, trial.left_out) ** 2))),
                     sigma=sigma,
                     coloured=sigma * math.sqrt(max(0.0, square - chance)),
-                    allowed=_explained(trial, rounding, joint),
+                    allowed=_explained(trial, joint),
                 )
             )
     return found
@@ -94,16 +93,14 @@ def _of_means(residuals: Floats) -> tuple[float, float]:
     return float(np.mean(means**2)), (1.0 + RARE * math.sqrt(2.0 / count)) / ROWS
 
 
-def _explained(trial: Trial, rounding: Floats, joint: int) -> float:
+def _explained(trial: Trial, joint: int) -> float:
     """Coloured residual that the counts of link and motor encoders explain [rad].
 
-    A motor that stands may be half a count beside what its encoder shows, sqrt(3) standard
-    deviations, and a leg that leans on its springs moves by more than they do.
+    Motors that stand have been fitted; one that creeps is up to half a count beside what its
+    encoder shows, and a link that comes to rest stays so.
     """
     link = trial.links[joint].count / math.sqrt(12.0)
-    moved = float(trial.sigma[joint] * np.sqrt(np.mean(np.sum(rounding[:, joint] ** 2, axis=-1))))
-    motor = max(moved, trial.motors[joint].count / math.sqrt(12.0))
-    return math.hypot(FLOOR, link, math.sqrt(3.0) * motor)
+    return math.hypot(FLOOR, link, 0.5 * trial.motors[joint].count)
 
 
 def scores_of(problem: Problem, misfit: Misfit) -> list[Score]:
@@ -111,10 +108,10 @@ def scores_of(problem: Problem, misfit: Misfit) -> list[Score]:
     free = set(problem.freedom.names)
     others = [name for name in PARAMETERS if name not in free]
     slopes = _other_slopes(problem, misfit.guess, others)
-    own = np.concatenate([each.reshape(-1, each.shape[-1]) for each in misfit.jacobians])
-    left = np.concatenate([each.ravel() for each in misfit.residuals])
+    left, own = misfit.whole()
+    slopes = np.pad(slopes, ((0, len(misfit.prior)), (0, 0)))
     base = np.linalg.qr(own / np.linalg.norm(own, axis=0))[0]
-    excess, hidden = _excess(misfit, problem.trials), _hidden(misfit)
+    excess = _excess(misfit, problem.trials)
     found = []
     for name, slope in zip(others, slopes.T, strict=True):
         bare = slope - base @ (base.T @ slope)
@@ -126,8 +123,8 @@ def scores_of(problem: Problem, misfit: Misfit) -> list[Score]:
         step = score / size
         if PARAMETERS[name].positive:
             step = float(np.clip(step, -1.0, 1.0))
-        variance = size * excess + float(np.sum((bare @ hidden) ** 2))
-        found.append(Score(name=name, value=moved(name, value, step), gain=score**2 / variance))
+        gain = score**2 / (size * excess)
+        found.append(Score(name=name, value=moved(name, value, step), gain=gain))
     return sorted(found, key=lambda each: -each.gain)
 
 
@@ -144,25 +141,15 @@ def _other_slopes(problem: Problem, guess: Guess, names: Sequence[str]) -> Float
     )
 
 
-def _hidden(misfit: Misfit) -> Floats:
-    """Slopes of all rows by the rounding of each motor in each run (rows, 2 r) [-]."""
-    ends = np.cumsum([0, *(each.size for each in misfit.residuals)])
-    found = np.zeros((ends[-1], 2 * len(misfit.rounding)))
-    for place, each in enumerate(misfit.rounding):
-        found[ends[place] : ends[place + 1], 2 * place : 2 * place + 2] = each.reshape(-1, 2)
-    return found
-
-
 def _excess(misfit: Misfit, trials: Sequence[Trial]) -> float:
     """Factor by which coloured noise raises the variance of a score [-].
 
     It is measured from the residuals, and bounded by what the counts of the encoders can make.
     """
     most = 1.0
-    runs = zip(trials, misfit.residuals, misfit.rounding, strict=True)
-    for trial, residuals, rounding in runs:
+    for trial, residuals in zip(trials, misfit.residuals, strict=True):
         for joint in (0, 1):
             measured = ROWS * _of_means(residuals[:, joint])[0]
-            share = _explained(trial, rounding, joint) / float(trial.sigma[joint])
+            share = _explained(trial, joint) / float(trial.sigma[joint])
             most = max(most, min(measured, 1.0 + ROWS * share**2))
     return most

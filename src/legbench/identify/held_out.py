@@ -1,6 +1,6 @@
 """Runs that a fit has not seen, predicted by it."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -47,7 +47,7 @@ def hold_out(trial: Trial, guess: Guess, reach: float) -> HeldOut:
     """Predict a run from fitted parameters; its first posture alone is its own."""
     rubs = any(guess.values[INDEX[name]] for name in ("f1", "f2"))
     problem = Problem([trial], reach, Freedom(names=()), friction=rubs)
-    own = replace(guess, starts=nothing_moved([trial]))
+    own = Guess(values=guess.values, starts=nothing_moved([trial]))
     try:
         misfit = fit(problem, own, horizons=(None,)).misfit
     except (PlantFault, np.linalg.LinAlgError):

@@ -1,7 +1,7 @@
 """Link angles that parameters predict for recorded runs, with all derivatives."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final, final
 
 import numpy as np
@@ -12,6 +12,7 @@ from legbench.design.statics import balance
 from legbench.errors import PlantFault
 from legbench.identify.base import can_be, equation_parameters
 from legbench.identify.parameters import INDEX
+from legbench.identify.rounding import Stretch, by_stretch, stretches_of
 from legbench.identify.trial import Trial
 from legbench.signals import Floats
 
@@ -28,6 +29,9 @@ class Guess:
     starts: Floats
     """Posture against the rest posture, and rates, in the first row of each run (r, 4)
     [rad, rad/s]; of a run that begins in motion against what its first rows show."""
+    hidden: Floats = field(default_factory=lambda: np.zeros(0))
+    """Angles that the counts of the motors' encoders hide, one for each stretch of each run, in
+    standard deviations (h,) [-]; empty: there are none."""
 
     def at(self, name: str, value: float) -> "Guess":
         """Return this guess with another value of one parameter."""
@@ -46,6 +50,8 @@ class Prediction:
     """Their derivatives by all parameters (n, 2, p)."""
     by_start: Floats
     """Their derivatives by what is free in the first row (n, 2, 4)."""
+    by_hidden: Floats
+    """Their derivatives by the hidden angles of this run (n, 2, h)."""
 
 
 @final
@@ -54,6 +60,7 @@ class Predictor:
 
     def __init__(self, trials: Sequence[Trial], reach: float, *, friction: bool) -> None:
         self.trials, self.reach = tuple(trials), reach
+        self.stretches = tuple(stretches_of(trial) for trial in self.trials)
         self._legs = SensitiveLegs(friction=friction)
 
     def predict(self, guess: Guess, horizon: float | None = None) -> list[Prediction]:
@@ -66,11 +73,22 @@ class Predictor:
         if not can_be(guess.values, self.reach):
             raise PlantFault("no such leg", "the inertias are those of no body")
         begun = [
-            _begun(trial, guess, start, self.reach, rows_within(trial, horizon))
-            for trial, start in zip(self.trials, guess.starts, strict=True)
+            _begun(run, guess, start, self.reach, rows_within(run.trial, horizon))
+            for run, start in zip(self._runs(guess.hidden), guess.starts, strict=True)
         ]
         paths = self._legs.follow([each.track for each in begun])
         return [_measured(path, each, guess) for path, each in zip(paths, begun, strict=True)]
+
+    def _runs(self, hidden: Floats) -> list["_Run"]:
+        """Runs with the motors where they are believed to have been."""
+        found, first = [], 0
+        for trial, stretches in zip(self.trials, self.stretches, strict=True):
+            motors = trial.motor_pos.copy()
+            for each, angle in zip(stretches, hidden[first:].tolist(), strict=False):
+                motors[each.rows, each.joint] += each.sigma * angle
+            found.append(_Run(trial=trial, motors=motors, stretches=stretches))
+            first += len(stretches)
+        return found
 
 
 def rows_within(trial: Trial, horizon: float | None) -> int:
@@ -84,30 +102,50 @@ def rows_within(trial: Trial, horizon: float | None) -> int:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class _Run:
+    """A run, and where its motors are believed to have been."""
+
+    trial: Trial
+    motors: Floats
+    """Positions of the motors, but for their zeros (n, 2) [rad]."""
+    stretches: tuple[Stretch, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Begun:
     """A run that is about to be followed."""
 
     track: Track
+    stretches: tuple[Stretch, ...]
     start_by_equations: Floats
     """Derivative of the start by the equations' parameters (4, e)."""
     equations_by_values: Floats
     """Derivative of the equations' parameters by all values (e, p)."""
 
 
-def _begun(trial: Trial, guess: Guess, start: Floats, reach: float, rows: int) -> _Begun:
+def _begun(run: _Run, guess: Guess, start: Floats, reach: float, rows: int) -> _Begun:
     """Begin at the rest posture of the first motor positions, plus what is free in it.
 
     A run that begins in motion begins where its first rows show it, whatever its parameters are.
     """
+    trial, stretches = run.trial, run.stretches
     found, slope = equation_parameters(guess.values, reach, trial.setup)
     zeros = guess.values[[INDEX["motor_zero1"], INDEX["motor_zero2"]]]
     slope[[MOTOR, MOTOR + 1], [INDEX["motor_zero1"], INDEX["motor_zero2"]]] = 1.0
-    motors = trial.motor_pos[:rows] + zeros
+    motors = run.motors[:rows] + zeros
     by = np.zeros((STATES, len(found)))
+    track = Track(
+        times=trial.time[:rows],
+        motors=motors[1:],
+        start=trial.first_state + start if trial.moving else start,
+        parameters=found,
+        restarts=tuple(sorted({edge for each in stretches for edge in each.edges})),
+    )
+    begun = _Begun(
+        track=track, stretches=stretches, start_by_equations=by, equations_by_values=slope
+    )
     if trial.moving:
-        first = trial.first_state + start
-        track = Track(times=trial.time[:rows], motors=motors[1:], start=first, parameters=found)
-        return _Begun(track=track, start_by_equations=by, equations_by_values=slope)
+        return begun
     stiffness, moment = found[STIFFNESS : STIFFNESS + 2], found[MOMENT : MOMENT + 2]
     rest = motors[0].copy()
     for share in SHARES:
@@ -123,8 +161,7 @@ def _begun(trial: Trial, guess: Guess, start: Floats, reach: float, rows: int) -
         by[joint, MOMENT + joint] = -np.sin(rest[joint]) / hold[joint]
         by[joint, MOTOR + joint] = stiffness[joint] / hold[joint]
     first = np.concatenate([rest + start[:2], start[2:]])
-    track = Track(times=trial.time[:rows], motors=motors[1:], start=first, parameters=found)
-    return _Begun(track=track, start_by_equations=by, equations_by_values=slope)
+    return replace(begun, track=replace(track, start=first))
 
 
 def _measured(path: Path, begun: _Begun, guess: Guess) -> Prediction:
@@ -134,16 +171,28 @@ def _measured(path: Path, begun: _Begun, guess: Guess) -> Prediction:
     seeds = by_equations.shape[-1]
     by_equations = by_equations + by_start @ begun.start_by_equations[:, :seeds]
     by_values = by_equations @ begun.equations_by_values[:seeds]
+    by_hidden = _by_hidden(path, begun)
     links, rates, delay = states[:, :2], states[:, 2:], guess.values[INDEX["delay"]]
     if delay != 0.0:
         times = begun.track.times
-        links, rates, by_values, by_start = _late(times, delay, links, rates, by_values, by_start)
+        links, rates, by_values, by_start, by_hidden = _late(
+            times, delay, links, rates, by_values, by_start, by_hidden
+        )
     by_values[:, :, INDEX["delay"]] -= rates
     for joint in (0, 1):
         zero = INDEX[f"link_zero{joint + 1}"]
         links = links + np.eye(2)[joint] * guess.values[zero]
         by_values[:, joint, zero] += 1.0
-    return Prediction(links=links, by_values=by_values, by_start=by_start)
+    return Prediction(links=links, by_values=by_values, by_start=by_start, by_hidden=by_hidden)
+
+
+def _by_hidden(path: Path, begun: _Begun) -> Floats:
+    """Derivatives of the angles of a path by what is hidden of its motors (n, 2, h)."""
+    found = [
+        by_stretch(path, each, begun.start_by_equations[:, MOTOR + each.joint])
+        for each in begun.stretches
+    ]
+    return np.stack(found, axis=-1) if found else np.zeros((len(path.states), 2, 0))
 
 
 def _late(

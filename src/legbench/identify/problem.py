@@ -1,7 +1,6 @@
 """Least-squares problem of some runs: residuals in standard deviations, and their Jacobian."""
 
-import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import final
 
@@ -28,19 +27,50 @@ class Misfit:
     """Measured less predicted (n, 2) of each run [-]."""
     jacobians: tuple[Floats, ...]
     """Derivatives of the prediction by the fit's steps (n, 2, m) of each run [-]."""
-    rounding: tuple[Floats, ...]
-    """Derivatives of the prediction by what the motors' counts hide, one for each motor, in
-    standard deviations of a rounding (n, 2, 2) of each run [-]."""
+    hidden: tuple[Floats, ...]
+    """Derivatives of the prediction by the angles that the motors' counts hide (n, 2, h) of each
+    run [-]; those of the other runs are zero."""
+    prior: Floats
+    """Those angles, which are zero but for one standard deviation, over all runs (h,) [-]."""
     cost: float
-    """Sum of squares [-]."""
+    """Sum of squares, that of the hidden angles included [-]."""
+
+    def parts(self) -> Iterator[tuple[Floats, Floats, slice]]:
+        """Yield residuals (n, 2) and derivatives (n, 2, m + h) of each run, with the columns of
+        the run's own hidden angles among all.
+        """
+        first = self.jacobians[0].shape[-1]
+        for residuals, own, hidden in zip(self.residuals, self.jacobians, self.hidden, strict=True):
+            stop = first + hidden.shape[-1]
+            yield residuals, np.concatenate([own, hidden], axis=2), slice(first, stop)
+            first = stop
 
     def normal(self) -> tuple[Floats, Floats]:
-        """Normal matrix (m, m) and right side (m,) of a Gauss-Newton step."""
-        flat = [each.reshape(-1, each.shape[-1]) for each in self.jacobians]
-        pairs = list(zip(flat, self.residuals, strict=True))
-        matrix = sum((slope.T @ slope for slope in flat), np.zeros((flat[0].shape[1],) * 2))
-        right = sum((slope.T @ each.ravel() for slope, each in pairs), np.zeros(len(matrix)))
+        """Normal matrix (m, m) and right side (m,) of a Gauss-Newton step, hidden angles last."""
+        own = self.jacobians[0].shape[-1]
+        matrix = np.diag(np.append(np.zeros(own), np.ones(len(self.prior))))
+        right = np.append(np.zeros(own), -self.prior)
+        for residuals, slopes, hidden in self.parts():
+            flat = slopes.reshape(-1, slopes.shape[-1])
+            columns = np.r_[:own, hidden]
+            matrix[np.ix_(columns, columns)] += flat.T @ flat
+            right[columns] += flat.T @ residuals.ravel()
         return matrix, right
+
+    def whole(self) -> tuple[Floats, Floats]:
+        """Residuals (rows,) and derivatives (rows, m) of all runs, hidden angles last.
+
+        The last rows say that hidden angles are zero but for one standard deviation.
+        """
+        own = self.jacobians[0].shape[-1]
+        left, found = [], []
+        for residuals, slopes, hidden in self.parts():
+            flat = np.zeros((residuals.size, own + len(self.prior)))
+            flat[:, np.r_[:own, hidden]] = slopes.reshape(residuals.size, -1)
+            left.append(residuals.ravel())
+            found.append(flat)
+        found.append(np.eye(own + len(self.prior))[own:])
+        return np.concatenate([*left, -self.prior]), np.concatenate(found)
 
 
 @final
@@ -69,21 +99,29 @@ class Problem:
         return (*self.freedom.names, *starts)
 
     def misfit(self, guess: Guess, horizon: float | None = None) -> Misfit:
-        """Compare a guess with the runs; raises PlantFault as `Predictor.predict`."""
+        """Compare a guess with the runs; raises PlantFault as `Predictor.predict`.
+
+        Angles that the motors' counts hide are unknowns over the whole run alone: a horizon is for
+        finding the way, which half a count does not bar.
+        """
         predicted = self._predictor.predict(guess, horizon)
-        residuals, jacobians, rounding = [], [], []
+        shown = horizon is None
+        residuals, jacobians, hidden = [], [], []
         for place, (trial, each) in enumerate(zip(self.trials, predicted, strict=True)):
             rows = len(each.links)
             left = (trial.joint_pos[:rows] - each.links) / trial.sigma
             residuals.append(without_rows(left, trial))
             jacobians.append(self._slope(place, trial, each, guess))
-            rounding.append(_rounding(trial, each))
-        cost = float(sum(np.sum(each * each) for each in residuals))
+            by_hidden = each.by_hidden if shown else each.by_hidden[:, :, :0]
+            hidden.append(without_rows(by_hidden / trial.sigma[:, np.newaxis], trial))
+        prior = self._prior(guess) if shown else np.zeros(0)
+        cost = float(sum(np.sum(each * each) for each in residuals) + prior @ prior)
         return Misfit(
             guess=guess,
             residuals=tuple(residuals),
             jacobians=tuple(jacobians),
-            rounding=tuple(rounding),
+            hidden=tuple(hidden),
+            prior=prior,
             cost=cost,
         )
 
@@ -105,16 +143,17 @@ class Problem:
         for name, amount in zip(self.freedom.names, step[:own].tolist(), strict=True):
             values[INDEX[name]] = moved(name, float(values[INDEX[name]]), amount)
         starts = guess.starts.copy()
-        for (run, part), amount in zip(self._starts, step[own:].tolist(), strict=True):
+        rest = step[own:].tolist()
+        for (run, part), amount in zip(self._starts, rest, strict=False):
             starts[run, part] += amount * START_SCALE[part]
-        return replace(guess, values=values, starts=starts)
+        behind = step[own + len(self._starts) :]
+        hidden = self._prior(guess) + behind if len(behind) else guess.hidden
+        return replace(guess, values=values, starts=starts, hidden=hidden)
 
-
-def _rounding(trial: Trial, each: Prediction) -> Floats:
-    """Derivatives of one run's prediction by the rounding of both motors (n, 2, 2) [-]."""
-    places = [INDEX["motor_zero1"], INDEX["motor_zero2"]]
-    hidden = np.array([motor.count for motor in trial.motors]) / math.sqrt(12.0)
-    return without_rows(each.by_values[:, :, places] * hidden / trial.sigma[:, np.newaxis], trial)
+    def _prior(self, guess: Guess) -> Floats:
+        """Hidden angles of a guess (h,), which may have none yet [-]."""
+        count = sum(len(each) for each in self._predictor.stretches)
+        return guess.hidden if len(guess.hidden) else np.zeros(count)
 
 
 def all_slopes(each: Prediction, trial: Trial, values: Floats) -> Floats:

@@ -27,52 +27,50 @@ class Spread:
     """Errors of a fit's steps, in logarithms of positive parameters and scales of the others."""
 
     white: Floats
-    """Standard errors that white noise of the encoders would give (m,) [-]."""
+    """Standard errors that white noise of the encoders, and the counts of the motors' encoders,
+    would give (m,) [-]."""
     block: Floats
     """Standard errors from the residuals in blocks (m,) [-]."""
-    rounding: Floats
-    """Standard errors from what the motors' counts hide, which stays the same in a run (m,) [-]."""
     correlation: Floats
-    """Correlation of the errors (m, m) [-]."""
+    """Correlation (m, m) of the errors that noise of the link encoders makes [-]: what the runs
+    cannot tell apart, whatever is known of the motors' counts."""
     quantile: float
     """Standard errors from an estimate to the end of its interval [-]."""
 
     @property
     def errors(self) -> Floats:
-        """Larger of the first two standard errors, and the rounding of the motors (m,) [-]."""
-        return np.hypot(np.maximum(self.white, self.block), self.rounding)
+        """Larger of both standard errors (m,) [-]."""
+        return np.maximum(self.white, self.block)
 
 
 def spread_of(misfit: Misfit, trials: Sequence[Trial]) -> Spread:
     """Errors of the parameters at the end of a fit."""
     matrix, _ = misfit.normal()
-    size = np.sqrt(np.diag(matrix))
-    inverse = np.linalg.inv(matrix / np.outer(size, size)) / np.outer(size, size)
-    scores = np.concatenate(
-        [
-            _scores(residuals, slopes, trial)
-            for residuals, slopes, trial in zip(
-                misfit.residuals, misfit.jacobians, trials, strict=True
-            )
-        ]
-    )
+    own = len(matrix) - len(misfit.prior)
+    inverse, alone = _inverse(matrix), _inverse(matrix[:own, :own])
+    # What is known of a hidden angle beforehand is a block of its own.
+    blocks = [np.diag(np.append(np.zeros(own), -misfit.prior))[own:]]
+    for (residuals, slopes, hidden), trial in zip(misfit.parts(), trials, strict=True):
+        found = _scores(residuals, slopes, trial)
+        blocks.append(np.zeros((len(found), len(matrix))))
+        blocks[-1][:, np.r_[:own, hidden]] = found
+    scores = np.concatenate(blocks)
     count = len(scores)
     freedom = max(count - len(matrix), 3)
     middle = scores.T @ scores * (count / freedom)
     sandwich = inverse @ middle @ inverse
-    white = np.sqrt(np.diag(inverse))
-    hidden = [
-        np.einsum("njm,njr->mr", slopes, rounding)
-        for slopes, rounding in zip(misfit.jacobians, misfit.rounding, strict=True)
-    ]
-    moved = inverse @ np.concatenate(hidden, axis=1)
     return Spread(
-        white=white,
+        white=np.sqrt(np.diag(inverse)),
         block=np.sqrt(np.diag(sandwich)),
-        rounding=np.linalg.norm(moved, axis=1),
-        correlation=inverse / np.outer(white, white),
+        correlation=alone / np.sqrt(np.outer(np.diag(alone), np.diag(alone))),
         quantile=float(student.ppf(0.5 + 0.5 * LEVEL, freedom)),
     )
+
+
+def _inverse(matrix: Floats) -> Floats:
+    """Inverse of a normal matrix whose unknowns have scales of their own (m, m)."""
+    size = np.sqrt(np.diag(matrix))
+    return np.linalg.inv(matrix / np.outer(size, size)) / np.outer(size, size)
 
 
 def _scores(residuals: Floats, slopes: Floats, trial: Trial) -> Floats:

@@ -7,6 +7,7 @@ A stage that fails ends it: hopeless data are not fitted, and what cannot be see
 """
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -16,7 +17,7 @@ from legbench.analytic.terms import Bars
 from legbench.design import LegDesign
 from legbench.errors import ConfigError, PlantFault
 from legbench.identify.adequacy import residuals_of, scores_of
-from legbench.identify.alternatives import explain
+from legbench.identify.alternatives import OtherBars, explain
 from legbench.identify.base import Leg, mended
 from legbench.identify.checks import Finding, check_data
 from legbench.identify.estimates import estimates_of
@@ -27,10 +28,12 @@ from legbench.identify.outcome import Outcome
 from legbench.identify.parameters import INDEX, Freedom
 from legbench.identify.prediction import Guess, nothing_moved
 from legbench.identify.problem import Misfit, Problem
+from legbench.identify.regression import regressed
 from legbench.identify.spread import spread_of
 from legbench.identify.trial import Trial
 from legbench.identify.verdict import reasons_against
 from legbench.identify.wiring import check_wiring
+from legbench.mjcf.fitting import fitted_bar_density
 
 ALIKE: Final = 0.99
 """Correlation from which two parameters are told to be hard to tell apart [-]."""
@@ -57,7 +60,7 @@ class Question:
     bars: Bars | None = None
     """Bars of the linkage; none: they weigh nothing."""
     starts: int = 3
-    """Number of starts of the fit, the first from the design."""
+    """Number of starts of the fit: from the design, from a regression, and from legs beside it."""
     seed: int = 0
     """Source of the further starts."""
 
@@ -73,6 +76,17 @@ class Question:
     def leg(self) -> Leg:
         """Leg that the fit starts from."""
         return Leg.of(self.design, bars=self.bars, mass=self.mass)
+
+    @property
+    def other_bars(self) -> OtherBars | None:
+        """The leg with bars as they usually are, or without; none: it is too light for them."""
+        held = 0.0 if self.bars is None else self.bars.density
+        try:
+            bars = None if held else Bars(density=fitted_bar_density(self.design))
+        except ConfigError:
+            return None
+        leg = Leg.of(self.design, bars=bars, mass=self.mass)
+        return OtherBars(held=held, density=0.0 if bars is None else bars.density, leg=leg)
 
 
 def identify(question: Question, say: Say = lambda _: None) -> Outcome:
@@ -131,7 +145,7 @@ def _judged(question: Question, problem: Problem, misfit: Misfit, begun: Outcome
         misfit=misfit,
         residuals=tuple(residuals_of(misfit, trials)),
         scores=tuple(scores),
-        alternatives=tuple(explain(problem, misfit, scores)),
+        alternatives=tuple(explain(problem, misfit, scores, question.other_bars)),
         held_out=tuple(hold_out(each, misfit.guess, problem.reach) for each in question.held_out),
     )
     return replace(outcome, reasons=tuple(reasons_against(outcome)))
@@ -150,14 +164,26 @@ def _findings(question: Question, leg: Leg) -> list[Finding]:
 
 
 def fits_from(problem: Problem, guess: Guess, starts: int, seed: int = 0) -> list[Fit]:
-    """Fits from a guess and from legs beside it; raises PlantFault where the first cannot be."""
+    """Fits from a guess, from what a regression makes of the runs, and from legs beside it.
+
+    Args:
+        problem: the runs, and what is free.
+        guess: first start; further ones are beside the second, which hardly depends on it.
+        starts: number of starts.
+        seed: source of those that are drawn.
+
+    Raises:
+        PlantFault: no leg can be predicted from the guess.
+    """
     found = [fit(problem, guess)]
+    near = regressed(problem.trials, guess, problem.freedom, problem.reach) or guess
     random = np.random.default_rng(seed)
-    for _ in range(starts - 1):
-        try:
-            found.append(fit(problem, beside(guess, problem.freedom, problem.reach, random, APART)))
-        except PlantFault:
-            continue
+    for place in range(starts - 1):
+        other = near
+        if place or near is guess:
+            other = beside(near, problem.freedom, problem.reach, random, APART)
+        with suppress(PlantFault):
+            found.append(fit(problem, other))
     return found
 
 

@@ -148,8 +148,8 @@ def _check_setup(run: RunDescription, name: str) -> None:
         )
     if run.setup.boom_radius is not None:
         raise ConfigError(
-            f"{name} is on a boom of {run.setup.boom_radius:g} m, which the equations do not know; "
-            "learn from runs without one"
+            f"{name} is on a boom of {run.setup.boom_radius:g} m, which the equations of a fit do "
+            "not know; learn from runs without one"
         )
 
 

@@ -6,7 +6,9 @@ from typing import final
 
 from legbench.errors import PlantFault
 from legbench.limits.knee import knee_of, project
-from legbench.limits.plausibility import LinkWatch, MotorWatch
+from legbench.limits.momentum import LegMomentum, Reading
+from legbench.limits.momentum_watch import MomentumWatch
+from legbench.limits.plausibility import Doubt, LinkWatch, MotorWatch
 from legbench.limits.safety import START_TOLERANCE, UNLIMITED, SafetyLimits
 from legbench.limits.shortfall import Shortfall
 
@@ -30,6 +32,7 @@ class Guard:
         *,
         known: Sequence[frozenset[str]] = (ALL, ALL),
         two_encoders: bool = True,
+        momentum: LegMomentum | None = None,
     ) -> None:
         """Watch over a leg.
 
@@ -40,6 +43,7 @@ class Guard:
                 spring_torque. Limits of others do not act.
             two_encoders: every axis has an encoder on both sides of its spring, without which
                 their readings cannot be held against each other.
+            momentum: what the leg's angular momentum obeys; without it `link_error` does not act.
         """
         self._limits = limits
         self._loads = tuple("spring_torque" in names for names in known)
@@ -53,6 +57,10 @@ class Guard:
         bounds = limits.bounds(period)
         self._motors = tuple(MotorWatch(bounds) for _ in limits.motor_range)
         self._links = LinkWatch(bounds)
+        self._period = period
+        self._momentum = None
+        if momentum is not None and limits.link_error is not None:
+            self._momentum = MomentumWatch(momentum, limits.link_error, period)
         self.applied: tuple[float, ...] = ()
         self.shortfall = Shortfall(period)
 
@@ -63,6 +71,8 @@ class Guard:
         for watch, value in zip(self._motors, self.applied, strict=False):
             watch.start_at(value)
         self._links.start()
+        if self._momentum is not None:
+            self._momentum.start()
         self.shortfall.restart()
 
     def restart_from_applied(self) -> None:
@@ -190,6 +200,7 @@ class Guard:
         temperature: Sequence[float | None] = (),
         fresh: Sequence[bool] = (True, True),
         elapsed: int = 1,
+        interval: float | None = None,
         led_pos: Sequence[float] | None = None,
     ) -> None:
         """Look at what a cycle showed.
@@ -202,6 +213,7 @@ class Guard:
             temperature: of each drive, None if it is not known [deg C].
             fresh: which drives have told something new in this cycle.
             elapsed: periods since the cycle before.
+            interval: time since the cycle before, by default these periods [s].
             led_pos: positions that the drives' loops lead; by default those of the motors [rad].
 
         Raises:
@@ -218,7 +230,8 @@ class Guard:
                 self._refuse_temperatures(temperature)
         if expected_pos is not None:
             led = motor_pos if led_pos is None else led_pos
-            self._check_encoders(led, joint_pos, expected_pos, fresh, elapsed)
+            after = elapsed * self._period if interval is None else interval
+            self._check_encoders(led, joint_pos, expected_pos, fresh, elapsed, after)
 
     def _refuse_torques(self, spring_torque: Sequence[float]) -> None:
         """Raise PlantFault for the first known torque beyond its limit; none if all are unknown."""
@@ -274,6 +287,7 @@ class Guard:
         expected_pos: Sequence[float],
         fresh: Sequence[bool],
         elapsed: int,
+        interval: float,
     ) -> None:
         found = None
         for axis, watch in enumerate(self._motors):
@@ -281,9 +295,29 @@ class Guard:
         doubt = None
         if self._two_encoders:
             doubt = self._links.see(motor_pos, joint_pos, expected_pos, fresh, elapsed)
+            doubt = doubt or self._check_momentum(motor_pos, joint_pos, fresh, interval)
         if found is None and doubt is not None:
             # A motor that is not where it should be makes the springs sway, too: it is the cause.
             suspects = [watch.suspicion for watch in self._motors if watch.suspicion is not None]
             found = suspects[0] if suspects else doubt
         if found is not None:
             raise PlantFault(found.cause, found.message)
+
+    def _check_momentum(
+        self,
+        motor_pos: Sequence[float],
+        joint_pos: Sequence[float],
+        fresh: Sequence[bool],
+        interval: float,
+    ) -> Doubt | None:
+        """Ask the leg's momentum, where a sway may hide an encoder that is wrong."""
+        watch = self._momentum
+        if watch is None:
+            return None
+        if not (all(fresh) and self._links.hides_drift):
+            watch.restart()
+            return None
+        motor_1, motor_2 = motor_pos
+        joint_1, joint_2 = joint_pos
+        reading = Reading(interval, (motor_1, motor_2), (joint_1, joint_2))
+        return watch.see(reading, stands=self._links.stands)

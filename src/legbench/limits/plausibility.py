@@ -24,6 +24,9 @@ SWAY_MEMORY = 5.0
 """Time constant in which a sway is forgotten: a dozen hops, each of which may swing it on [s]."""
 SWAY_GROWTH = 1.5
 """A leg that sways may sway so much more, relative to what it did [-]."""
+HIDDEN = 0.1
+"""Bound of a sway from which on a drift may hide in it [rad]: a leg with this bound sways by 0.03
+rad, and 1 rad/s takes 0.13 s to both together."""
 POLAR_GAIN = 10.0
 """What a command along the polar mode may cause there, relative to it, in resonance [-]."""
 
@@ -109,6 +112,9 @@ class LinkWatch:
     the seconds before, since a hop in place sways more from hop to hop, and with what is commanded
     along the polar mode, such as a jog of one motor: a leg that is led along it is not watched in
     this way. The references follow what lasts, such as an offset or the weight.
+
+    Attributes:
+        stands: one link stands while the other one swings, as it may in a leg that sways.
     """
 
     def __init__(self, bounds: Bounds) -> None:
@@ -122,6 +128,7 @@ class LinkWatch:
         self._restart()
 
     def _restart(self) -> None:
+        self.stands = False
         self._last: list[float] = []
         self._silent = [0, 0]
         self._sway_age = 0
@@ -136,6 +143,11 @@ class LinkWatch:
     def start(self) -> None:
         """Begin anew with whatever is shown next."""
         self._restart()
+
+    @property
+    def hides_drift(self) -> bool:
+        """Whether the leg may sway so far that a drift of an encoder would be found too late."""
+        return self._bounds.sway + self._widening > HIDDEN
 
     def see(
         self,
@@ -212,6 +224,7 @@ class LinkWatch:
     ) -> Doubt | None:
         if not (self._watches_standing and all(fresh)):
             return None
+        self.stands = False
         for place in (0, 1):
             self._links[place].append(joint_pos[place])
             self._springs[place].append(joint_pos[place] - motor_pos[place])
@@ -222,8 +235,9 @@ class LinkWatch:
             return None
         ranges = (_range(self._links[0]), _range(self._links[1]))
         for place in (0, 1):
-            if ranges[place] > STANDING_BAND or ranges[1 - place] <= limit:
+            if ranges[place] > STANDING_BAND or ranges[1 - place] <= self._bounds.standing:
                 continue
+            self.stands = True
             # A link that its motor merely carries along pulls at nothing: the spring must work.
             moved = min(ranges[1 - place], _range(self._springs[1 - place]))
             if moved > limit:

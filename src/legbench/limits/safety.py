@@ -74,6 +74,9 @@ class SafetyLimits:
     """Consecutive missed ticks that end the run."""
     lost_frames: int = 3
     """Consecutive cycles without a drive's process data that end the run."""
+    link_error: float | None = None
+    """Angle by which a link encoder may contradict spring torques and momentum of a leg that sways
+    too much for `sway`; beyond it the run ends [rad]."""
     waive: tuple[str, ...] = ()
     """Limits that may exceed their usual upper end, by name; every run says so."""
 
@@ -103,6 +106,7 @@ class SafetyLimits:
             ("joint_speed", self.joint_speed, "rad/s"),
             ("standing", self.standing, "rad"),
             ("sway", self.sway, "rad"),
+            ("link_error", math.inf if self.link_error is None else self.link_error, "rad"),
             ("temperature", self.temperature, "deg C"),
             ("following_cycles", self.following_cycles, "cycles"),
             ("overrun_cycles", self.overrun_cycles, "cycles"),

@@ -18,6 +18,7 @@ LIMIT_ENDS: Mapping[str, tuple[float, float, str]] = {
     "joint_speed": (200.0, 1000.0, "rad/s"),
     "standing": (0.2, 6.3, "rad"),
     "sway": (0.5, 6.3, "rad"),
+    "link_error": (0.1, 6.3, "rad"),
     "temperature": (120.0, 200.0, "deg C"),
     "overrun_cycles": (50, 5000, "cycles"),
     "lost_frames": (50, 5000, "cycles"),
@@ -26,7 +27,8 @@ LIMIT_ENDS: Mapping[str, tuple[float, float, str]] = {
 
 No geared servo turns a joint at 200 rad/s, 1 900 rpm. A step of 1 rad or an error of 0.5 rad is
 half or a quarter of a joint's whole range; a link that stands while the other one moves by 0.2 rad,
-or sways by 0.5 rad, is nearly as far from where it should be. Springs of 3 to 5 N m/rad that carry
+or sways by 0.5 rad, is nearly as far from where it should be. A link encoder that is wrong by 0.1
+rad drifts for longer than a drift may last. Springs of 3 to 5 N m/rad that carry
 50 N m are wound by more than a turn. Insulation of class E ends at 120 deg C. 50 cycles are half of
 the time in which drives stop that have lost their master. A waived limit still acts within seconds.
 """

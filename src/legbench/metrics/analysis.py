@@ -63,6 +63,10 @@ class Analysis:
         self._signals[name] = found
         return found
 
+    def forget(self) -> None:
+        """Forget the signals that are kept: they make room, and are read again when asked for."""
+        self._signals.clear()
+
     def _make_room(self, size: int) -> None:
         """Forget the signals that have not been asked for the longest."""
         kept = sum(each.nbytes for each in self._signals.values())

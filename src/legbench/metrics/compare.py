@@ -92,6 +92,8 @@ def compare(recording: Recorded, other: Recorded) -> Comparison:
         RecordingError: they have no time in common.
     """
     run, other = analysed(recording), analysed(other)
+    for each in (run, other):
+        _measure(each)
     apart = differences(run, other)
     landing = first_touchdown(run, other)
     before = apart.time < landing
@@ -111,6 +113,14 @@ def compare(recording: Recorded, other: Recorded) -> Comparison:
         **_flights(run.gait, other.gait),
         **_ratings(run, other),
     )
+
+
+def _measure(run: Analysis) -> None:
+    """Find phases and ratings, which are kept, and forget the signals: of two long runs only one at
+    a time has them in memory.
+    """
+    _ = run.gait, run.ratings
+    run.forget()
 
 
 def differences(recording: Recorded, other: Recorded) -> Differences:
@@ -133,7 +143,8 @@ def differences(recording: Recorded, other: Recorded) -> Differences:
         raise RecordingError(f"{recording.path} and {other.path} have no time in common: {spans}")
     ours, theirs = (_at(time, run) for run in runs)
     convention = recording.description.convention
-    z2 = [joint_to_modal(joint, convention)[:, 1] for joint in (ours, theirs)]
+    # Copies, as a view of the second coordinate keeps the first.
+    z2 = [joint_to_modal(joint, convention)[:, 1].copy() for joint in (ours, theirs)]
     return Differences(time=time, joint=theirs - ours, z2=z2[1] - z2[0])
 
 

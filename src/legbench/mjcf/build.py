@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 
 from legbench.design import LegDesign, Segment
+from legbench.design.rig import AXIAL_SHARE, TRUNK_COM_HEIGHT, TRUNK_INERTIA
 from legbench.design.setup import SetupKind
 from legbench.design.statics import GRAVITY
 from legbench.errors import ConfigError
@@ -97,8 +98,8 @@ def _add_trunk(
     trunk = spec.worldbody.add_body(name="trunk", pos=base)
     trunk.explicitinertial = True
     trunk.mass = _trunk_mass(design, options.linkage)
-    trunk.ipos = np.array([0.0, 0.0, 0.03])
-    trunk.inertia = np.array([5e-4, 7e-4, 7e-4])
+    trunk.ipos = np.array([0.0, 0.0, TRUNK_COM_HEIGHT])
+    trunk.inertia = np.array(TRUNK_INERTIA)
     trunk.add_site(name="hip", size=[0.004] * 3, group=3)
     if not setup.trunk_moves:
         return
@@ -155,7 +156,7 @@ def _set_inertia(body: mujoco.MjsBody, segment: Segment) -> None:
     body.explicitinertial = True
     body.mass = segment.mass
     body.ipos = np.array([0.0, 0.0, -segment.com])
-    body.inertia = segment.inertia * np.array([1.0, 1.0, 0.1])
+    body.inertia = segment.inertia * np.array([1.0, 1.0, AXIAL_SHARE])
 
 
 def _add_springs(spec: mujoco.MjSpec, design: LegDesign, kind: LinkageKind) -> None:

@@ -3,6 +3,7 @@
 import mujoco
 import numpy as np
 
+from legbench.design.rig import PIN_MASS
 from legbench.design.setup import Setup, SetupKind
 from legbench.mjcf.linkage import connect_sites
 from legbench.mjcf.look import add_table, add_tip
@@ -59,7 +60,7 @@ def _add_pin(spec: mujoco.MjSpec, setup: Setup, numerics: Numerics) -> None:
     """Hold the tip at the origin; on a boom the pin slides sideways, as the trunk's arc asks."""
     pin = spec.worldbody.add_body(name="pin")
     if setup.boom_radius:
-        pin.explicitinertial, pin.mass = True, 0.001
+        pin.explicitinertial, pin.mass = True, PIN_MASS
         pin.ipos, pin.inertia = np.zeros(3), np.full(3, 1e-7)
         pin.add_joint(name="pin_y", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0.0, 1.0, 0.0])
     pin.add_site(name="pin", size=[0.004] * 3, group=3)

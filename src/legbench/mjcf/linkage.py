@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 
 from legbench.design import LegDesign
+from legbench.design.rig import AXIAL_SHARE
 from legbench.mjcf.options import Linkage, Numerics
 
 HINGE_AXIS = (0.0, -1.0, 0.0)
@@ -27,7 +28,7 @@ def _rod(body: mujoco.MjsBody, density: float, length: float) -> None:
     body.mass = density * length
     body.ipos = np.array([0.0, 0.0, -0.5 * length])
     inertia = body.mass * length**2 / 12.0
-    body.inertia = inertia * np.array([1.0, 1.0, 0.1])
+    body.inertia = inertia * np.array([1.0, 1.0, AXIAL_SHARE])
 
 
 def add_bars(spec: mujoco.MjSpec, design: LegDesign, linkage: Linkage, numerics: Numerics) -> None:

@@ -154,6 +154,8 @@ class Numerics:
         Raises:
             ConfigError: no step or no bar suits one of them.
         """
+        if self.timestep is not None and self.loop_solref is not None:
+            return self
         step = self.timestep
         if step is None:
             parts, name = max((linkage.parts_of_step(design), design.name) for design in designs)

@@ -4,10 +4,11 @@ import mujoco
 import numpy as np
 
 from legbench.design import LegDesign
+from legbench.design.rig import BOOM_BEND
 from legbench.kinematics import leg_points
 from legbench.signals import Floats
 
-BENT = np.array([-0.6, 0.6])
+BENT = np.array([-BOOM_BEND, BOOM_BEND])
 """Posture of the keyframe `bent` [rad]; qpos0 is the straight leg, where the loops are singular."""
 
 
@@ -31,15 +32,20 @@ def rest_qpos(model: mujoco.MjModel, design: LegDesign, joint_pos: Floats) -> Fl
         "bar_shank": q2 - q1,
     }
     tip = leg_points(np.asarray(joint_pos, dtype=np.float64), design.lengths)[3]
-    joints = {model.joint(index).name: index for index in range(model.njnt)}
-    if "boom_yaw" in joints:
-        angles |= _boom_angles(model, joints["boom_yaw"], tip)
+    if (yaw_joint := _joint(model, "boom_yaw")) >= 0:
+        angles |= _boom_angles(model, yaw_joint, tip)
     else:
         angles |= {"trunk_x": -tip[0], "trunk_z": -tip[1]}
     qpos = np.array(model.qpos0)
-    for name in angles.keys() & joints.keys():
-        qpos[model.jnt_qposadr[joints[name]]] = angles[name]
+    for name, angle in angles.items():
+        if (joint := _joint(model, name)) >= 0:
+            qpos[model.jnt_qposadr[joint]] = angle
     return qpos
+
+
+def _joint(model: mujoco.MjModel, name: str) -> int:
+    """Index of a joint; -1 for one that the model lacks. Named views take ten times as long."""
+    return mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
 
 
 def _boom_angles(model: mujoco.MjModel, yaw_joint: int, tip: Floats) -> dict[str, float]:

@@ -2,19 +2,22 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import final
 
 import numpy as np
 
 from legbench.analytic import HybridLeg, LegModel, LegState, Regime, Transition, standing
+from legbench.analytic.boom import Boom
 from legbench.analytic.losses import Losses
 from legbench.analytic.smooth import Accuracy
-from legbench.analytic.terms import Bars
+from legbench.analytic.terms import Bars, bodies_of
 from legbench.design import LegDesign
+from legbench.design.rig import BOOM_BEND
 from legbench.design.setup import Setup, SetupKind
 from legbench.design.statics import GRAVITY
 from legbench.encoders import EncoderErrors
-from legbench.errors import ConfigError, PlantFault
+from legbench.errors import PlantFault
 from legbench.imperfections import Imperfections
 from legbench.mjcf.options import BuildOptions
 from legbench.plant.abstract import AbstractPlant
@@ -24,8 +27,6 @@ from legbench.signals import Command, Floats, Observation, Truth
 
 STRAIGHT_MARGIN = 0.02
 """Distance of a knee from 0 or pi at which it has gone through its stop [rad]."""
-HANGING_BEND = 0.6
-"""Half angle of the standing leg whose hip is as high as a fixed trunk [rad]."""
 
 
 @final
@@ -43,8 +44,8 @@ class AnalyticPlant(AbstractPlant):
         transitions: touchdowns and lift-offs since the reset, in order.
 
     Raises:
-        ConfigError: a setup with a boom, which these equations do not know, or imperfections that
-            leave no leg or need another setup.
+        ConfigError: a boom that is shorter than the leg, or imperfections that leave no leg or
+            need another setup.
     """
 
     def __init__(
@@ -59,18 +60,16 @@ class AnalyticPlant(AbstractPlant):
         imperfections: Imperfections = PERFECT,
         seed: int = 0,
     ) -> None:
-        if setup.boom_radius is not None:
-            raise ConfigError(
-                f"the analytic plant has no boom (boom_radius {setup.boom_radius:g} m): leave it "
-                "out, or use the simulated plant"
-            )
         self.period = PERIOD
         self.transitions: list[Transition] = []
         gravity = 0.0 if setup.kind is SetupKind.HFTS else GRAVITY
         BuildOptions(setup=setup).built(imperfections)
         built = imperfections.leg_of(design)
-        losses = Losses.of(imperfections)
-        self._model = LegModel.of(built, gravity=gravity, bars=bars, losses=losses)
+        boom = _boom(built, setup, bars, imperfections, gravity)
+        # The guide of a boom is damped at its pivot.
+        joints = imperfections if boom is None else replace(imperfections, guide_damping=None)
+        losses = Losses.of(joints)
+        self._model = LegModel.of(built, gravity=gravity, bars=bars, losses=losses, boom=boom)
         self._leg = HybridLeg(self._model, accuracy)
         self._setup, self._start = setup, start
         self._servo = Servo(servo or ServoConfig(), PERIOD, imperfections)
@@ -124,7 +123,7 @@ class AnalyticPlant(AbstractPlant):
         q = (float(self._start.joint_pos[0]), float(self._start.joint_pos[1]))
         if self._setup.trunk_moves:
             return standing(self._model, q, pinned=self._setup.kind is SetupKind.FFS)
-        height = 2.0 * self._model.floating.reach * math.cos(HANGING_BEND)
+        height = _bent_height(self._model.floating.reach)
         return LegState(
             time=0.0,
             regime=Regime.HANGING,
@@ -158,8 +157,14 @@ class AnalyticPlant(AbstractPlant):
         force = (0.0, 0.0)
         if state.regime.stands:
             motor = (float(self._shaft[0]), float(self._shaft[1]))
-            force, tip = model.stance_force(motor, state.q, state.v), (tip[0], 0.0)
-        if state.regime is Regime.HANGING:
+            hip = model.hip_over_foot(state.q)
+            force, tip = (
+                model.stance_force(motor, state.q, state.v),
+                (state.trunk_pos[0] - hip[0], 0.0),
+            )
+        if model.boom is not None:
+            energy = model.boom.energy(state.q, state.v)
+        elif state.regime is Regime.HANGING:
             energy = model.pair_energy(model.hanging, state.q, state.v)
         else:
             energy = model.floating_energy(state.trunk_pos[1], state.trunk_vel, state.q, state.v)
@@ -172,3 +177,32 @@ class AnalyticPlant(AbstractPlant):
             energy=np.array(energy),
             loop_gap=np.zeros(2),
         )
+
+
+def _boom(
+    design: LegDesign,
+    setup: Setup,
+    bars: Bars | None,
+    imperfections: Imperfections,
+    gravity: float,
+) -> Boom | None:
+    """Boom of a leg as it was built, where the setup has one."""
+    if setup.boom_radius is None:
+        return None
+    setup.check_boom(design)
+    bodies, reach = bodies_of(design, bars), design.lengths[1]
+    trunk_mass = design.total_mass - sum(body.mass for body in bodies)
+    return Boom(
+        bodies,
+        trunk_mass,
+        reach,
+        radius=setup.boom_radius,
+        height=_bent_height(reach),
+        gravity=gravity,
+        guide=imperfections.guide_damping or (0.0, 0.0),
+    )
+
+
+def _bent_height(reach: float) -> float:
+    """Height of a hip that is held, or carried by a level boom [m]."""
+    return 2.0 * reach * math.cos(BOOM_BEND)

@@ -22,7 +22,7 @@ class AnalyticChoice:
         """Open the leg of the equations.
 
         Raises:
-            ConfigError: the limits are looser than the design, or the setup has a boom.
+            ConfigError: the limits are looser than the design, or the boom is shorter than the leg.
         """
         make = load_text("legbench.plant.analytic:AnalyticPlant")
         accuracy = load_text("legbench.analytic.smooth:Accuracy")()

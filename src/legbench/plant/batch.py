@@ -13,10 +13,11 @@ from legbench.design import LegDesign
 from legbench.encoders import EncoderErrors
 from legbench.errors import ConfigError
 from legbench.imperfections import Imperfections
-from legbench.mjcf import BuildOptions, bare_model, rest_qpos
+from legbench.mjcf import BuildOptions
 from legbench.mjcf.messages import silence
 from legbench.plant.abstract import AbstractPlant
 from legbench.plant.backlash import Backlash
+from legbench.plant.leg_models import batch_of
 from legbench.plant.observe import (
     LiveArrays,
     Observer,
@@ -76,17 +77,15 @@ class BatchPlant(AbstractPlant):
         built = [each.leg_of(design) for each, design in zip(flaws, designs, strict=True)]
         # Legs in step share the step of the one that needs the finest.
         options = replace(options, numerics=options.numerics.fitted(built, options.linkage))
-        models = _models(built, options, flaws)
-        self.model = models[0]
+        legs = [(leg, options.built(each)) for leg, each in zip(built, flaws, strict=True)]
         self.threads = threads or os.cpu_count() or 1
-        self._batch = batch.Batch(models[0], nsim=count, nthread=self.threads)
-        self._batch.set_models(models)
+        self._batch, self.model, self._start_qpos = batch_of(
+            legs, designs, start.joint_pos, self.threads
+        )
         self._start = start
-        rows = zip(models, designs, start.joint_pos, strict=True)
-        self._start_qpos = np.array([rest_qpos(*row) for row in rows])
         self._servo = Servo(servo, PERIOD, flaws)
         self._errors, self._backlash = EncoderErrors(flaws, chosen), Backlash(flaws)
-        substeps = round(PERIOD / models[0].opt.timestep)
+        substeps = round(PERIOD / self.model.opt.timestep)
         self._rounds, self._at_once = (1, substeps) if self._backlash.none else (substeps, 1)
         self._arrays = LiveArrays(
             qpos=self._batch.bind("qpos"),
@@ -96,7 +95,7 @@ class BatchPlant(AbstractPlant):
             energy=self._batch.bind("energy"),
         )
         believed = np.array([design.stiffness for design in designs])
-        self._observer = Observer(models[0], self._arrays, believed, self._servo, self._errors)
+        self._observer = Observer(self.model, self._arrays, believed, self._servo, self._errors)
         self._cycle = 0
         self._forget_faults()
 
@@ -187,15 +186,3 @@ def _check(
     ):
         if length != count:
             raise ConfigError(f"{length} {what} for {count} designs; each leg needs one")
-
-
-def _models(
-    built: Sequence[LegDesign], options: BuildOptions, imperfections: Sequence[Imperfections]
-) -> list[mujoco.MjModel]:
-    """Compiled model of each leg as it was built; equal ones share one."""
-    legs = [
-        (design, options.built(flaws)) for design, flaws in zip(built, imperfections, strict=True)
-    ]
-    dry = any(any(each.friction) for _, each in legs)
-    compiled = {leg: bare_model(*leg, dry=dry) for leg in dict.fromkeys(legs)}
-    return [compiled[leg] for leg in legs]

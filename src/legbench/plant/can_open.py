@@ -29,6 +29,7 @@ from legbench.plant.design_limits import joint_ranges, limits_events, limits_wit
 from legbench.plant.emulated_leg import EmulatedLeg
 from legbench.plant.gone_drive import gone_drive
 from legbench.plant.landing import End
+from legbench.plant.leg_momentum import momentum_on
 from legbench.plant.limits_file import limits_for
 from legbench.plant.opening import Leg, OpenPlant
 from legbench.plant.start import PERIOD
@@ -67,7 +68,12 @@ def open_can(choice: CanChoice, leg: Leg) -> OpenPlant:
     session = open_session(config, choice, leg, leads=not choice.read_only)
     try:
         granted = session.request_realtime()
-        link = session.link(limits, leg.design.stiffness, read_only=choice.read_only)
+        link = session.link(
+            limits,
+            leg.design.stiffness,
+            read_only=choice.read_only,
+            momentum=momentum_on(config, leg.design, leg.options.setup, leg.imperfections),
+        )
         link.open()
     except BaseException:
         session.close()

@@ -8,6 +8,7 @@ from typing import Any
 from legbench.design import LegDesign
 from legbench.drives.setup.waivers import describe_waivers
 from legbench.errors import ConfigError
+from legbench.guests import load_text
 from legbench.limits.knee import Range
 from legbench.limits.safety import UNLIMITED, SafetyLimits
 from legbench.limits.shortfall import Shortfall
@@ -70,7 +71,15 @@ def open_limited(plant: AbstractPlant, limits: SafetyLimits | None, leg: Leg) ->
         return OpenPlant(plant=plant)
     limits = limits_within(limits, leg.design)
     _check_servo(leg.servo, limits)
-    limited = LimitedPlant(plant, limits, delay_cycles=leg.servo.delay_cycles)
+    counts = leg.servo.encoder_counts
+    momentum = load_text("legbench.plant.leg_momentum:momentum_of")(
+        leg.design,
+        leg.options.setup,
+        0.0 if counts is None else 2.0 * math.pi / counts,
+        leg.imperfections,
+    )
+    delay = leg.servo.delay_cycles
+    limited = LimitedPlant(plant, limits, delay_cycles=delay, momentum=momentum)
     waived = describe_waivers(None, limits)
     return OpenPlant(
         plant=limited,

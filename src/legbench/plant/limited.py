@@ -8,6 +8,7 @@ from typing import final
 import numpy as np
 
 from legbench.limits.guard import Guard
+from legbench.limits.momentum import LegMomentum
 from legbench.limits.safety import SafetyLimits
 from legbench.limits.shortfall import Shortfall
 from legbench.plant.abstract import AbstractPlant
@@ -24,12 +25,24 @@ class LimitedPlant(AbstractPlant):
     """
 
     def __init__(
-        self, plant: AbstractPlant, limits: SafetyLimits, *, delay_cycles: int = 0
+        self,
+        plant: AbstractPlant,
+        limits: SafetyLimits,
+        *,
+        delay_cycles: int = 0,
+        momentum: LegMomentum | None = None,
     ) -> None:
-        """Wrap a plant whose motors react `delay_cycles` late; it is closed with this one."""
+        """Wrap a plant.
+
+        Args:
+            plant: one leg, closed with this plant.
+            limits: what it may do.
+            delay_cycles: number of cycles that its motors react late.
+            momentum: what its angular momentum obeys; without it `link_error` does not act.
+        """
         self.period = plant.period
         self._plant, self._delay = plant, delay_cycles
-        self._guard = Guard(limits, plant.period)
+        self._guard = Guard(limits, plant.period, momentum=momentum)
         self._expected: deque[tuple[float, ...]] = deque()
 
     def reset(self) -> Observation:

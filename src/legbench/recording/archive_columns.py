@@ -4,6 +4,7 @@ import shutil
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from tempfile import mkdtemp
+from types import MappingProxyType
 from typing import Any, Final, final
 from weakref import finalize
 
@@ -71,6 +72,51 @@ class ArchiveColumns(Mapping[str, np.ndarray]):
             raise RecordingError(f"{self._path} is damaged: {reason(error)}") from error
 
 
+@final
+class ArchiveRows(Mapping[str, np.ndarray]):
+    """Consecutive rows of the columns of a long run, decoded when they are asked for."""
+
+    def __init__(self, columns: "ArchiveColumns | ArchiveRows", rows: slice) -> None:
+        """Take rows, whose slice has step one, of columns."""
+        self._columns = columns
+        self._first, self._stop, _ = rows.indices(columns.rows)
+        self.rows = max(0, self._stop - self._first)
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """Values of a column (n,), read-only; a copy, so that the rest of it is not kept."""
+        values = self._columns[name][self._first : self._stop].copy()
+        values.flags.writeable = False
+        return values
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._columns
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._columns)
+
+    def __len__(self) -> int:
+        return len(self._columns)
+
+    def windows(self, rows: int) -> Iterator[dict[str, np.ndarray]]:
+        """All columns of consecutive rows, at most `rows` of them at a time."""
+        first = 0
+        for part in self._columns.windows(rows):
+            count = len(next(iter(part.values()), ()))
+            begin, end = max(self._first - first, 0), min(self._stop - first, count)
+            if begin < end:
+                yield {name: values[begin:end] for name, values in part.items()}
+            first += count
+            if first >= self._stop:
+                return
+
+
+def rows_of(columns: Mapping[str, np.ndarray], rows: slice) -> Mapping[str, np.ndarray]:
+    """Return consecutive rows of columns; those that are in a file stay there."""
+    if isinstance(columns, ArchiveColumns | ArchiveRows):
+        return ArchiveRows(columns, rows)
+    return MappingProxyType({name: values[rows] for name, values in columns.items()})
+
+
 def spooled(stream: WholeBatches, manifest: Mapping[str, Any]) -> ArchiveColumns:
     """Columns of a long stream, through an archive that lives as long as they do.
 
@@ -101,7 +147,7 @@ def column_windows(
     columns: Mapping[str, np.ndarray], rows: int
 ) -> Iterator[Mapping[str, np.ndarray]]:
     """Consecutive rows of columns of equal length, at most `rows` of them at a time."""
-    if isinstance(columns, ArchiveColumns):
+    if isinstance(columns, ArchiveColumns | ArchiveRows):
         yield from columns.windows(rows)
         return
     length = max(map(len, columns.values()), default=0)

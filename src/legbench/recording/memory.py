@@ -38,22 +38,25 @@ class MemoryRun:
         created = start.isoformat(timespec="seconds")
         self._manifest = new_manifest(manifest, id=self._id, created=created)
         self._layout = layout_of(self._manifest)
-        self._block = Block(RowLayout(self._layout))
+        self._block: Block | None = None  # takes 25 KiB, and whole rows need none
         self._parts: list[Floats] = []
         self._events: list[Event] = []
 
     @property
     def rows(self) -> int:
         """Number of rows that were appended so far."""
-        return sum(part.shape[1] for part in self._parts) + self._block.count
+        waiting = 0 if self._block is None else self._block.count
+        return sum(part.shape[1] for part in self._parts) + waiting
 
     def append(
         self, command: Command, observation: Observation, cycle_us: float, late_us: float
     ) -> None:
         """Remember one cycle; raises ConfigError if the arrays are not those of one leg."""
+        if self._block is None:
+            self._block = Block(RowLayout(self._layout))
         self._block.put(command, observation, cycle_us, late_us)
         if self._block.count == BATCH_ROWS:
-            self._take_block()
+            self._take(self._block)
 
     def extend(self, columns: Floats) -> None:
         """Remember whole rows (columns with time, rows), laid out as `Block.columns` does."""
@@ -69,8 +72,8 @@ class MemoryRun:
 
     def recording(self) -> Recording:
         """Return the run as `load` would return it; its path is a name, no folder."""
-        if self._block.count:
-            self._take_block()
+        if self._block is not None and self._block.count:
+            self._take(self._block)
         names = (TIME, *self._layout.names)
         values = np.concatenate([np.empty((len(names), 0)), *self._parts], axis=1)
         nanoseconds = np.rint(1e9 * values[0]).astype(np.int64)
@@ -93,9 +96,9 @@ class MemoryRun:
             events=tuple(self._events),
         )
 
-    def _take_block(self) -> None:
-        self._parts.append(self._block.columns())
-        self._block.count = 0
+    def _take(self, block: Block) -> None:
+        self._parts.append(block.columns())
+        block.count = 0
 
 
 def _stored(column: Column, row: Floats) -> np.ndarray:

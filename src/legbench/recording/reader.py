@@ -20,6 +20,7 @@ from legbench.recording.archive_columns import (
     spooled,
 )
 from legbench.recording.columns import ONE_LEG, Layout
+from legbench.recording.derived import completed
 from legbench.recording.description import RunDescription, describe
 from legbench.recording.events import Event, read_events
 from legbench.recording.export import Rows, arrow_table, as_html, as_text, pandas_frame
@@ -189,13 +190,15 @@ def load(path: Path | str) -> Recording:
         manifest = carried_manifest(schema, run)
     if TIME not in columns:
         raise RecordingError(f"the samples of {run} have no column {TIME}")
+    told = described(manifest, run)
+    columns = completed(columns, manifest, told)
     events, bad = read_events(run)
     if bad:
         torn = "; ".join(filter(None, (torn, f"{EVENTS} has {bad} unreadable lines")))
     return Recording(
         path=run,
         manifest=manifest,
-        described=described(manifest, run),
+        described=told,
         time=columns[TIME] / 1e9,
         columns=columns,
         events=tuple(events),
@@ -208,7 +211,8 @@ def described(manifest: Manifest, run: Path) -> RunDescription | FormatError:
     try:
         return describe(manifest, run.name)
     except FormatError as error:
-        return error
+        # A new one: the frames of one that was raised would keep the run's columns alive.
+        return FormatError(str(error))
 
 
 def run_folder(path: Path) -> Path:

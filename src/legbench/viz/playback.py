@@ -3,12 +3,12 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 
 from legbench.errors import ConfigError
+from legbench.recording.archive_columns import rows_of
 from legbench.recording.reader import Recording
 from legbench.signals import Floats, Ints
 
@@ -106,6 +106,8 @@ WHOLE: Final = Playback()
 
 
 def cut(recording: Recording, rows: slice) -> Recording:
-    """Some consecutive rows of a run as a recording of them alone."""
-    columns = {name: values[rows] for name, values in recording.columns.items()}
-    return replace(recording, time=recording.time[rows], columns=MappingProxyType(columns))
+    """Some consecutive rows of a run as a recording of them alone; those of a long run stay in
+    its file.
+    """
+    columns = rows_of(recording.columns, rows)
+    return replace(recording, time=recording.time[rows], columns=columns)

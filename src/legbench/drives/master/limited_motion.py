@@ -8,6 +8,7 @@ from legbench.drives.master.sample import Sample, sample_of
 from legbench.drives.master.tick import Tick
 from legbench.drives.setup.config import BusConfig
 from legbench.limits.guard import Guard
+from legbench.limits.momentum import LegMomentum
 from legbench.limits.safety import SafetyLimits
 
 
@@ -40,6 +41,7 @@ class LimitedMotion:
         self._cycle, self._guard = cycle, guard
         self._stiffness = tuple(float(value) for value in stiffness)
         self._expected: list[tuple[float, ...]] = []
+        self._seen_ns = 0
 
     def begin(self) -> None:
         """Begin to command from the targets that the drives hold, not from their encoders."""
@@ -64,6 +66,8 @@ class LimitedMotion:
 
     def check(self, sample: Sample) -> None:
         """Check measurements against the limits; raises PlantFault."""
+        interval = 1e-9 * (sample.time_ns - self._seen_ns)
+        self._seen_ns = sample.time_ns
         self._guard.check(
             motor_pos=sample.motor_pos,
             joint_pos=sample.link_pos,
@@ -72,6 +76,7 @@ class LimitedMotion:
             temperature=sample.temperature,
             fresh=sample.fresh,
             elapsed=1 + sample.skipped,
+            interval=interval,
             led_pos=None if self._two_encoders else self.led_pos,
         )
 
@@ -90,11 +95,12 @@ class LimitedMotion:
         return applied, words
 
 
-def guard_of(config: BusConfig, limits: SafetyLimits) -> Guard:
+def guard_of(config: BusConfig, limits: SafetyLimits, momentum: LegMomentum | None = None) -> Guard:
     """Make the guard of a bus; limits of what its drives do not tell will not act."""
     return Guard(
         limits,
         config.period,
         known=[node.knows for node in config.nodes],
         two_encoders=config.two_encoders,
+        momentum=momentum,
     )

@@ -36,6 +36,7 @@ from legbench.drives.transport.lock import ChannelLock
 from legbench.drives.transport.open_bus import timebase_of
 from legbench.drives.transport.timebase import Timebase
 from legbench.errors import PlantFault
+from legbench.limits.momentum import LegMomentum
 from legbench.limits.safety import SafetyLimits
 from legbench.limits.shortfall import Shortfall
 
@@ -63,6 +64,7 @@ class Link(DriveLeader):
         listener: Listener | None = None,
         read_only: bool = False,
         lock: ChannelLock | None = None,
+        momentum: LegMomentum | None = None,
     ) -> None:
         """Wire the parts; nothing is sent.
 
@@ -75,6 +77,7 @@ class Link(DriveLeader):
             listener: sees every frame, such as a `BusLog`.
             read_only: observe; change nothing in a drive, see `master.read_only`.
             lock: lock that `open` takes; by default one for the bus's channel.
+            momentum: what the leg's angular momentum obeys, for the limit `link_error`.
 
         Raises:
             ConfigError: the bus cannot carry the schedule.
@@ -94,7 +97,7 @@ class Link(DriveLeader):
         self._opening, self._ending = LinkOpening(parts), LinkEnd(parts)
         self._stop_on_error = StopOnError(self._ending)
         self._ticks = Ticks(parts)
-        self._guard = guard_of(config, parts.limits)
+        self._guard = guard_of(config, parts.limits, momentum)
         self._motion = LimitedMotion(
             parts.cycle, self._guard, stiffness, two_encoders=config.two_encoders
         )

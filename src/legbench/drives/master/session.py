@@ -19,6 +19,7 @@ from legbench.drives.transport.realtime import Granted, ask
 from legbench.drives.transport.timebase import SystemTime, Timebase
 from legbench.drives.transport.virtual_bus import VirtualBus
 from legbench.interrupts import shielded
+from legbench.limits.momentum import LegMomentum
 from legbench.limits.safety import SafetyLimits
 from legbench.recording.abstract_disk import AbstractLog
 
@@ -107,9 +108,14 @@ class Session(Closing):
         return BringUp(self.port(), self.config, lambda _message: None)
 
     def link(
-        self, limits: SafetyLimits, stiffness: Sequence[float], *, read_only: bool = False
+        self,
+        limits: SafetyLimits,
+        stiffness: Sequence[float],
+        *,
+        read_only: bool = False,
+        momentum: LegMomentum | None = None,
     ) -> Link:
-        """Make a cyclic link; nothing is sent yet."""
+        """Make a cyclic link, as `Link` with this bus; nothing is sent yet."""
         link = Link(
             self.bus,
             self.config,
@@ -118,6 +124,7 @@ class Session(Closing):
             timebase=self.timebase,
             read_only=read_only,
             lock=self._lock,
+            momentum=momentum,
         )
         if self.log is not None:
             link.show_frames_to(self.log)

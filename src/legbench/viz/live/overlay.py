@@ -9,13 +9,14 @@ from typing import final
 import numpy as np
 
 from legbench.kinematics import leg_points
+from legbench.metrics.source import Recorded
 from legbench.recording.reader import Recording
 from legbench.viz import style
 from legbench.viz.facts import Facts, facts_of
 from legbench.viz.live._rerun import rr
 from legbench.viz.live.leg2d import FREQ as LEG_FREQ
 from legbench.viz.live.leg2d import PATH, TRUNK_LINE, hip_of, trunk_lines
-from legbench.viz.trace import Thinner, Tracer
+from legbench.viz.trace import Thinner, TracedRows, Tracer
 
 COLOURS: tuple[style.Rgb, ...] = ((200, 150, 198), (196, 176, 130), (130, 180, 150))
 """Colours of the other runs in turn, pale on dark and light grounds; the fourth has the first."""
@@ -68,51 +69,57 @@ def other_of(recording: Recording, place: int, facts: Facts) -> Other:
 
 @final
 class Overlay:
-    """Publishes the joints and the leg of another run."""
+    """Publishes the joints and the leg of another run, in consecutive parts of it."""
 
     def __init__(self, stream: rr.RecordingStream, other: Other) -> None:
-        self._stream = stream
-        self._other = other
-        self.trace = Tracer(other.facts).extend(other.recording)
+        self._stream, self._other = stream, other
+        self._tracer, self._thinner = Tracer(other.facts), Thinner(LEG_FREQ)
+        self._joints, self._leg = f"/series/joint/{other.key}", f"{PATH}/{other.key}"
+        self._lay_out()
 
-    def push(self) -> None:
-        """Add all rows of the run."""
-        self._push_joints()
-        self._push_leg()
+    def push(self, rows: Recorded) -> TracedRows:
+        """Add the rows that follow those before, and return them with what was derived."""
+        trace = self._tracer.extend(rows)
+        self._push_joints(trace)
+        self._push_leg(trace)
+        return trace
 
-    def _push_joints(self) -> None:
-        other, path = self._other, f"/series/joint/{self._other.key}"
+    def _lay_out(self) -> None:
+        """Say once how everything looks."""
+        other = self._other
         looks = rr.SeriesLines(
             names=[f"q1 {other.label}", f"q2 {other.label}"],
             colors=[other.colour] * 2,
             widths=[0.8] * 2,
             aggregation_policy="MinMax",
         )
-        self._stream.log(path, looks, static=True)
-        index = [rr.TimeColumn("t", duration=self.trace.time)]
-        columns = rr.Scalars.columns(scalars=self.trace.joint.ravel())
-        pairs = columns.partition(np.full(len(self.trace.time), 2))
-        self._stream.send_columns(path, index, pairs)
-
-    def _push_leg(self) -> None:
-        other, path = self._other, f"{PATH}/{self._other.key}"
-        kept = Thinner(LEG_FREQ).pick(self.trace.time)
-        hip = hip_of(other.recording, other.facts)[kept]
-        joint = self.trace.joint[kept]
-        points = hip[:, None] + leg_points(joint, other.facts.run.design.lengths)
+        self._stream.log(self._joints, looks, static=True)
         colour = [*other.colour, OPACITY]
         lines = rr.LineStrips2D.from_fields(colors=[colour], radii=[SEGMENT], draw_order=6.0)
         tip = rr.Points2D.from_fields(colors=[colour], radii=[TIP], draw_order=7.0)
-        self._stream.log(f"{path}/segments", lines, static=True)
-        self._stream.log(f"{path}/tip", tip, static=True)
-        index = [rr.TimeColumn("t", duration=self.trace.time[kept])]
-        strips = rr.LineStrips2D.columns(strips=points.astype(np.float32))
-        self._stream.send_columns(f"{path}/segments", index, strips)
-        tips = rr.Points2D.columns(positions=points[:, 3])
-        self._stream.send_columns(f"{path}/tip", index, tips)
         trunk = rr.LineStrips2D(
             trunk_lines(), colors=[colour], radii=[0.6 * TRUNK_LINE], draw_order=5.0
         )
-        self._stream.log(f"{path}/trunk/box", trunk, static=True)
+        for name, what in (("segments", lines), ("tip", tip), ("trunk/box", trunk)):
+            self._stream.log(f"{self._leg}/{name}", what, static=True)
+
+    def _push_joints(self, trace: TracedRows) -> None:
+        index = [rr.TimeColumn("t", duration=trace.time)]
+        columns = rr.Scalars.columns(scalars=trace.joint.ravel())
+        pairs = columns.partition(np.full(len(trace.time), 2))
+        self._stream.send_columns(self._joints, index, pairs)
+
+    def _push_leg(self, trace: TracedRows) -> None:
+        kept = self._thinner.pick(trace.time)
+        if len(kept) == 0:
+            return
+        facts = self._other.facts
+        hip = hip_of(trace.rows, facts)[kept]
+        points = hip[:, None] + leg_points(trace.joint[kept], facts.run.design.lengths)
+        index = [rr.TimeColumn("t", duration=trace.time[kept])]
+        strips = rr.LineStrips2D.columns(strips=points.astype(np.float32))
+        self._stream.send_columns(f"{self._leg}/segments", index, strips)
+        tips = rr.Points2D.columns(positions=points[:, 3])
+        self._stream.send_columns(f"{self._leg}/tip", index, tips)
         moved = rr.Transform3D.columns(translation=np.pad(hip, ((0, 0), (0, 1))))
-        self._stream.send_columns(f"{path}/trunk", index, moved)
+        self._stream.send_columns(f"{self._leg}/trunk", index, moved)

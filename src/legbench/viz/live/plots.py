@@ -111,6 +111,7 @@ class Plots:
         self._thinner = Thinner(FREQ)
         self._seen = {name: ThinnedPoints() for name in self._plots}
         self._others: dict[str, list[Floats]] = {name: [] for name in self._plots}
+        self._other_thinner: dict[str, Thinner] = {}
 
     def push(self, trace: TracedRows) -> None:
         """Add rows to the trails."""
@@ -132,11 +133,15 @@ class Plots:
             )
 
     def overlay(self, key: str, trace: TracedRows, colour: style.Rgb) -> None:
-        """Draw the whole of another run over the trails."""
-        kept = Thinner(FREQ).pick(trace.time)
+        """Draw rows of another run, which follow those drawn before, over the trails."""
+        kept = self._other_thinner.setdefault(key, Thinner(FREQ)).pick(trace.time)
+        if len(kept) == 0:
+            return
         for name, plot in self._plots.items():
             points = _points(trace, name)[kept]
-            self._others[name].append(points)
+            known = points[np.isfinite(points).all(axis=1)]
+            if len(known):
+                self._others[name].append(np.stack([known.min(axis=0), known.max(axis=0)]))
             plot.overlay(key, trace.time[kept], points, colour)
 
     def finish(self) -> None:

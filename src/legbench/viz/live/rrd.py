@@ -10,12 +10,9 @@ from legbench.viz.drafts import draft_of, require_rows
 from legbench.viz.facts import facts_of
 from legbench.viz.live._rerun import rr
 from legbench.viz.live.overlay import other_of
-from legbench.viz.live.publish import APPLICATION, Publisher
+from legbench.viz.live.publish import APPLICATION, WINDOW_ROWS, Publisher
 from legbench.viz.live.rrd_sink import saved
 from legbench.viz.playback import WHOLE, Playback, cut
-
-WINDOW_ROWS = 1 << 18
-"""Rows that are published at once: four minutes at 1 kHz, 200 MB while they are on their way."""
 
 
 def write_rrd(
@@ -50,7 +47,7 @@ def write_rrd(
     with draft_of(path) as draft:
         stream = rr.RecordingStream(APPLICATION, recording_id=facts.run.id)
         with saved(stream, draft):
-            publisher = Publisher(stream, facts, others=others, playback=playback)
+            publisher = Publisher(stream, facts, others=others, playback=playback, rows=WINDOW_ROWS)
             publisher.lay_out(RowWindow(recording, rows.start, rows.stop))
             _push(publisher, recording, rows)
             publisher.finish()

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from legbench.signals import Floats
 from legbench.viz import style
@@ -22,6 +23,7 @@ class XYPlot:
         self._stream = stream
         self._spec = spec
         self._limits: tuple[Span, Span] | None = None
+        self._ends: dict[str, NDArray[np.float32]] = {}
         trail = rr.LineStrips2D.from_fields(radii=rr.Radius.ui_points(1.3), draw_order=20)
         stream.log(f"{spec.path}/data/trail", trail, static=True)
         head = rr.Points2D.from_fields(radii=rr.Radius.ui_points(5.0), draw_order=30)
@@ -64,24 +66,27 @@ class XYPlot:
         self._stream.send_columns(f"{data}/head", index, head)
 
     def overlay(self, key: str, time: Floats, points: Floats, colour: style.Rgb) -> None:
-        """Draw another run's trajectory (n, 2) thinly over the trail, all in one colour."""
+        """Draw more of another run's trajectory (n, 2) thinly over the trail, in one colour."""
         index = [rr.TimeColumn("t", duration=time)]
-        path = points.astype(np.float32)
+        path: NDArray[np.float32] = points.astype(np.float32)
         trail, head = (f"{self._spec.path}/data/{key}/{name}" for name in ("trail", "head"))
-        radius = rr.Radius.ui_points(0.7)
-        looks = rr.LineStrips2D.from_fields(colors=[colour], radii=radius, draw_order=25)
-        self._stream.log(trail, looks, static=True)
-        segments = np.stack([np.concatenate([path[:1], path[:-1]]), path], axis=1)
+        if key not in self._ends:
+            radius = rr.Radius.ui_points(0.7)
+            looks = rr.LineStrips2D.from_fields(colors=[colour], radii=radius, draw_order=25)
+            self._stream.log(trail, looks, static=True)
+            radius = rr.Radius.ui_points(3.5)
+            dot = rr.Points2D.from_fields(colors=[colour], radii=radius, draw_order=31)
+            self._stream.log(head, dot, static=True)
+        before = self._ends.get(key, path[:1])
+        segments = np.stack([np.concatenate([before, path[:-1]]), path], axis=1)
         self._stream.send_columns(trail, index, rr.LineStrips2D.columns(strips=segments))
-        radius = rr.Radius.ui_points(3.5)
-        dot = rr.Points2D.from_fields(colors=[colour], radii=radius, draw_order=31)
-        self._stream.log(head, dot, static=True)
         self._stream.send_columns(head, index, rr.Points2D.columns(positions=path))
+        self._ends[key] = path[-1:].copy()
 
     def backdrop(self, points: Floats, others: Floats | None = None) -> None:
         """Draw the whole run (n, 2) faintly behind everything, with axes that fit it.
 
-        Points (m, 2) of other runs have room, too.
+        Points (m, 2) that other runs reach have room, too.
         """
         self._limits = None
         self.cover(points if others is None else np.concatenate([points, others]))

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from legbench.kinematics import ModalConvention
-from legbench.metrics.analysis import analysed
+from legbench.metrics.analysis import Analysis, analysed
 from legbench.metrics.source import Recorded
 from legbench.signals import Floats
 from legbench.viz import style
@@ -67,10 +67,7 @@ def phase_figure(recording: Recorded, against: Sequence[Recorded] = ()) -> Figur
             panel.locator_params(axis="y", nbins=5)
             lines = [planes[place] for planes in bright]
             _draw(panel, faint[place], lines, colouring, WIDE if against else WIDTH)
-        for place, other in enumerate(others):
-            draw_other(panels, other, convention, place)
-        if others:
-            draw_differences(rows.differences, run, others)
+        _draw_others(panels, rows.differences, run, others)
         draw_own_signals(rows.own, len(panels) + len(rows.differences), run, others)
         widen(panels[0], style.POLAR_LEAST)
         draw_modes(panels[1], facts, run["joint_pos"])
@@ -90,6 +87,20 @@ def _bright(
         step = plane_stride(run.time[stretches[0].first : stretches[-1].stop])
     rows = [slice(stretch.first, stretch.stop + 1, step) for stretch in stretches]
     return [planes_of(run, convention, each) for each in rows]
+
+
+def _draw_others(
+    panels: Sequence[Axes], below: Sequence[Axes], run: Analysis, others: Sequence[Analysis]
+) -> None:
+    """Draw other runs over the planes, and how far apart they are below; of long runs, only one at
+    a time has its signals in memory.
+    """
+    for place, other in enumerate(others):
+        draw_other(panels, other, run.description.convention, place)
+        other.forget()
+    if others:
+        run.forget()
+        draw_differences(below, run, others)
 
 
 def _draw(
