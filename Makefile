@@ -59,7 +59,7 @@ test-engine: $(STAMP) ## the tests against Pinocchio, which is installed for the
 test-readers: $(STAMP) .venv-readers/.installed ## pandas, polars, DuckDB and fastparquet read what is exported
 	$(BIN)/python scripts/check_readers.py .venv-readers/bin/python
 
-test-socketcan: $(STAMP) ## a run over vcan in a QEMU guest at 1 kHz, in virtual time; about 15 minutes
+test-socketcan: $(STAMP) ## a run over vcan in a QEMU guest at 1 kHz, in virtual time; about 20 minutes
 	$(BIN)/python scripts/socketcan/guest.py 'sh $(CURDIR)/scripts/socketcan/all.sh'
 
 bench: $(STAMP) ## performance targets as ratios against a baseline in the same run

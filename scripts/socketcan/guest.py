@@ -197,7 +197,7 @@ def main() -> int:
     """Boot and run."""
     parser = argparse.ArgumentParser(description="A Linux guest with SocketCAN.")
     parser.add_argument("command", help="for the guest's shell")
-    parser.add_argument("--timeout", type=float, default=1800.0, help="of this machine [s]")
+    parser.add_argument("--timeout", type=float, default=7200.0, help="of this machine [s]")
     parser.add_argument("--instructions", type=int, default=INSTRUCTIONS, help="in a ns")
     chosen = parser.parse_args()
     try:

@@ -227,16 +227,38 @@ def test_actions_refuse_what_makes_no_sense(
     drives(*arguments).refused(*words)
 
 
-@pytest.mark.parametrize("how", [("--channel", "leg.sock"), ("--serve", "slcan")])
-def test_emulate_serves_one_wire_and_refuses_two_channels(
+@pytest.mark.parametrize(
+    "how", [("--channel", "leg.sock"), ("--channel", "leg.sock,leg.sock"), ("--serve", "slcan")]
+)
+def test_emulate_wants_a_socket_file_for_each_channel(
     how: tuple[str, str], tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     bus = changed(tmp_path, ('name = "motor2"', 'channel = "can1"\nname = "motor2"'))
     ask = ("drives", "emulate", "--bus", bus, "--bare", "--seconds", "0.05")
-    at = (how[0], str(tmp_path / how[1])) if how[0] == "--channel" else how
+    at = how
+    if how[0] == "--channel":
+        at = (how[0], ",".join(str(tmp_path / name) for name in how[1].split(",")))
     done = called(capfd, *ask, *at)
-    done.refused("2 channels, can0, can1", "--only NAME", "--interface legbench")
-    assert called(capfd, *ask, *at, "--only", "motor2").status == 0
+    done.refused("2 channels, can0, can1", "--channel can0.sock,can1.sock")
+    assert list(tmp_path.glob("*.sock")) == []
+    one = at if how[0] != "--channel" else (how[0], at[1].split(",")[0])
+    assert called(capfd, *ask, *one, "--only", "motor2").status == 0
+
+
+def test_emulate_serves_two_channels_and_leaves_no_socket_file(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    bus = changed(tmp_path, ('name = "motor2"', 'channel = "can1"\nname = "motor2"'))
+    ask = ("drives", "emulate", "--bus", bus, "--bare", "--seconds", "0.05")
+    first, second = tmp_path / "a.sock", tmp_path / "b.sock"
+    done = called(capfd, *ask, "--channel", f"{first},{second}")
+    assert done.status == 0
+    assert f"--interface legbench_unix --channel {first},{second}" in done.err
+    assert list(tmp_path.glob("*.sock")) == []
+    # A file that is there is not overwritten, and the socket file made before it is gone, too.
+    second.write_text("mine")
+    called(capfd, *ask, "--channel", f"{first},{second}").refused("cannot serve a bus", "b.sock")
+    assert (first.exists(), second.read_text()) == (False, "mine")
 
 
 def test_jitter_in_virtual_time_is_punctual(drives: Drives, tmp_path: Path) -> None:
@@ -320,7 +342,7 @@ def test_a_bus_that_is_not_there_is_named(
         ((("vendor = 0x0000_0123", "vendor = 0x99"),), ("motor1", "vendor", "0x99")),
         ((("id = 2", "id = 5"),), ("node 5", "does not answer", "bitrate")),
         (
-            (("serial = 1001", "serial = 7"), ("1002", "1001"), ("= 7", "= 1002")),
+            (("serial = 1001", "serial = 7"), ("1002", "1001"), ("serial = 7", "serial = 1002")),
             ("swapped",),
         ),
         ((("bitrate = 1_000_000", "bitrate = 250_000"),), ("250000 bit/s", "80 %")),
@@ -413,7 +435,7 @@ def test_a_wrong_bitrate_is_named(
     monkeypatch.chdir(tmp_path)
     done = called(capfd, *command, *EMULATED, *DESIGN, "--bitrate", "900000")
     # The budget of a run finds out before the wire does.
-    found = "the last answer may come 683 us after SYNC" if command[0] == "run" else "error frames"
+    found = "the last answer may come 756 us after SYNC" if command[0] == "run" else "error frames"
     done.refused("900000 bit/s is asked for", "the bus file says 1000000 bit/s", found)
     assert list(tmp_path.iterdir()) == []
 

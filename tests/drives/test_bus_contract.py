@@ -300,9 +300,9 @@ def test_a_sender_that_is_bus_off_and_gone_leaves_nothing_behind(socket_ports: U
     here.send(message(BROKEN))
     until(socket_ports, lambda: False, 20)
     accepted(here, numbered(10))
-    assert len(socket_ports.server._stations) == 1
+    assert len(socket_ports.server._wire._stations) == 1
     here.shutdown()
-    assert until(socket_ports, lambda: not socket_ports.server._stations)
+    assert until(socket_ports, lambda: not socket_ports.server._wire._stations)
 
 
 def test_other_states_than_active_cannot_be_asked_for(ports: Ports) -> None:

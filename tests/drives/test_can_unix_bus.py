@@ -97,7 +97,7 @@ def test_a_file_that_nobody_serves_is_replaced_and_one_in_use_is_not(tmp_path: P
     path = tmp_path / "leg.sock"
     network = emulate(load_bus(BUS))
     dead = UnixServer(network, path)
-    dead._listener.close()
+    dead._wire._listener.close()
     assert path.exists()
     with (
         UnixServer(network, path),

@@ -100,7 +100,7 @@ def test_frames_of_others_hold_up_no_cycle_beyond_its_deadline() -> None:
     wire.take = lambda: None
     wire.receive = babble
     assert not it.tick().complete
-    assert wire.time_ns == MS + 700 * US
+    assert wire.time_ns == MS + 720 * US
 
 
 def test_a_command_in_two_frames_goes_out_whole() -> None:

@@ -52,7 +52,7 @@ def test_a_late_tick_is_made_from_half_a_period_on_at_the_next_place_of_the_grid
 
 
 def test_answers_count_until_the_deadline_and_no_longer() -> None:
-    for at_us, counts in ((700, True), (701, False)):
+    for at_us, counts in ((720, True), (721, False)):
         wire = Wire()
         wire.answers = lambda number, at=at_us: (BOTH[0], (at * US, 0x182, DATA))
         it = cycle(wire)
@@ -60,7 +60,7 @@ def test_answers_count_until_the_deadline_and_no_longer() -> None:
         assert [axis.fresh for axis in it.axes] == [True, counts]
         assert missed(it) == [0, int(not counts)]
         # All there: the cycle waits no longer.
-        assert wire.time_ns == MS + 700 * US
+        assert wire.time_ns == MS + 720 * US
 
 
 # --- what is owed ----------------------------------------------------------------------------

@@ -46,7 +46,7 @@ bits = 16
 
 def bus_text(*, channels: bool = False, twelve: bool = False, **numbers: int) -> str:
     """The bench's bus file with other numbers, a channel for each drive, or coarse encoders."""
-    text = BUS.read_text(encoding="utf-8").replace("tpdo_deadline_us = 650\n", "")
+    text = BUS.read_text(encoding="utf-8").replace("tpdo_deadline_us = 720\n", "")
     for name, value in numbers.items():
         lines = [
             f"{name} = {value}" if line.startswith(f"{name} =") else line
@@ -83,7 +83,7 @@ def test_all_times_of_the_drives_follow_from_the_period(period_us: int) -> None:
     told = {entry.key: entry.value for entry in configuration(bus, bus.nodes[0])}
     assert told[0x1006, 0] == period_us
     assert told[0x60C2, 1] * 10.0 ** told[0x60C2, 2] == pytest.approx(1e-6 * period_us)
-    assert bus.deadline_us == 0.7 * period_us
+    assert bus.deadline_us == 0.72 * period_us
     # A heartbeat of 10 ms leaves on ticks: after 12 ms, where these are 4 ms apart.
     assert told[0x1016, 1] & 0xFFFF == {1000: 30, 2000: 30, 4000: 36}[period_us]
     assert bus.cycles_in(40) == 40_000 // period_us
@@ -161,13 +161,13 @@ def test_answers_that_cannot_come_in_time_are_refused_whatever_the_load() -> Non
     both = two_answers(bus)
     assert check_load(both) == pytest.approx(0.718, abs=1e-3)
     words = (
-        "the last answer may come 790 us after SYNC at 1000000 bit/s, tpdo_deadline_us is 650 us: "
+        "the last answer may come 855 us after SYNC at 1000000 bit/s, tpdo_deadline_us is 720 us: "
         "map fewer objects in fewer PDOs, raise bitrate or period_us"
     )
     with pytest.raises(ConfigError, match=words):
         check_budget(both)
     # With a later deadline the commands would miss the next SYNC.
-    with pytest.raises(ConfigError, match="the last command may go out 1020 us after SYNC"):
+    with pytest.raises(ConfigError, match="the last command may go out 1150 us after SYNC"):
         check_budget(replace(both, tpdo_deadline_us=900))
     # Each of these is a way out.
     check_budget(replace(both, reply_delay_us=100))
@@ -201,9 +201,8 @@ def test_no_answer_of_the_slowest_drives_comes_later_than_the_budget_says(
             sync_ns = at_ns
         elif frame.cob_id in (0x181, 0x182, 0x281, 0x282) and sync_ns:
             latest = max(latest, 1e-3 * (at_ns - sync_ns) + 55)
-    assert latest <= budget.answers_us
-    # The budget has room for one heartbeat of 65 us that is in front, and for no more.
-    assert latest > budget.answers_us - 66
+    # Counted from the begin of SYNC, in front of which one of two heartbeats of 65 us may be.
+    assert budget.answers_us - 2 * 65 - 1 < latest <= budget.answers_us - 65
 
 
 # --- channels --------------------------------------------------------------------------------

@@ -65,10 +65,11 @@ def test_a_listener_at_another_bitrate_destroys_frames_until_it_is_error_passive
 def test_a_link_at_a_wrong_bitrate_says_so_before_anything_is_enabled(
     bitrate: int, tmp_path: Path
 ) -> None:
-    network = emulate(config(), keep_log=True)
+    drives = config(period_us=2000)
+    network = emulate(drives, keep_log=True)
     with LockstepBus("rig", network=network, bitrate=bitrate) as bus:
         lock = ChannelLock("rig", tmp_path)
-        link = Link(bus, config().at(bitrate), stiffness=STIFFNESS, lock=lock)
+        link = Link(bus, drives.at(bitrate), stiffness=STIFFNESS, lock=lock)
         if bitrate == network.bitrate:
             link.start()
             link.close()

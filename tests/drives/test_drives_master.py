@@ -55,10 +55,10 @@ def wide() -> object:
                 temperature_object=parse_object("2070:00 i16"),
             )
         )
-    return config(nodes=tuple(nodes), tpdo_deadline_us=700, reply_delay_us=100)
+    return config(nodes=tuple(nodes), tpdo_deadline_us=720, reply_delay_us=60)
 
 
-QUICK = [Behaviour(start_pos=pos, reply_delay_us=(50, 100)) for pos in START]
+QUICK = [Behaviour(start_pos=pos, reply_delay_us=(50, 60)) for pos in START]
 """Drives that answer soon enough for four frames."""
 
 

@@ -145,5 +145,5 @@ def test_a_command_for_another_number_of_motors_is_refused() -> None:
     alone = Guard(FREE, PERIOD)
     alone.start_at((0.0,))
     for wish in (0.0, 1.0):
-        with pytest.raises(ValueError, match="zip"):
+        with pytest.raises(ValueError, match="values to unpack"):
             alone.command((wish,))

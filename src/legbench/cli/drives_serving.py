@@ -14,7 +14,11 @@ from legbench.errors import ConfigError
 from legbench.shipped import locate
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from legbench.commissioning.emulate import Server
     from legbench.drives.emulated.body import Body
+    from legbench.drives.emulated.network import Network
     from legbench.drives.setup.config import BusConfig
 
 UNIX, SLCAN = "legbench_unix", "slcan"
@@ -67,7 +71,8 @@ def _print_state(as_json: bool, at: float, node: str, state: str) -> None:
 class Emulate:
     """Emulate a leg for other processes, at --channel: a socket file for legbench_unix.
 
-    With --serve slcan it sits behind a pseudo terminal, as behind an adapter on a serial line, and
+    Drives that hang on several channels are served at a socket file each, --channel A,B. With
+    --serve slcan the leg sits behind a pseudo terminal, as behind an adapter on a serial line, and
     --channel may name a link to it. With --interface it sits on that bus, such as socketcan on a
     vcan. --bitrate is that of the emulated wire.
     """
@@ -89,11 +94,10 @@ class Emulate:
         """Serve until ^C or SIGTERM, printing every change of a drive's state."""
         _check_time("seconds", self.seconds)
         self._check_way(bench)
-        from legbench.commissioning.emulate import Server, serve
+        from legbench.commissioning.emulate import serve
         from legbench.drives.emulated.bus_server import BusServer
-        from legbench.drives.emulated.network import Network
         from legbench.drives.emulated.slcan_server import SlcanServer
-        from legbench.drives.emulated.unix_server import UnixServer
+        from legbench.drives.emulated.unix_server import ChannelsServer, UnixServer
         from legbench.interrupts import stop_on_interrupt
         from legbench.plant.can_open import open_session
 
@@ -102,25 +106,21 @@ class Emulate:
         start_pos, body = self._leg(bench)
         if self.only is not None:
             config, start_pos = only(config, self.only), (0.0,)
-        self._check_channels(bench, config)
+        paths = self._paths(bench, config)
         end = time.monotonic() + self.seconds
         where = None if bench.channel is None else Path(bench.channel)
 
         _tell_problems(config)
 
-        def serve_at(network: Network) -> Server:
+        def serve_at(networks: "Sequence[Network]") -> "Server":
+            if len(paths) > 1:
+                return ChannelsServer(networks, paths)
+            (network,) = networks
             if self.serve == SLCAN:
                 return SlcanServer(network, where, warn=note)
-            if where is not None and bench.interface in (None, UNIX):
-                return UnixServer(network, where)
+            if paths:
+                return UnixServer(network, paths[0])
             return BusServer(network, open_session(config, bench.choice, leads=False).bus)
-
-        def ready(server: Server) -> None:
-            interface, channel = bench.interface or UNIX, bench.channel
-            if isinstance(server, SlcanServer):
-                interface, channel = SLCAN, server.path
-            at = f" --bitrate {config.bitrate}" if isinstance(server, SlcanServer) else ""
-            note(f"serving {channel}; use it with --interface {interface} --channel {channel}{at}")
 
         with stop_on_interrupt() as stop:
             serve(
@@ -129,22 +129,43 @@ class Emulate:
                 start_pos=start_pos,
                 body=body,
                 patience=self.patience,
+                split=len(paths) > 1,
                 report=partial(_print_state, bench.json),
-                ready=ready,
+                ready=partial(self._tell_ready, bench, config.bitrate),
                 stop=lambda: stop.is_set or time.monotonic() > end,
             )
         return 0
 
-    def _check_channels(self, bench: Bench, config: "BusConfig") -> None:
-        """Refuse drives on several channels where one wire is served; raises ConfigError."""
-        one_wire = self.serve == SLCAN or bench.interface in (None, UNIX)
-        if one_wire and len(config.channels) > 1:
+    @staticmethod
+    def _tell_ready(bench: Bench, bitrate: int, server: "Server") -> None:
+        """Say how a program reaches the drives."""
+        from legbench.drives.emulated.slcan_server import SlcanServer
+
+        interface, channel, at = bench.interface or UNIX, bench.channel, ""
+        if isinstance(server, SlcanServer):
+            interface, channel, at = SLCAN, server.path, f" --bitrate {bitrate}"
+        note(f"serving {channel}; use it with --interface {interface} --channel {channel}{at}")
+
+    def _paths(self, bench: Bench, config: "BusConfig") -> tuple[Path, ...]:
+        """Socket files to serve, one a channel; none where it is another bus.
+
+        Raises:
+            ConfigError: drives hang on several channels, and it is not one socket file for each.
+        """
+        sockets = self.serve != SLCAN and bench.interface in (None, UNIX)
+        if len(config.channels) == 1:
+            return (Path(bench.channel),) if sockets and bench.channel is not None else ()
+        if not sockets and self.serve != SLCAN:
+            return ()
+        given = (bench.channel or "").split(",") if sockets else []
+        if len(set(filter(None, given))) != len(config.channels):
             names = ", ".join(map(str, config.channels))
+            example = ",".join(f"{name}.sock" for name in config.channels)
             raise ConfigError(
                 f"the bus file's drives hang on {len(config.channels)} channels, {names}; a socket "
-                "file or a terminal is one wire: serve each drive by itself, with --only NAME and "
-                "a --channel of its own, or emulate them in the run, with --interface legbench"
+                f"file or a terminal is one wire: give a socket file for each, --channel {example}"
             )
+        return tuple(map(Path, given))
 
     def _leg(self, bench: Bench) -> "tuple[tuple[float, ...], Body]":
         """Motor positions at power-on [rad], and what hangs on the shafts."""

@@ -51,6 +51,8 @@ class Guard:
         self._two_encoders = two_encoders
         self._step_max = limits.command_speed * period
         self._knee = None if limits.motor_knee_range == UNLIMITED else limits.motor_knee_range
+        limited_knee = limits.joint_knee_range != UNLIMITED and all(self._shown)
+        self._joint_knee = limits.joint_knee_range if limited_knee else None
         self._wish: tuple[float, ...] | None = None
         bounds = limits.bounds(period)
         self._motors = tuple(MotorWatch(bounds) for _ in limits.motor_range)
@@ -118,16 +120,26 @@ class Guard:
 
     def _allows(self, wish: tuple[float, ...]) -> bool:
         """Whether a wish lies within all ranges, and within reach of one cycle."""
-        step = self._step_max
-        for value, last, (low, high) in zip(
-            wish, self.applied, self._limits.motor_range, strict=True
-        ):
-            if not (low <= value <= high and -step <= value - last <= step):
-                return False
-        return self._knee is None or self._knee[0] <= knee_of(wish) <= self._knee[1]
+        step, knee = self._step_max, self._knee
+        (low1, high1), (low2, high2) = self._limits.motor_range
+        (motor1, motor2), (last1, last2) = wish, self.applied
+        return (
+            low1 <= motor1 <= high1
+            and low2 <= motor2 <= high2
+            and -step <= motor1 - last1 <= step
+            and -step <= motor2 - last2 <= step
+            and (knee is None or knee[0] <= knee_of(wish) <= knee[1])
+        )
 
     def _check_wish(self, wish: Sequence[float]) -> None:
         before = self.applied if self._wish is None else self._wish
+        limit = self._limits.command_step
+        for value, wished in zip(wish, before, strict=True):
+            # Of what is not finite no step is within a limit, unless there is none.
+            if not abs(value - wished) <= limit or not math.isfinite(value):
+                self._refuse_wish(wish, before)
+
+    def _refuse_wish(self, wish: Sequence[float], before: Sequence[float]) -> None:
         limit = self._limits.command_step
         for motor, (value, wished) in enumerate(zip(wish, before, strict=True), start=1):
             if not math.isfinite(value):
@@ -207,28 +219,57 @@ class Guard:
         Raises:
             PlantFault: a limit is exceeded.
         """
-        limits = self._limits
         self._check_joints(joint_pos)
-        for axis, value in enumerate(spring_torque, start=1):
-            if not abs(value) <= limits.spring_torque and self._loads[axis - 1]:
-                raise PlantFault(
-                    "spring torque",
-                    f"spring {axis} carries {value:.3f} N m, the limit is "
-                    f"{limits.spring_torque:g} N m; push less, or raise spring_torque",
-                )
-        for axis, value in enumerate(temperature, start=1):
-            if value is not None and value > limits.temperature:
-                raise PlantFault(
-                    "temperature",
-                    f"drive {axis} is at {value:.1f} deg C, the limit is "
-                    f"{limits.temperature:g} deg C, temperature of the limits; let it cool down",
-                )
+        torque1, torque2 = spring_torque
+        most = self._limits.spring_torque
+        if not (-most <= torque1 <= most and -most <= torque2 <= most):
+            self._refuse_torques(spring_torque)
+        hottest = self._limits.temperature
+        for value in temperature:
+            if value is not None and value > hottest:
+                self._refuse_temperatures(temperature)
         if expected_pos is not None:
             led = motor_pos if led_pos is None else led_pos
             after = elapsed * self._period if interval is None else interval
             self._check_encoders(led, joint_pos, expected_pos, fresh, elapsed, after)
 
+    def _refuse_torques(self, spring_torque: Sequence[float]) -> None:
+        """Raise PlantFault for the first known torque beyond its limit; none if all are unknown."""
+        limit = self._limits.spring_torque
+        for axis, value in enumerate(spring_torque, start=1):
+            if not abs(value) <= limit and self._loads[axis - 1]:
+                raise PlantFault(
+                    "spring torque",
+                    f"spring {axis} carries {value:.3f} N m, the limit is {limit:g} N m; push "
+                    "less, or raise spring_torque",
+                )
+
+    def _refuse_temperatures(self, temperature: Sequence[float | None]) -> None:
+        """Raise PlantFault for the first temperature beyond its limit."""
+        limit = self._limits.temperature
+        for axis, value in enumerate(temperature, start=1):
+            if value is not None and value > limit:
+                raise PlantFault(
+                    "temperature",
+                    f"drive {axis} is at {value:.1f} deg C, the limit is {limit:g} deg C, "
+                    "temperature of the limits; let it cool down",
+                )
+
     def _check_joints(self, joint_pos: Sequence[float]) -> None:
+        (low1, high1), (low2, high2) = self._limits.joint_range
+        joint1, joint2 = joint_pos
+        if not (low1 <= joint1 <= high1 and low2 <= joint2 <= high2):
+            self._refuse_joints(joint_pos)
+        knee = self._joint_knee
+        if knee is not None and not knee[0] <= knee_of(joint_pos) <= knee[1]:
+            raise PlantFault(
+                "joint range",
+                f"q2 - q1 is at {knee_of(joint_pos):.3f} rad, the limits are [{knee[0]:g}, "
+                f"{knee[1]:g}] rad, joint_knee_range: the knee has gone through its stop",
+            )
+
+    def _refuse_joints(self, joint_pos: Sequence[float]) -> None:
+        """Raise PlantFault for the first known joint beyond its range; none if all are unknown."""
         for axis, (value, (low, high)) in enumerate(
             zip(joint_pos, self._limits.joint_range, strict=True), start=1
         ):
@@ -238,13 +279,6 @@ class Guard:
                     f"joint {axis} is at {value:.3f} rad, the limits are [{low:g}, {high:g}] rad, "
                     f"joint_range of axis {axis}",
                 )
-        low, high = self._limits.joint_knee_range
-        if (low, high) != UNLIMITED and all(self._shown) and not low <= knee_of(joint_pos) <= high:
-            raise PlantFault(
-                "joint range",
-                f"q2 - q1 is at {knee_of(joint_pos):.3f} rad, the limits are [{low:g}, {high:g}] "
-                "rad, joint_knee_range: the knee has gone through its stop",
-            )
 
     def _check_encoders(
         self,

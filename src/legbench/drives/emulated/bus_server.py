@@ -10,6 +10,7 @@ import can
 
 from legbench.closing import Closing
 from legbench.drives.emulated.network import Network
+from legbench.drives.emulated.network_time import NetworkTime
 from legbench.drives.emulated.pacer import Pacer
 from legbench.drives.errors import BusError
 from legbench.drives.transport.messages import frame_of, message_of
@@ -25,7 +26,7 @@ class BusServer(Closing):
         """Attach to a network and a bus, which closes together with this server."""
         self.network, self._bus = network, bus
         self._station = network.attach()
-        self._pacer = Pacer(network, now_ns)
+        self._pacer = Pacer(NetworkTime(network), now_ns)
 
     def poll(self) -> None:
         """Wait a moment for frames, pass them on and advance virtual time.

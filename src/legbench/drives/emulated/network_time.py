@@ -16,6 +16,10 @@ class NetworkTime:
         """Return the present time [ns]."""
         return self._network.now_ns
 
+    def next_ns(self) -> int:
+        """Time of the next event [ns]."""
+        return self._network.upcoming()[0]
+
     def wait_until(self, at_ns: int) -> None:
         """Advance the bus to `at_ns`."""
         self._network.advance(at_ns)

@@ -1,33 +1,45 @@
 """Virtual time of an emulated bus, led by the machine's clock."""
 
 from collections.abc import Callable
-from typing import final
-
-from legbench.drives.emulated.network import Network
+from typing import Protocol, final
 
 FORGIVEN_NS = 3_000_000
 """Longest step of virtual time at once; the rest of a longer pause is left out [ns]."""
 
 
+class VirtualTime(Protocol):
+    """Virtual time of one network, or of several that pass it together."""
+
+    def now_ns(self) -> int:
+        """Return the present time [ns]."""
+        ...
+
+    def next_ns(self) -> int:
+        """Time of the next event [ns]."""
+        ...
+
+    def wait_until(self, at_ns: int) -> None:
+        """Advance to `at_ns`."""
+        ...
+
+
 @final
 class Pacer:
-    """Pacer that lets the virtual time of a network follow a clock."""
+    """Pacer that lets virtual time follow a clock."""
 
-    def __init__(self, network: Network, now_ns: Callable[[], int]) -> None:
-        self._network, self._now_ns = network, now_ns
-        self._offset_ns = now_ns() - network.now_ns
+    def __init__(self, virtual: VirtualTime, now_ns: Callable[[], int]) -> None:
+        self._virtual, self._now_ns = virtual, now_ns
+        self._offset_ns = now_ns() - virtual.now_ns()
 
     def advance(self) -> None:
-        """Advance the network to the present time of the clock."""
-        network = self._network
-        now_ns = self._now_ns() - self._offset_ns
-        away_ns = now_ns - network.now_ns
+        """Advance virtual time to the present time of the clock."""
+        now_ns, before_ns = self._now_ns() - self._offset_ns, self._virtual.now_ns()
+        away_ns = now_ns - before_ns
         if away_ns > FORGIVEN_NS:
             self._offset_ns += away_ns - FORGIVEN_NS
-            now_ns = network.now_ns + FORGIVEN_NS
-        network.advance(now_ns)
+            now_ns = before_ns + FORGIVEN_NS
+        self._virtual.wait_until(now_ns)
 
     def wait_s(self) -> float:
-        """Time until the next event of the network [s]."""
-        at_ns, _ = self._network._next()
-        return max(0.0, 1e-9 * (at_ns + self._offset_ns - self._now_ns()))
+        """Time until the next event [s]."""
+        return max(0.0, 1e-9 * (self._virtual.next_ns() + self._offset_ns - self._now_ns()))

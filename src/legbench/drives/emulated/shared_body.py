@@ -56,6 +56,10 @@ class LockstepChannels:
         """Return the present time [ns]."""
         return self._networks[0].now_ns
 
+    def next_ns(self) -> int:
+        """Time of the next event of any network [ns]."""
+        return min(network.upcoming()[0] for network in self._networks)
+
     def wait_until(self, at_ns: int) -> None:
         """Advance all networks to `at_ns`."""
         self.advance(at_ns)

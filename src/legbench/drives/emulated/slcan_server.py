@@ -11,6 +11,7 @@ from typing import final
 
 from legbench.closing import Closing
 from legbench.drives.emulated.network import Network
+from legbench.drives.emulated.network_time import NetworkTime
 from legbench.drives.emulated.pacer import Pacer
 from legbench.drives.emulated.slcan import SlcanAdapter
 from legbench.drives.errors import BusError
@@ -71,7 +72,7 @@ class SlcanServer(Closing):
         self._adapter = SlcanAdapter(network)
         self._warned: int | None = None
         self._unsent, self._cut, self._openings = b"", False, 0
-        self._pacer = Pacer(network, now_ns)
+        self._pacer = Pacer(NetworkTime(network), now_ns)
 
     @staticmethod
     def _replace_dead(link: Path) -> None:

@@ -1,9 +1,11 @@
 """One drive in the cycle: process data <-> angles, controlword and target; pure."""
 
 import math
+import struct
+from collections.abc import Callable, Sequence
+from operator import itemgetter
 from typing import final
 
-from legbench.drives.errors import CodecError
 from legbench.drives.protocol.cia402 import PowerMachine, StatusBit, decode_state
 from legbench.drives.protocol.pdo import PdoMap
 from legbench.drives.setup.config import NodeConfig
@@ -11,8 +13,9 @@ from legbench.drives.setup.pdos import CONTROLWORD, STATUSWORD
 from legbench.drives.setup.quirks import ModeShown
 from legbench.drives.setup.units import Unwrapper
 
-LINK, TORQUE = 2, 3
-"""Slots of the second encoder and of the torque among what a drive shows."""
+LINK, SLOTS = 2, 4
+"""Slot of the second encoder among what a drive shows, and the number of slots: statusword, motor,
+link, torque."""
 
 
 def _wanted(layout: PdoMap, node: NodeConfig) -> tuple[tuple[int, int], ...]:
@@ -27,12 +30,28 @@ def _wanted(layout: PdoMap, node: NodeConfig) -> tuple[tuple[int, int], ...]:
     return tuple((slot, place) for slot, place in places if place is not None)
 
 
+def _picker(
+    layouts: Sequence[Sequence[tuple[int, int]]],
+) -> Callable[[Sequence[int]], Sequence[int]] | None:
+    """Function that picks all slots from the values of the only TPDO; none for several TPDOs.
+
+    A slot that the drive does not show gets any value, which nobody looks at.
+    """
+    if len(layouts) != 1:
+        return None
+    places = dict(layouts[0])
+    return itemgetter(*(places.get(slot, 0) for slot in range(SLOTS)))
+
+
 @final
 class AxisLink:
     """Compiled process data of one drive.
 
     Attributes:
         node: its configuration.
+        tpdo_ids: COB-IDs to expect after every SYNC.
+        rpdo_ids: COB-IDs of the drive's RPDOs, which carry its commands.
+        rpdo_sizes: COB-ID of each RPDO -> length of its data [bytes].
         machine: leads it through its states.
         statusword: statusword last received.
         target_counts: target of its next RPDO, not wrapped.
@@ -54,7 +73,7 @@ class AxisLink:
         self.motor_counts = 0
         self.link_counts = 0
         units, link = node.motor, node.link
-        self._motor_rad = units.to_rad
+        self._motor_rad, self._motor_counts = units.to_rad, units.to_counts
         self._lowest, self._modulus = units.lowest, units.modulus
         self._link_rad = None if link is None else link.to_rad
         self.motor_pos = self._motor_rad(0)
@@ -66,35 +85,28 @@ class AxisLink:
         self.torque = math.nan
         maps = {node.tpdo_id(pdo): PdoMap(pdo.objects) for pdo in node.tpdos}
         self._tpdos = {
-            cob_id: (1 << number, layout, _wanted(layout, node))
+            cob_id: (1 << number, layout.values_of, _wanted(layout, node))
             for number, (cob_id, layout) in enumerate(maps.items())
         }
-        self._tpdo_ids = tuple(maps)
+        self.tpdo_ids = tuple(maps)
+        self._pick = _picker([wanted for _, _, wanted in self._tpdos.values()])
         self._all = (1 << len(maps)) - 1
         self._missing = self._all
         self.fresh = False
         self._shown = [0, 0, 0, 0]
         """Statusword, motor, link and torque, as received."""
         self._rpdos = tuple((node.rpdo_id(pdo), PdoMap(pdo.objects)) for pdo in node.rpdos)
+        self.rpdo_sizes = {cob_id: layout.size for cob_id, layout in self._rpdos}
+        self.rpdo_ids = tuple(self.rpdo_sizes)
         self._plain = self._plain_layout()
         self._motor = Unwrapper(units.modulus, 0)
         self._link = Unwrapper(1 if link is None else link.modulus, 0)
         self._known = False
 
     def _plain_layout(self) -> bool:
-        """Whether all process data is one usual frame each way."""
+        """Whether all commands are one usual frame."""
         plain = (CONTROLWORD, self.node.target_object)
         return len(self._rpdos) == 1 and self._rpdos[0][1].entries == plain
-
-    @property
-    def tpdo_ids(self) -> tuple[int, ...]:
-        """COB-IDs to expect after every SYNC."""
-        return self._tpdo_ids
-
-    @property
-    def rpdo_ids(self) -> tuple[int, ...]:
-        """COB-IDs of the drive's RPDOs, which carry its commands."""
-        return tuple(cob_id for cob_id, _ in self._rpdos)
 
     @property
     def known(self) -> bool:
@@ -117,22 +129,27 @@ class AxisLink:
 
     def feed(self, cob_id: int, data: bytes | bytearray) -> bool:
         """Take a TPDO; false, and nothing changed, if its length is wrong."""
-        bit, layout, wanted = self._tpdos[cob_id]
+        bit, values_of, wanted = self._tpdos[cob_id]
         try:
-            values = layout.unpack(data)
-        except CodecError:
+            values = values_of(data)
+        except struct.error:
             return False
+        if self._pick is not None:
+            self._missing, self.fresh = 0, True
+            self._digest(self._pick(values))
+            return True
         shown = self._shown
         for slot, place in wanted:
             shown[slot] = values[place]
         self._missing &= ~bit
         if not self._missing:
             self.fresh = True
-            self._digest()
+            self._digest(shown)
         return True
 
-    def _digest(self) -> None:
-        self.statusword, motor, link, torque = self._shown
+    def _digest(self, shown: Sequence[int]) -> None:
+        """Take all that a drive has shown in a cycle, in the order of the slots."""
+        self.statusword, motor, link, torque = shown
         if not self._known:
             self._find(motor)
         self.motor_counts = counts = self._motor.feed(motor)
@@ -173,7 +190,7 @@ class AxisLink:
 
     def aim(self, motor_pos: float) -> None:
         """Set the target [rad]."""
-        self.target_counts = self.node.motor.to_counts(motor_pos)
+        self.target_counts = self._motor_counts(motor_pos)
 
     def aim_at_actual(self) -> None:
         """Set the target to where the motor is."""

@@ -76,11 +76,12 @@ class Cycle:
             node.node_id: watch for node, watch in zip(config.nodes, self.watches, strict=True)
         }
         self._period_ns = config.period_ns
+        # SYNC is still sent up to half a period late; later it would crowd the next one.
+        self._latest_ns = config.period_ns - config.period_ns // 2
         self._deadline_ns = 1000 * config.deadline_us
         self._due_ns = 0
         self._owed: set[int] = set()
         """COB-IDs of process data that has not come, and still may."""
-        self._sync = port.message(SYNC_ID)
         modes = mode_polls(self.axes, config)
         both = zip(config.nodes, self.polls, modes, strict=True)
         self._polls = {node.node_id: polls for node, *polls in both}
@@ -105,26 +106,21 @@ class Cycle:
         timebase = self._port.timebase
         now_ns = timebase.now_ns()
         late_ns = now_ns - self._due_ns
-        # SYNC is still sent up to half a period late; later it would crowd the next one.
-        skipped = max(0, (late_ns + self._period_ns // 2) // self._period_ns)
-        self._due_ns += skipped * self._period_ns
+        skipped = 0
+        if late_ns >= self._latest_ns:
+            skipped = (late_ns + self._period_ns // 2) // self._period_ns
+            self._due_ns += skipped * self._period_ns
         timebase.wait_until(self._due_ns)
         self.bus_error = None
         self._drain()
         silent = int(bool(self._owed) and not self.stopping)
         if silent:
             self._keep_silent()
-        due_ns = self._due_ns
+        due_ns, sync_ns = self._due_ns, timebase.now_ns()
+        sent = self._outgoing.sync()
         for axis in self.axes:
             axis.begin_cycle()
-        sync_ns = timebase.now_ns()
-        missing = self._expected
-        try:
-            self._port.put(self._sync)
-        except BusError as error:
-            self._failed(error)
-        else:
-            missing = self._gather(sync_ns + self._deadline_ns)
+        missing = self._gather(sync_ns + self._deadline_ns) if sent else self._expected
         self._requests.turn(None if missing or self.stopping else timebase.now_ns() - sync_ns)
         for axis, watch in zip(self.axes, self.watches, strict=True):
             watch.cycle(complete=axis.fresh)

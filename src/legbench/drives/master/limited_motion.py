@@ -31,7 +31,12 @@ class LimitedMotion:
             guard: limits of their motion and of their commands.
             stiffness: stiffness of the series springs, one a drive [N m/rad].
             two_encoders: every drive has an encoder on both sides of its spring.
+
+        Raises:
+            ValueError: not one spring a drive.
         """
+        if len(stiffness) != len(cycle.axes):
+            raise ValueError(f"{len(stiffness)} springs for {len(cycle.axes)} drives")
         self._two_encoders = two_encoders
         self._cycle, self._guard = cycle, guard
         self._stiffness = tuple(float(value) for value in stiffness)

@@ -40,6 +40,9 @@ from legbench.limits.momentum import LegMomentum
 from legbench.limits.safety import SafetyLimits
 from legbench.limits.shortfall import Shortfall
 
+EXCHANGING = (LinkState.RUNNING, LinkState.CYCLIC)
+"""States in which process data is exchanged."""
+
 
 @final
 class Link(DriveLeader):
@@ -212,15 +215,16 @@ class Link(DriveLeader):
             PlantFault: a watchdog or a limit; all drives have been stopped by then.
         """
         self._refuse_ended()
+        cycle, motion = self.cycle, self._motion
         with self._stop_on_error:
             tick = self._ticks.watched()
             if self._status.state is LinkState.CYCLIC:
                 self._start_up.idle()
-                return self._motion.sample(tick)
+                return motion.sample(tick)
             self._supervisor.states()
-            self.cycle.notices.statuswords(self.cycle.axes, tick.time_ns)
-            sample = self._motion.sample(tick)
-            self._motion.check(sample)
+            cycle.notices.statuswords(cycle.axes, tick.time_ns)
+            sample = motion.sample(tick)
+            motion.check(sample)
         return sample
 
     def look(self) -> Sample:
@@ -285,5 +289,5 @@ class Link(DriveLeader):
         status = self._status
         if status.fault is not None:
             raise status.fault
-        if status.state not in (LinkState.CYCLIC, LinkState.RUNNING):
+        if status.state not in EXCHANGING:
             raise DriveError(f"the link is {status.state.name.lower()}; start it first")

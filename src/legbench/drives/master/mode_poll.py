@@ -22,17 +22,20 @@ class ModePoll:
     """Poll of 6061h from when a drive is enabled until it shows cyclic synchronous position mode.
 
     Drives that have shown their mode before are not asked.
+
+    Attributes:
+        every: cycles between two requests.
     """
 
     def __init__(self, axis: AxisLink, every_cycles: int = EVERY_MS) -> None:
         """Poll every so many cycles; by default of 1 ms each."""
-        self._axis, self._every = axis, every_cycles
+        self._axis, self.every = axis, every_cycles
         self._upload: Upload | None = None
 
     def due(self, cycle: int) -> Frame | None:
         """SDO request of this cycle, none if none is due."""
         axis = self._axis
-        if axis.in_mode or cycle % self._every:
+        if axis.in_mode or cycle % self.every:
             return None
         if decode_state(axis.statusword) is not DriveState.OPERATION_ENABLED:
             return None

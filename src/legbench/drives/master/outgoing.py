@@ -1,18 +1,21 @@
-"""The frames that a master sends after the process data of a cycle: commands and heartbeat."""
+"""The frames that a master sends in every cycle: SYNC, commands and heartbeat."""
 
 from collections.abc import Callable, Sequence
 from typing import final
 
+import can
+
 from legbench.drives.errors import BusError
 from legbench.drives.master.axis_link import AxisLink
 from legbench.drives.master.port import Port
+from legbench.drives.protocol.frame import SYNC_ID
 from legbench.drives.protocol.nmt import NmtState, heartbeat_frame
 from legbench.drives.setup.config import BusConfig
 
 
 @final
 class Outgoing:
-    """Sender of what follows SYNC; a bus that fails is told to its owner, and nothing is raised."""
+    """Sender of cyclic frames; a bus that fails is told to its owner, and nothing is raised."""
 
     def __init__(
         self,
@@ -30,14 +33,25 @@ class Outgoing:
             failed: called with the error of a frame that could not be sent.
         """
         self._port, self._axes, self._failed = port, axes, failed
-        self._beat = heartbeat_frame(config.master_id, NmtState.OPERATIONAL)
+        self._sync = port.message(SYNC_ID)
+        beat = heartbeat_frame(config.master_id, NmtState.OPERATIONAL)
+        self._beat = port.message(beat.cob_id, beat.data)
         self._beat_ns = 1_000_000 * config.master_heartbeat_ms
         self._beat_due_ns = 0
-        self._commands = {cob_id: port.message(cob_id) for axis in axes for cob_id in axis.rpdo_ids}
+        self._commands = {
+            cob_id: port.message(cob_id, bytes(size))
+            for axis in axes
+            for cob_id, size in axis.rpdo_sizes.items()
+        }
+        """COB-ID -> message of its true length, whose bytes are replaced in every cycle."""
 
     def begin(self, due_ns: int) -> None:
         """Place the next heartbeat one interval after a tick of the grid [ns]."""
         self._beat_due_ns = due_ns + self._beat_ns
+
+    def sync(self) -> bool:
+        """Send SYNC; false if the bus failed."""
+        return self._put(self._sync)
 
     def commands(self, controlwords: Sequence[int | None]) -> bool:
         """Send the RPDOs of all drives, which act at the next SYNC; false if the bus failed.
@@ -45,19 +59,14 @@ class Outgoing:
         A frame that is refused keeps no other drive from its own. A drive without a controlword
         gets no frame.
         """
-        sent = True
+        sent, messages = True, self._commands
         for axis, controlword in zip(self._axes, controlwords, strict=True):
             if controlword is None:
                 continue
             for cob_id, data in axis.frames(controlword):
-                message = self._commands[cob_id]
-                message.data = bytearray(data)
-                message.dlc = len(data)
-                try:
-                    self._port.put(message)
-                except BusError as error:
-                    self._failed(error)
-                    sent = False
+                message = messages[cob_id]
+                message.data[:] = data
+                sent = self._put(message) and sent
         return sent
 
     def heartbeat(self, due_ns: int) -> bool:
@@ -67,10 +76,16 @@ class Outgoing:
         """
         if due_ns < self._beat_due_ns:
             return True
+        if not self._put(self._beat):
+            return False
+        self._beat_due_ns = due_ns + self._beat_ns
+        return True
+
+    def _put(self, message: can.Message) -> bool:
+        """Send a message; false if the bus failed."""
         try:
-            self._port.send_frame(self._beat)
+            self._port.put(message)
         except BusError as error:
             self._failed(error)
             return False
-        self._beat_due_ns = due_ns + self._beat_ns
         return True

@@ -89,8 +89,9 @@ class Port:
         Raises:
             BusError: the driver has failed.
         """
+        now_ns = self.timebase.now_ns
         while True:
-            left = 1e-9 * (until_ns - self.timebase.now_ns())
+            left = 1e-9 * (until_ns - now_ns())
             message = self._receive(left if left > 0.0 else 0.0)
             if message is None or self._for_us(message):
                 return message

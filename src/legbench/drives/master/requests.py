@@ -1,5 +1,6 @@
 """SDO requests beside the cycle, each at a time at which its answer holds up no SYNC."""
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Protocol, final
 
@@ -12,6 +13,9 @@ from legbench.drives.setup.config import BusConfig
 
 class Poll(Protocol):
     """A request that is due in some cycles."""
+
+    every: int
+    """Number of cycles between two requests; in those between, `due` returns none."""
 
     def due(self, cycle: int) -> Frame | None:
         """Request of this cycle, none if none is due."""
@@ -41,6 +45,7 @@ class Requests:
         self._latest_ns = 1000 * latest_request_us(config)
         self._patience = config.cycles_in(PATIENCE_MS)
         self._cycle = 0
+        self._step = math.gcd(*(poll.every for poll in polls))
         self._waiting: dict[Poll, tuple[int, Frame]] = {}
         """Poll -> cycle in which its request became due, and the request."""
 
@@ -52,10 +57,12 @@ class Requests:
                 which nothing may be asked.
         """
         self._cycle += 1
-        for place, poll in enumerate(self._polls):
-            frame = poll.due(self._cycle + place)
-            if frame is not None:
-                self._waiting.setdefault(poll, (self._cycle, frame))
+        # None is due unless a multiple of all their intervals is at most one turn of them away.
+        if -self._cycle % self._step < len(self._polls):
+            for place, poll in enumerate(self._polls):
+                frame = poll.due(self._cycle + place)
+                if frame is not None:
+                    self._waiting.setdefault(poll, (self._cycle, frame))
         if not self._waiting or after_sync_ns is None:
             return
         poll, (since, frame) = next(iter(self._waiting.items()))

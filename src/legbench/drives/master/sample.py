@@ -1,15 +1,14 @@
 """The measurements of one cycle."""
 
 from collections.abc import Sequence
-from operator import attrgetter
+from operator import attrgetter, mul, sub
 from typing import NamedTuple
 
 from legbench.drives.master.cycle import Cycle
 from legbench.drives.master.joint import joint_of
 from legbench.drives.master.tick import Tick
 
-_MOTOR, _LINK = attrgetter("motor_pos"), attrgetter("link_pos")
-_STATUSWORD, _FRESH, _CELSIUS = map(attrgetter, ("statusword", "fresh", "celsius"))
+_SHOWN = attrgetter("motor_pos", "link_pos", "statusword", "fresh")
 
 
 class Sample(NamedTuple):
@@ -58,9 +57,9 @@ def sample_of(
         two_encoders: every drive has an encoder on both sides of its spring.
     """
     axes = cycle.axes
+    motor, links, statusword, fresh = zip(*map(_SHOWN, axes), strict=True)
     if two_encoders:
-        motor, links = tuple(map(_MOTOR, axes)), tuple(map(_LINK, axes))
-        torque = tuple([k * (a - b) for k, a, b in zip(stiffness, motor, links, strict=True)])
+        torque = tuple(map(mul, stiffness, map(sub, motor, links)))
     else:
         joints = [joint_of(axis, k) for axis, k in zip(axes, stiffness, strict=True)]
         motor, links, torque = zip(*joints, strict=True)
@@ -72,7 +71,7 @@ def sample_of(
         links,
         torque,
         applied_pos,
-        tuple(map(_STATUSWORD, axes)),
-        tuple(map(_FRESH, axes)),
-        tuple(map(_CELSIUS, cycle.polls)),
+        statusword,
+        fresh,
+        tuple([poll.celsius for poll in cycle.polls]),
     )

@@ -27,6 +27,7 @@ class Supervisor:
         self._overruns = 0
         self._ignored = 0
         self._unsent = 0
+        self._lost_frames = limits.lost_frames
         self._watches_temperature = math.isfinite(limits.temperature)
 
     def bus(self, tick: Tick) -> None:
@@ -72,7 +73,7 @@ class Supervisor:
         if self._watches_temperature:
             self._temperatures()
         for watch in self._cycle.watches:
-            trouble = watch.trouble(now_ns, self._limits.lost_frames)
+            trouble = watch.trouble(now_ns, self._lost_frames)
             if trouble is not None:
                 cause, text = trouble
                 error = self._cycle.bus_error
@@ -80,8 +81,9 @@ class Supervisor:
 
     def _temperatures(self) -> None:
         """Check that every drive that is to report its temperature does."""
-        for axis, poll in zip(self._cycle.axes, self._cycle.polls, strict=True):
+        for place, poll in enumerate(self._cycle.polls):
             if poll.unanswered >= MISSING_TEMPERATURES:
+                axis = self._cycle.axes[place]
                 raise PlantFault(
                     "temperature",
                     f"drive '{axis.node.name}' (node {axis.node.node_id}) has not reported its "

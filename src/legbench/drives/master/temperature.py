@@ -17,13 +17,14 @@ class TemperaturePoll:
     """Poll of a drive's temperature every `EVERY_MS`; an unanswered request is repeated.
 
     Attributes:
+        every: cycles between two requests.
         celsius: last temperature, none before or where the bus file names no object [deg C].
         unanswered: requests in a row that brought no temperature.
     """
 
     def __init__(self, node: NodeConfig, every_cycles: int = EVERY_MS) -> None:
         """Poll every so many cycles; by default of 1 ms each."""
-        self._every = every_cycles
+        self.every = every_cycles
         self._object, self._scale = node.temperature_object, node.temperature_scale
         self._request_id = SDO_REQUEST_BASE + node.node_id
         self._upload: Upload | None = None
@@ -33,7 +34,7 @@ class TemperaturePoll:
 
     def due(self, cycle: int) -> Frame | None:
         """SDO request of this cycle, none if none is due."""
-        if self._object is None or cycle % self._every:
+        if self._object is None or cycle % self.every:
             return None
         if self._waiting:
             self.unanswered += 1

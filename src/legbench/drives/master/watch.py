@@ -6,6 +6,8 @@ from legbench.drives.protocol.emcy import MEANINGS, Emergency, decode_emcy
 from legbench.drives.protocol.nmt import HeartbeatWatch, NmtState, decode_heartbeat
 from legbench.drives.setup.config import BusConfig, NodeConfig
 
+NOT_OPERATIONAL = (NmtState.PRE_OPERATIONAL, NmtState.STOPPED)
+"""NMT states in which a drive sends no process data."""
 HEARTBEATS = 3
 """Number of heartbeat periods without a heartbeat after which a drive is lost."""
 
@@ -85,20 +87,20 @@ class NodeWatch:
 
     def trouble(self, now_ns: int, lost_frames: int) -> tuple[str, str] | None:
         """Cause and message of what is wrong with the drive; none if nothing is."""
-        who = self._who
         if self.emergency is not None:
-            return "drive emergency", f"{who}: {self.emergency}{self._way()}"
+            return "drive emergency", f"{self._who}: {self.emergency}{self._way()}"
         if self._rebooted:
-            return "drive reset", f"{who} has started again; its configuration is gone"
+            return "drive reset", f"{self._who} has started again; its configuration is gone"
         if self.missed >= lost_frames:
             return (
                 "process data lost",
-                f"{who} sent no process data for {self.missed} cycles, the limit is {lost_frames}",
+                f"{self._who} sent no process data for {self.missed} cycles, the limit is "
+                f"{lost_frames}",
             )
         if self.expects_heartbeat and self._beat.lost(now_ns):
             late_ms = (now_ns - self._beat.last_ns) / 1e6
-            return "heartbeat lost", f"{who}: no heartbeat for {late_ms:.0f} ms"
+            return "heartbeat lost", f"{self._who}: no heartbeat for {late_ms:.0f} ms"
         state = self.state
-        if state is NmtState.PRE_OPERATIONAL or state is NmtState.STOPPED:
-            return "drive left operational", f"{who} is {state.name.lower()}"
+        if state is not None and state in NOT_OPERATIONAL:
+            return "drive left operational", f"{self._who} is {state.name.lower()}"
         return None

@@ -69,6 +69,8 @@ class PdoMap:
         self._ranges = tuple(range_of(entry.kind) for entry in self.entries)
         self.size = self._layout.size
         """Length of the frame's data [bytes]."""
+        self.values_of = self._layout.unpack
+        """Function that unpacks as `unpack` does, but raises `struct.error` for a wrong length."""
         if not self.entries or self.size > MAX_BYTES:
             names = ", ".join(map(str, self.entries)) or "nothing"
             raise CodecError(f"a PDO of {names} has {self.size} bytes; it must have 1 to 8")

@@ -1,4 +1,4 @@
-"""Time at which a request beside the cycle may be sent, so that it holds up no SYNC; pure."""
+"""Time at which a request beside the cycle may be sent, so that no answer is late; pure."""
 
 from legbench.drives.protocol.pdo import PdoMap
 from legbench.drives.setup.config import BusConfig
@@ -11,12 +11,14 @@ SDO_BYTES = 8
 
 
 def latest_request_us(bus: BusConfig) -> int:
-    """Latest time after SYNC at which a request may leave, its answer ending before the next [us].
+    """Latest time after SYNC at which a request may leave, so that no answer is late [us].
 
     A frame on the wire is not interrupted (ISO 11898-1): an answer that begins just before SYNC
-    holds it up by 135 us at 1 Mbit/s, and with it the answers to SYNC. The request goes first, the
-    commands behind it while the drive prepares its answer; one heartbeat may be in front of that.
-    A drive is taken to answer a request as fast as SYNC. Negative where the period has no room.
+    holds it up by 135 us at 1 Mbit/s, and with it the answers to SYNC. These have room for one
+    heartbeat in front of SYNC (`exchange`), so the SDO answer may end as late as that one would.
+    The request goes first, the commands behind it while the drive prepares its answer; a heartbeat
+    may be in front of each of the two frames. A drive is taken to answer a request as fast as SYNC.
+    Negative where the period has no room.
     """
     latest = []
     for channel in bus.channels:
@@ -25,6 +27,7 @@ def latest_request_us(bus: BusConfig) -> int:
             for node in bus.nodes_on(channel)
             for pdo in node.rpdos
         )
+        # Two heartbeats are in front, one is what the answers have room for after the period.
         frames_us = 1e6 * (2 * worst_bits(SDO_BYTES) + worst_bits(1)) / bus.bitrate
         wait_us = max(bus.reply_delay_us, 1e6 * commands / bus.bitrate)
         latest.append(bus.period_us - frames_us - wait_us)

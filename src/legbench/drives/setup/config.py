@@ -155,7 +155,7 @@ class NodeConfig:
         return pdo.identifier(TPDO_BASES, self.node_id)
 
 
-USUAL_DEADLINE = 0.7
+USUAL_DEADLINE = 0.72
 """Share of the period that drives have for their answers [-]."""
 NOT_IN_FILES = "not in files"
 """Metadata of a field that is no key of a bus file."""
@@ -177,9 +177,9 @@ class BusConfig:
     """Bitrate of the bus [bit/s]."""
     period_us: int = 1000
     tpdo_deadline_us: int | None = None
-    """Deadline of the TPDOs after SYNC; later process data counts as lost; by default 70 % of the
-    period [us]. A reply delay of 250 us, two full frames and a heartbeat in front make 640 us at
-    1 Mbit/s; RPDOs need 230 us after it."""
+    """Deadline of the TPDOs after SYNC; later process data counts as lost; by default 72 % of the
+    period [us]. A reply delay of 250 us, two full frames and two heartbeats in front make 705 us at
+    1 Mbit/s; RPDOs and a heartbeat in front of them need 295 us after it."""
     reply_delay_us: int = 250
     """Longest time from SYNC until a drive begins to send its first answer [us]."""
     master_id: int = 126

@@ -1,11 +1,14 @@
 """Time that the frames of a cycle take at worst: answers and commands of every channel; pure.
 
 Of the frames that are ready, the one with the lowest identifier is sent first, and a frame that is
-on the wire already is not interrupted (ISO 11898-1). So the last answer of a channel ends, at
-worst, after SYNC, the longest reply delay, one heartbeat that had just begun and all answers. An
-SDO answer, which is longer, is asked for when it ends before SYNC (`asking`).
+on the wire already is not interrupted (ISO 11898-1). So a heartbeat that has just begun may be in
+front of SYNC, another one in front of the answers, a third one in front of the commands: both
+drives and the master send them, each on a clock of its own. The last answer of a channel ends, at
+worst, after SYNC, the longest reply delay, two heartbeats and all answers. An SDO answer, which is
+longer, is asked for when it keeps SYNC no longer than a heartbeat does (`asking`).
 """
 
+import math
 from dataclasses import dataclass
 
 from legbench.drives.protocol.pdo import PdoMap
@@ -16,7 +19,7 @@ from legbench.errors import ConfigError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Exchange:
-    """Longest exchange of one channel, from the begin of SYNC."""
+    """Longest exchange of one channel, from the tick at which SYNC is to be sent."""
 
     channel: str | None
     answers_us: float
@@ -30,12 +33,20 @@ def exchanges(bus: BusConfig) -> tuple[Exchange, ...]:
     found: list[Exchange] = []
     for channel in bus.channels:
         nodes = bus.nodes_on(channel)
-        answers = worst_bits(0) + worst_bits(1) + sum(_bits(node.tpdos) for node in nodes)
-        commands = sum(_bits(node.rpdos) for node in nodes)
+        beats = _heartbeats(bus, len(nodes))
+        answers = worst_bits(0) + sum(_bits(node.tpdos) for node in nodes)
+        commands = answers + sum(_bits(node.rpdos) for node in nodes)
+        answers += worst_bits(1) * min(2, beats)
+        commands += worst_bits(1) * min(3, beats)
         answers_us = bus.reply_delay_us + 1e6 * answers / bus.bitrate
-        commands_us = answers_us + 1e6 * commands / bus.bitrate
+        commands_us = bus.reply_delay_us + 1e6 * commands / bus.bitrate
         found.append(Exchange(channel=channel, answers_us=answers_us, commands_us=commands_us))
     return tuple(found)
+
+
+def _heartbeats(bus: BusConfig, drives: int) -> int:
+    """Largest number of heartbeats in a cycle on a channel with so many drives and the master."""
+    return drives * math.ceil(bus.period_us / (1000 * bus.heartbeat_ms)) + 1
 
 
 def _bits(pdos: tuple[PdoConfig, ...]) -> int:

@@ -136,13 +136,14 @@ def wrap(counts: int, bits: int = 32) -> int:
 class Unwrapper:
     """Follows a wrapping position object across its seam."""
 
+    __slots__ = ("_half", "_modulus", "counts")
+
     def __init__(self, modulus: int, near: int) -> None:
         self._half, self._modulus = modulus // 2, modulus
         self.counts = near
 
     def feed(self, shown: int) -> int:
         """The unwrapped count: `AxisUnits.nearest` without its calls, four times a cycle."""
-        half = self._half
-        near = self.counts
-        self.counts = near + (shown - near + half) % self._modulus - half
-        return self.counts
+        near, half = self.counts, self._half
+        self.counts = counts = near + (shown - near + half) % self._modulus - half
+        return counts
