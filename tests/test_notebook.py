@@ -20,6 +20,7 @@ with warnings.catch_warnings():
     nbclient = pytest.importorskip(
         "nbclient", reason="no notebook can be executed: pip install 'legbench[notebook]'"
     )
+    nbformat = pytest.importorskip("nbformat")  # nbclient needs it, too
 
 
 def notebook_of(program: str) -> dict[str, Any]:
@@ -45,8 +46,6 @@ def notebook_of(program: str) -> dict[str, Any]:
 
 @pytest.mark.filterwarnings("ignore")  # The kernel's warnings are those of Jupyter.
 def test_cells_show_a_table_and_a_figure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import nbformat  # noqa: PLC0415
-
     (tmp_path / "models").symlink_to(ROOT / "models")
     monkeypatch.setenv("JUPYTER_PLATFORM_DIRS", "1")
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT / "src")]))

@@ -11,9 +11,10 @@ from legbench.analytic import LegModel, LegState, Regime, standing
 from legbench.analytic.smooth import Accuracy
 from legbench.control import BangBangConfig, JumpConfig
 from legbench.design import load_design
+from legbench.design.rig import BOOM_BEND
 from legbench.design.setup import Setup, SetupKind
 from legbench.experiment import ControllerSettings, Experiment, make_controller, targets_of
-from legbench.plant.analytic import HANGING_BEND, AnalyticPlant
+from legbench.plant.analytic import AnalyticPlant
 from legbench.plant.start import PERIOD, Start
 
 pytest.importorskip("heyoka")
@@ -63,7 +64,7 @@ def first_state(model: LegModel, setup: Setup, start: Start) -> LegState:
     q = (float(start.joint_pos[0]), float(start.joint_pos[1]))
     if setup.trunk_moves:
         return standing(model, q, pinned=setup.kind is SetupKind.FFS)
-    height = 2.0 * model.floating.reach * float(np.cos(HANGING_BEND))
+    height = 2.0 * model.floating.reach * float(np.cos(BOOM_BEND))
     return LegState(0.0, Regime.HANGING, q, (0.0, 0.0), (0.0, height), (0.0, 0.0))
 
 

@@ -95,7 +95,8 @@ def test_every_range_has_two_ends(kind: str, end: int, axis: int) -> None:
     limits = load_limits(LIMITS)
     ranges = [list(one) for one in getattr(limits, f"{kind}_range")]
     ranges[axis - 1][end] = math.inf if end else -math.inf
-    open_ended = replace(limits, **{f"{kind}_range": tuple(map(tuple, ranges))})
+    changed: dict[str, Any] = {f"{kind}_range": tuple(map(tuple, ranges))}
+    open_ended = replace(limits, **changed)
     session, network = opened()
     said = rf"{kind}_range of axis {axis} is \[.*inf.*\] rad; a motor is not jogged without"
     with session, pytest.raises(ConfigError, match=said):

@@ -53,7 +53,7 @@ def served(
 
     emulate.serve(
         BENCH,
-        lambda network: cast(Any, seen.wires.append(Wire(network)) or seen.wires[0]),
+        lambda networks: cast(Any, seen.wires.append(Wire(*networks)) or seen.wires[0]),
         start_pos=START,
         **patience,
         report=report,
