@@ -5,10 +5,9 @@ from collections.abc import Sequence
 from typing import final
 
 from legbench.errors import PlantFault
+from legbench.limits.encoder_watch import EncoderWatch
 from legbench.limits.knee import knee_of, project
-from legbench.limits.momentum import LegMomentum, Reading
-from legbench.limits.momentum_watch import MomentumWatch
-from legbench.limits.plausibility import Doubt, LinkWatch, MotorWatch
+from legbench.limits.momentum import LegMomentum
 from legbench.limits.safety import START_TOLERANCE, UNLIMITED, SafetyLimits
 from legbench.limits.shortfall import Shortfall
 
@@ -48,19 +47,13 @@ class Guard:
         self._limits = limits
         self._loads = tuple("spring_torque" in names for names in known)
         self._shown = tuple("joint_pos" in names for names in known)
-        self._two_encoders = two_encoders
         self._step_max = limits.command_speed * period
         self._knee = None if limits.motor_knee_range == UNLIMITED else limits.motor_knee_range
         limited_knee = limits.joint_knee_range != UNLIMITED and all(self._shown)
         self._joint_knee = limits.joint_knee_range if limited_knee else None
         self._wish: tuple[float, ...] | None = None
-        bounds = limits.bounds(period)
-        self._motors = tuple(MotorWatch(bounds) for _ in limits.motor_range)
-        self._links = LinkWatch(bounds)
+        self._encoders = EncoderWatch(limits, period, two_encoders=two_encoders, momentum=momentum)
         self._period = period
-        self._momentum = None
-        if momentum is not None and limits.link_error is not None:
-            self._momentum = MomentumWatch(momentum, limits.link_error, period)
         self.applied: tuple[float, ...] = ()
         self.shortfall = Shortfall(period)
 
@@ -68,11 +61,7 @@ class Guard:
         """Begin from where the motors are, whatever was commanded before [rad]."""
         self.applied = tuple(float(value) for value in motor_pos)
         self._wish = None
-        for watch, value in zip(self._motors, self.applied, strict=False):
-            watch.start_at(value)
-        self._links.start()
-        if self._momentum is not None:
-            self._momentum.start()
+        self._encoders.start(self.applied)
         self.shortfall.restart()
 
     def restart_from_applied(self) -> None:
@@ -231,7 +220,9 @@ class Guard:
         if expected_pos is not None:
             led = motor_pos if led_pos is None else led_pos
             after = elapsed * self._period if interval is None else interval
-            self._check_encoders(led, joint_pos, expected_pos, fresh, elapsed, after)
+            doubt = self._encoders.see(led, joint_pos, expected_pos, fresh, elapsed, after)
+            if doubt is not None:
+                raise PlantFault(doubt.cause, doubt.message)
 
     def _refuse_torques(self, spring_torque: Sequence[float]) -> None:
         """Raise PlantFault for the first known torque beyond its limit; none if all are unknown."""
@@ -279,45 +270,3 @@ class Guard:
                     f"joint {axis} is at {value:.3f} rad, the limits are [{low:g}, {high:g}] rad, "
                     f"joint_range of axis {axis}",
                 )
-
-    def _check_encoders(
-        self,
-        motor_pos: Sequence[float],
-        joint_pos: Sequence[float],
-        expected_pos: Sequence[float],
-        fresh: Sequence[bool],
-        elapsed: int,
-        interval: float,
-    ) -> None:
-        found = None
-        for axis, watch in enumerate(self._motors):
-            found = watch.see(axis + 1, motor_pos[axis], expected_pos[axis]) or found
-        doubt = None
-        if self._two_encoders:
-            doubt = self._links.see(motor_pos, joint_pos, expected_pos, fresh, elapsed)
-            doubt = doubt or self._check_momentum(motor_pos, joint_pos, fresh, interval)
-        if found is None and doubt is not None:
-            # A motor that is not where it should be makes the springs sway, too: it is the cause.
-            suspects = [watch.suspicion for watch in self._motors if watch.suspicion is not None]
-            found = suspects[0] if suspects else doubt
-        if found is not None:
-            raise PlantFault(found.cause, found.message)
-
-    def _check_momentum(
-        self,
-        motor_pos: Sequence[float],
-        joint_pos: Sequence[float],
-        fresh: Sequence[bool],
-        interval: float,
-    ) -> Doubt | None:
-        """Ask the leg's momentum, where a sway may hide an encoder that is wrong."""
-        watch = self._momentum
-        if watch is None:
-            return None
-        if not (all(fresh) and self._links.hides_drift):
-            watch.restart()
-            return None
-        motor_1, motor_2 = motor_pos
-        joint_1, joint_2 = joint_pos
-        reading = Reading(interval, (motor_1, motor_2), (joint_1, joint_2))
-        return watch.see(reading, stands=self._links.stands)

@@ -1,0 +1,98 @@
+"""All encoders of one leg, held against the commands, against each other, and against the leg."""
+
+from collections.abc import Sequence
+from typing import final
+
+from legbench.limits.momentum import LegMomentum, Reading
+from legbench.limits.momentum_watch import MomentumWatch
+from legbench.limits.plausibility import Doubt, LinkWatch, MotorWatch
+from legbench.limits.safety import SafetyLimits
+
+
+@final
+class EncoderWatch:
+    """Watches the motors' and the links' encoders of one leg, cycle by cycle."""
+
+    def __init__(
+        self,
+        limits: SafetyLimits,
+        period: float,
+        *,
+        two_encoders: bool,
+        momentum: LegMomentum | None,
+    ) -> None:
+        """Watch over a leg.
+
+        Args:
+            limits: what its encoders may show.
+            period: of the cycles [s].
+            two_encoders: every axis has an encoder on both sides of its spring, without which
+                their readings cannot be held against each other.
+            momentum: what the leg's angular momentum obeys; without it `link_error` does not act.
+        """
+        bounds = limits.bounds(period)
+        self._motors = tuple(MotorWatch(bounds) for _ in limits.motor_range)
+        self._links = LinkWatch(bounds)
+        self._two_encoders = two_encoders
+        self._momentum = None
+        if momentum is not None and limits.link_error is not None:
+            self._momentum = MomentumWatch(momentum, limits.link_error, period)
+
+    def start(self, motor_pos: Sequence[float]) -> None:
+        """Begin anew from where the motors are [rad]."""
+        for watch, value in zip(self._motors, motor_pos, strict=False):
+            watch.start_at(value)
+        self._links.start()
+        if self._momentum is not None:
+            self._momentum.start()
+
+    def see(
+        self,
+        motor_pos: Sequence[float],
+        joint_pos: Sequence[float],
+        expected_pos: Sequence[float],
+        fresh: Sequence[bool],
+        elapsed: int,
+        interval: float,
+    ) -> Doubt | None:
+        """Look at one cycle; returns what a healthy leg would not show.
+
+        Args:
+            motor_pos: positions that the drives' loops lead [rad].
+            joint_pos: links [rad].
+            expected_pos: command that should act by now [rad].
+            fresh: which drives have told something new in this cycle.
+            elapsed: periods since the cycle before.
+            interval: time since the cycle before [s].
+        """
+        found = None
+        for axis, watch in enumerate(self._motors):
+            found = watch.see(axis + 1, motor_pos[axis], expected_pos[axis]) or found
+        doubt = None
+        if self._two_encoders:
+            doubt = self._links.see(motor_pos, joint_pos, expected_pos, fresh, elapsed)
+            doubt = doubt or self._ask_momentum(motor_pos, joint_pos, fresh, interval)
+        if found is None and doubt is not None:
+            # A motor that is not where it should be makes the springs sway, too: it is the cause.
+            suspects = [watch.suspicion for watch in self._motors if watch.suspicion is not None]
+            found = suspects[0] if suspects else doubt
+        return found
+
+    def _ask_momentum(
+        self,
+        motor_pos: Sequence[float],
+        joint_pos: Sequence[float],
+        fresh: Sequence[bool],
+        interval: float,
+    ) -> Doubt | None:
+        """Ask the leg's momentum, where a sway may hide an encoder that is wrong."""
+        watch = self._momentum
+        if watch is None:
+            return None
+        if not (all(fresh) and self._links.hides_drift):
+            watch.restart()
+            return None
+        motor_1, motor_2 = motor_pos
+        joint_1, joint_2 = joint_pos
+        reading = Reading(interval, (motor_1, motor_2), (joint_1, joint_2))
+        return watch.see(reading, stands=self._links.stands)
