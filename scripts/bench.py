@@ -44,7 +44,7 @@ from legbench.plant.sim import SimPlant
 from legbench.plant.start import Start
 from legbench.recording.columns import Layout
 from legbench.recording.reader import Recording, load
-from legbench.recording.rows import BATCH_ROWS, Block, RowLayout
+from legbench.recording.rows import BATCH_ROWS, RowBlock, RowLayout
 from legbench.recording.writer import RunWriter
 from legbench.signals import Command, Floats, Observation, Signal
 from legbench.viz.live.rrd import write_rrd
@@ -243,9 +243,9 @@ def bench_own_signals() -> Result:
     command, observation = first_cycle()
     telling = replace(command, signals=np.zeros(4))
     own = tuple(Signal(f"own{place}", (), "-", "") for place in range(4))
-    plain, full = Block(), Block(RowLayout(Layout(own=own)))
+    plain, full = RowBlock(), RowBlock(RowLayout(Layout(own=own)))
 
-    def fill(block: Block, given: Command) -> None:
+    def fill(block: RowBlock, given: Command) -> None:
         for _ in range(400):
             block.count = 0
             for _ in range(BATCH_ROWS):

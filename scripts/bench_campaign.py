@@ -32,7 +32,7 @@ from bench import (
 from legbench.campaign import load_campaign, plan_campaign, read_table, run_campaign, shards_of
 from legbench.campaign.dask_workers import DaskExecutor
 from legbench.campaign.executor import AbstractExecutor, SerialExecutor
-from legbench.campaign.plan import Plan
+from legbench.campaign.plan import CampaignPlan
 from legbench.campaign.pool import PoolExecutor
 from legbench.experiment.batch import LegGroup, start_together
 from legbench.imperfections import Imperfections
@@ -60,19 +60,19 @@ if __name__ == "__main__":
 """
 
 
-def planned(file: Path) -> Plan:
+def planned(file: Path) -> CampaignPlan:
     """The plan of a campaign file."""
     return plan_campaign(load_campaign(file))
 
 
-def ran(plan: Plan, out: Path, executor: AbstractExecutor, size: int | None = None) -> None:
+def ran(plan: CampaignPlan, out: Path, executor: AbstractExecutor, size: int | None = None) -> None:
     """Run a campaign into a folder."""
     finished = run_campaign(plan, out, executor, shards_of(plan, size))
     if finished.table is None:
         raise SystemExit(f"it has not come to its end: {finished.failures}")
 
 
-def in_folder(plan: Plan, executor: AbstractExecutor) -> Callable[[], None]:
+def in_folder(plan: CampaignPlan, executor: AbstractExecutor) -> Callable[[], None]:
     """A whole campaign in a folder of its own."""
 
     def work() -> None:
@@ -82,7 +82,7 @@ def in_folder(plan: Plan, executor: AbstractExecutor) -> Callable[[], None]:
     return work
 
 
-def swings(text: str, folder: Path) -> Plan:
+def swings(text: str, folder: Path) -> CampaignPlan:
     """A plan of a campaign's text."""
     path = folder / "campaign.toml"
     path.write_text(text)

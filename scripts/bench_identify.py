@@ -29,12 +29,12 @@ from legbench.design import load_design
 from legbench.design.setup import Setup, SetupKind
 from legbench.errors import PlantFault
 from legbench.experiment import Experiment, run_batch
-from legbench.identify import Question, identify, parse_free
-from legbench.identify.base import Leg
+from legbench.identify import IdentificationTask, identify, parse_free
+from legbench.identify.base import FittedLeg
 from legbench.identify.fitting import fit
 from legbench.identify.prediction import Guess, nothing_moved
 from legbench.identify.problem import Problem
-from legbench.identify.trial import FIXED, Trial, trial_of
+from legbench.identify.trial import FIXED, MeasuredRun, trial_of
 from legbench.imperfections import Imperfections
 from legbench.mjcf.options import Linkage, LinkageKind
 
@@ -50,7 +50,7 @@ FREED = {
 }
 
 
-def steps() -> tuple[Trial, ...]:
+def steps() -> tuple[MeasuredRun, ...]:
     """Three steps of 3 s, with noise on the link encoders."""
     noise = float(np.radians(0.1))
     runs = run_batch(
@@ -70,9 +70,9 @@ def steps() -> tuple[Trial, ...]:
     return tuple(replace(trial_of(each), name=str(place)) for place, each in enumerate(runs))
 
 
-def against_cma(trials: tuple[Trial, ...], name: str) -> None:
+def against_cma(trials: tuple[MeasuredRun, ...], name: str) -> None:
     """Compare evaluations and processor time with pycma's."""
-    leg = Leg.of(OFF)
+    leg = FittedLeg.of(OFF)
     problem = Problem(trials, leg.reach, FREED[name])
     start = Guess(values=leg.values, starts=nothing_moved(trials))
     problem.misfit(start)  # compiled
@@ -120,7 +120,7 @@ print(f"k, d of three runs, everything imported and compiled anew: {now[0] - beg
 """
 
 
-def cold(trials: tuple[Trial, ...], folder: Path) -> None:
+def cold(trials: tuple[MeasuredRun, ...], folder: Path) -> None:
     """Identify k and d in a new process whose store of compiled integrators is empty."""
     path = folder / "trials.pickle"
     path.write_bytes(pickle.dumps((trials, OFF)))
@@ -142,11 +142,11 @@ pickle.dump(answer, open(sys.argv[1] + ".answer", "wb"))
 """
 
 
-def against_sysid(trials: tuple[Trial, ...], name: str, folder: Path) -> None:
+def against_sysid(trials: tuple[MeasuredRun, ...], name: str, folder: Path) -> None:
     """Compare the whole of an identification with the search of `mujoco.sysid` alone."""
-    identify(Question(design=OFF, trials=trials))  # compiled
+    identify(IdentificationTask(design=OFF, trials=trials))  # compiled
     before = time.process_time()
-    outcome = identify(Question(design=OFF, trials=trials))
+    outcome = identify(IdentificationTask(design=OFF, trials=trials))
     mine = time.process_time() - before
     path = folder / "peer.pickle"
     path.write_bytes(pickle.dumps((trials, OFF)))
@@ -174,7 +174,7 @@ def cpu_of_children() -> float:
     return usage.ru_utime + usage.ru_stime
 
 
-def shortened(trials: tuple[Trial, ...], duration: float) -> tuple[Trial, ...]:
+def shortened(trials: tuple[MeasuredRun, ...], duration: float) -> tuple[MeasuredRun, ...]:
     """First part of runs [s]."""
     rows = round(duration / trials[0].period)
     return tuple(

@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from legbench.analytic import Accuracy, HybridLeg, LegModel, LegState, Method, flying
+from legbench.analytic import Accuracy, HybridLeg, LegModel, LegState, RungeKutta, flying
 from legbench.analytic import matrices as mx
 from legbench.analytic.compiled import TOLERANCE
 from legbench.analytic.contact import switch
@@ -36,7 +36,7 @@ from legbench.analytic.taylor import MAP_TOLERANCE, TaylorLeg
 from legbench.control import JumpConfig
 from legbench.design import load_design
 from legbench.design.statics import Support, motor_holding
-from legbench.modes.basin import GridAxis, Question, map_basin
+from legbench.modes.basin import BasinTask, GridAxis, map_basin
 from legbench.modes.drive import JumpLaw
 from legbench.modes.fixed_point import fixed_point
 from legbench.modes.hop import Apex, return_map, settle
@@ -204,7 +204,7 @@ def basin(points: int) -> tuple[float, float]:
     start = Apex(height=0.27, speed=0.0, z1=0.0, z2=0.6, dz1=0.0, dz2=0.0)
     centre = fixed_point(leg, law, settle(leg, law, start, 60)[-1]).apex
     height = centre.height
-    question = Question(
+    question = BasinTask(
         design=design,
         jump=JumpConfig(),
         motor=(0.0, 0.0),
@@ -263,7 +263,7 @@ def main() -> int:
     fast = hops(TaylorLeg(model))
     fast()
     compiled = time.perf_counter() - began
-    scalar = Accuracy(method=Method.RK45, rtol=1e-6, atol=1e-6, max_step=1.0)
+    scalar = Accuracy(method=RungeKutta.RK45, rtol=1e-6, atol=1e-6, max_step=1.0)
     slow = {
         "RK45, matrices": (lambda: matrix_hop(model, start, motor), 5),
         "RK45, scalars": (hops(HybridLeg(model, scalar)), 20),

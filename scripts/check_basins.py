@@ -26,7 +26,7 @@ from reference.basins import Cells, edges, fates
 from reference.dop853 import Accuracy
 
 from legbench.errors import LegbenchError
-from legbench.modes.basin import Fate, Question, map_basin
+from legbench.modes.basin import BasinTask, Fate, map_basin
 from legbench.modes.fixed_point import fixed_point
 from legbench.modes.hop import NAMES, settle
 
@@ -44,7 +44,7 @@ SPANS = (2.0, 12.0)
 """Smallest and largest half width of a map, in the map's units [-]."""
 
 
-def random_map(number: int, points: int) -> Question:
+def random_map(number: int, points: int) -> BasinTask:
     """A random leg that hops, and a window around its hop."""
     random = np.random.default_rng((2, number))
     for _ in range(1000):
@@ -63,7 +63,7 @@ def random_map(number: int, points: int) -> Question:
     raise SystemExit(f"map {number}: no leg with a stable hop in 1000")
 
 
-def cells_of(questions: list[Question]) -> Cells:
+def cells_of(questions: list[BasinTask]) -> Cells:
     """Cells of maps, one map after the other, row by row."""
     starts, centres, designs, configs = [], [], [], []
     for question in questions:
@@ -86,7 +86,7 @@ def cells_of(questions: list[Question]) -> Cells:
     )
 
 
-def mapped(question: Question) -> list[str]:
+def mapped(question: BasinTask) -> list[str]:
     """Fates of a map's cells, row by row, as the package finds them."""
     with tempfile.TemporaryDirectory() as folder:
         found = map_basin(question, Path(folder) / "map.jsonl", workers=1)

@@ -24,7 +24,7 @@ from legbench.recording.reader import Recording, load
 from legbench.replay.comparison import Replayed
 from legbench.replay.controller import replay_controller
 from legbench.replay.log import load_log
-from legbench.replay.moved import Source
+from legbench.replay.moved import MotionSource
 from legbench.replay.recorded import recorded_controller, recorded_leg
 from legbench.replay.resimulation import resimulate
 from legbench.servo import ServoConfig
@@ -53,7 +53,7 @@ class Case:
 
     name: str
     experiment: Experiment
-    exact: tuple[Source, ...]
+    exact: tuple[MotionSource, ...]
     """Sources from which its resimulation is identical to the bit."""
 
 
@@ -67,7 +67,7 @@ def cases() -> Iterator[Case]:
         (step, SetupKind.FFS),
         (step, SetupKind.HFTS),
     )
-    both = tuple(Source)
+    both = tuple(MotionSource)
     for leg in ("prototype", "optimal", "table2"):
         design = load_design(ROOT / "models" / f"{leg}.toml")
         for law, setup in laws:
@@ -91,8 +91,8 @@ def cases() -> Iterator[Case]:
                 )
     design = load_design(ROOT / "models" / "prototype.toml")
     for words, servo, imperfections, exact in (
-        ("slow servo", SLOW, Imperfections(), (Source.COMMANDS,)),
-        ("imperfect", ServoConfig(), IMPERFECT, (Source.COMMANDS,)),
+        ("slow servo", SLOW, Imperfections(), (MotionSource.COMMANDS,)),
+        ("imperfect", ServoConfig(), IMPERFECT, (MotionSource.COMMANDS,)),
     ):
         chosen = Experiment(
             design=design,
@@ -117,7 +117,7 @@ def judged(case: Case, run: Recording) -> tuple[list[str], bool]:
     words = ["controller identical" if commands.identical else f"CONTROLLER {commands.first()}"]
     good = commands.identical
     count = load_bus(BUS).nodes[0].link_units.resolution
-    for source in Source:
+    for source in MotionSource:
         found = resimulate(run, recorded_leg(run), source)
         if found.signals.identical:
             words.append(f"{source} identical")
@@ -125,7 +125,7 @@ def judged(case: Case, run: Recording) -> tuple[list[str], bool]:
         worst = links(found.signals)
         words.append(f"{source} {worst:.2e} rad = {worst / count:.2f} counts")
         bound = JUMP if run.description.jumps else COUNTS * count
-        on_drives = run.description.plant == "can" and source is Source.MOTORS
+        on_drives = run.description.plant == "can" and source is MotionSource.MOTORS
         good = good and source not in case.exact and (not on_drives or worst <= bound)
     if (run.path / "bus.log").is_file():
         design, setup = run.description.design, run.description.setup

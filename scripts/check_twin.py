@@ -18,7 +18,7 @@ from legbench.design import load_design
 from legbench.design.setup import Setup, SetupKind
 from legbench.experiment import Experiment
 from legbench.identify import identify, parse_free, question_of, repeat, written_back
-from legbench.identify.base import Leg
+from legbench.identify.base import FittedLeg
 from legbench.identify.parameters import INDEX
 from legbench.identify.plan import ranked
 from legbench.identify.trial import FIXED, bars_of
@@ -59,7 +59,7 @@ def twin() -> bool:
     runs = [driven(STEP, SetupKind(kind), 3.0) for kind in FIXED]
     question = question_of(runs, free=parse_free(["nine"]))
     outcome = identify(question)
-    truth = Leg.of(HIDDEN.leg_of(PROTOTYPE), bars=bars_of(runs[0])).values
+    truth = FittedLeg.of(HIDDEN.leg_of(PROTOTYPE), bars=bars_of(runs[0])).values
     met = outcome.trusted
     print(f"trusted: {outcome.trusted}", *outcome.reasons)
     for each in outcome.estimates:

@@ -22,8 +22,8 @@ from legbench.design.setup import SetupKind
 from legbench.explain.causes import CAUSES, Cause, combined
 from legbench.explain.consistency import checks_of, only_counted, predict
 from legbench.explain.engine import rate_many
-from legbench.explain.fitting import DIFFERENCE, Fit, leg_of, rate
-from legbench.explain.jumping import Hop, hop_of
+from legbench.explain.fitting import DIFFERENCE, CauseFit, leg_of, rate
+from legbench.explain.jumping import JumpFit, hop_of
 from legbench.explain.least_squares import refine
 from legbench.explain.targets import READING, Target, step_experiment, step_target
 from legbench.imperfections import Imperfections
@@ -107,7 +107,7 @@ def others(steps: Sequence[Floats], foot: Floats) -> Floats:
     return np.maximum(apart, 0.0) / READING
 
 
-def fitted(design: LegDesign, target: Target) -> list[Fit]:
+def fitted(design: LegDesign, target: Target) -> list[CauseFit]:
     """Fit every triple from its start; the best first."""
     chosen = triples()
     owners = [causes for causes, _ in chosen]
@@ -131,7 +131,7 @@ def fitted(design: LegDesign, target: Target) -> list[Fit]:
     legs = [leg_of(design, causes, row) for causes, row in zip(owners, ends, strict=True)]
     apart, ratings = rate(design, target, legs)
     fits = [
-        Fit(
+        CauseFit(
             causes=causes,
             sizes=tuple(row.tolist()),
             ratings=tuple(rated.tolist()),
@@ -145,7 +145,7 @@ def fitted(design: LegDesign, target: Target) -> list[Fit]:
     return [fits[place] for place in order]
 
 
-def lowest(hop: Hop) -> float:
+def lowest(hop: JumpFit) -> float:
     """Distance of a jump from the bounds of its stances and flights, the worse of both [-]."""
     return float(np.nan_to_num(min(hop.stance - 0.99, hop.flight - 0.97), nan=-1.0))
 

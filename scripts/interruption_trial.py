@@ -21,7 +21,7 @@ from legbench import loop
 from legbench.cli import drives, main
 from legbench.cli.drives import DrivesArguments
 from legbench.cli.drives_moving import Configure, Home, Jog, Zero
-from legbench.cli.drives_reading import Bench
+from legbench.cli.drives_reading import BenchFlags
 from legbench.cli.drives_timing import Jitter
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.body import stiff_body
@@ -230,7 +230,7 @@ class TrialBench:
         """What the command line would have made of the flags."""
         if command == "script" or command in RUNS:
             return None
-        bench = Bench(bus=self._bus, interface=EMULATED, design=self._design)
+        bench = BenchFlags(bus=self._bus, interface=EMULATED, design=self._design)
         actions = {
             "jog": Jog(node="motor1", by=0.02, speed=0.5),
             "home": Home(node="motor1", method=-3),

@@ -143,3 +143,13 @@ def test_there_is_one_saver_one_atomic_writer_and_one_way_to_null(
     inside = [path.relative_to(ROOT / "src" / "legbench").as_posix() for path in found]
     others = ["recording/manifest.py"] if call.startswith("isfinite") else []
     assert inside == [*others, *([home] if home else [])]
+
+
+def test_a_class_has_a_name_of_its_own() -> None:
+    """A name that two rooms use for two things sends the reader to the wrong one."""
+    places: dict[str, list[str]] = {}
+    for path in SOURCES:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ClassDef):
+                places.setdefault(node.name, []).append(str(path.relative_to(ROOT / "src")))
+    assert {name: found for name, found in places.items() if len(found) > 1} == {}

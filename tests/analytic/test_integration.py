@@ -11,8 +11,8 @@ from legbench.analytic import (
     HybridLeg,
     LegModel,
     LegState,
-    Method,
     Regime,
+    RungeKutta,
     energy,
     flying,
     standing,
@@ -92,14 +92,14 @@ def test_rounded_leg_leaves_the_mode() -> None:
 
 @pytest.mark.parametrize(
     ("method", "nominal", "counts"),
-    [(Method.RK45, 5.0, (320, 640, 1280)), (Method.DOP853, 8.0, (80, 100, 120))],
+    [(RungeKutta.RK45, 5.0, (320, 640, 1280)), (RungeKutta.DOP853, 8.0, (80, 100, 120))],
 )
 @pytest.mark.parametrize("regime", [Regime.PINNED, Regime.FLIGHT])
 def test_order_of_convergence(
-    method: Method, nominal: float, counts: tuple[int, ...], regime: Regime
+    method: RungeKutta, nominal: float, counts: tuple[int, ...], regime: Regime
 ) -> None:
     if regime is Regime.PINNED:
-        folded = -1.1 if method is Method.RK45 else -0.9
+        folded = -1.1 if method is RungeKutta.RK45 else -0.9
         start, seconds, motor = standing(MODEL, (folded, 0.7), pinned=True), 0.64, MOTOR
     else:
         start = flying(MODEL, (-0.7, 0.65), (1.0, 2.0), (0.0, 9.0), (0.0, 0.0))

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from legbench.campaign import load_campaign, plan_campaign, run_campaign, shards_of
 from legbench.campaign.executor import AbstractExecutor, SerialExecutor
-from legbench.campaign.plan import Plan
-from legbench.campaign.running import Finished
+from legbench.campaign.plan import CampaignPlan
+from legbench.campaign.running import FinishedCampaign
 
 MODELS = Path(__file__).parents[2] / "models"
 BASE = f"""
@@ -52,13 +52,13 @@ def written(folder: Path, text: str, name: str = "campaign.toml") -> Path:
     return path
 
 
-def planned(folder: Path, text: str = SMALL) -> Plan:
+def planned(folder: Path, text: str = SMALL) -> CampaignPlan:
     return plan_campaign(load_campaign(written(folder, text)))
 
 
 def ran(
-    plan: Plan, out: Path, executor: AbstractExecutor | None = None, size: int | None = None
-) -> Finished:
+    plan: CampaignPlan, out: Path, executor: AbstractExecutor | None = None, size: int | None = None
+) -> FinishedCampaign:
     return run_campaign(plan, out, executor or SerialExecutor(1), shards_of(plan, size))
 
 

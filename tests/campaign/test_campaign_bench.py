@@ -8,7 +8,7 @@ from campaigns import MODELS, planned, ran, written
 
 from legbench.campaign import bench, load_campaign, plan_campaign, read_table
 from legbench.campaign.bench import run_on_bench
-from legbench.campaign.plan import Plan
+from legbench.campaign.plan import CampaignPlan
 from legbench.drives.emulated.faults import NodeFault, NodeFaultKind
 from legbench.errors import CampaignError, ConfigError
 from legbench.interrupts import StopFlag
@@ -41,7 +41,7 @@ IN_MID_RUN, AT_THE_START = 450 * MS, 350 * MS
 """Virtual times after 25 of the 50 cycles, and on the way to the start posture [ns]."""
 
 
-def faulty(plan: Plan, number: int, time_ns: int) -> Plan:
+def faulty(plan: CampaignPlan, number: int, time_ns: int) -> CampaignPlan:
     """The plan with a drive that is unplugged in one of its runs."""
     planned = list(plan.planned)
     experiment = planned[number].experiment

@@ -22,7 +22,7 @@ from legbench.campaign import load_campaign, plan_campaign, read_table, run_camp
 from legbench.campaign.dask_workers import DaskExecutor
 from legbench.campaign.executor import AbstractExecutor, Done, Note, SerialExecutor
 from legbench.campaign.folder import open_folder
-from legbench.campaign.plan import Plan
+from legbench.campaign.plan import CampaignPlan
 from legbench.campaign.pool import PoolExecutor
 from legbench.campaign.provenance import provenance
 from legbench.campaign.shards import FORMAT_KEY, PROVENANCE_KEY
@@ -39,12 +39,12 @@ from legbench.recording import saved
 
 
 @pytest.fixture(scope="module")
-def mixed(tmp_path_factory: pytest.TempPathFactory) -> Plan:
+def mixed(tmp_path_factory: pytest.TempPathFactory) -> CampaignPlan:
     return planned(tmp_path_factory.mktemp("file"), MIXED)
 
 
 @pytest.fixture(scope="module")
-def whole(mixed: Plan, tmp_path_factory: pytest.TempPathFactory) -> bytes:
+def whole(mixed: CampaignPlan, tmp_path_factory: pytest.TempPathFactory) -> bytes:
     """Table of the campaign that this process has run at one go."""
     out = tmp_path_factory.mktemp("whole")
     finished = ran(mixed, out)
@@ -54,28 +54,28 @@ def whole(mixed: Plan, tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 @pytest.mark.parametrize(("size", "threads"), [(1, 1), (7, 2), (16, 2)])
 def test_company_and_threads_change_no_byte(
-    mixed: Plan, whole: bytes, size: int, threads: int, tmp_path: Path
+    mixed: CampaignPlan, whole: bytes, size: int, threads: int, tmp_path: Path
 ) -> None:
     ran(mixed, tmp_path, SerialExecutor(threads), size)
     assert table_bytes(tmp_path) == whole
 
 
 def test_processes_of_this_machine_change_no_byte(
-    mixed: Plan, whole: bytes, tmp_path: Path
+    mixed: CampaignPlan, whole: bytes, tmp_path: Path
 ) -> None:
     ran(mixed, tmp_path, PoolExecutor(1), 4)
     assert table_bytes(tmp_path) == whole
 
 
 @pytest.mark.long
-def test_dask_changes_no_byte(mixed: Plan, whole: bytes, tmp_path: Path) -> None:
+def test_dask_changes_no_byte(mixed: CampaignPlan, whole: bytes, tmp_path: Path) -> None:
     ran(mixed, tmp_path, DaskExecutor(workers=1), 4)
     assert table_bytes(tmp_path) == whole
 
 
 @pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning")
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-def test_jobs_change_no_byte(mixed: Plan, whole: bytes, tmp_path: Path) -> None:
+def test_jobs_change_no_byte(mixed: CampaignPlan, whole: bytes, tmp_path: Path) -> None:
     """Jobs of the array that Slurm gets, run by submitit in this process; it leaves logs open."""
     jobs = SlurmExecutor(tmp_path / "jobs", cluster="debug")
     ran(mixed, tmp_path / "out", jobs, 8)
@@ -83,7 +83,9 @@ def test_jobs_change_no_byte(mixed: Plan, whole: bytes, tmp_path: Path) -> None:
     gc.collect()
 
 
-def test_parts_of_several_callers_make_one_table(mixed: Plan, whole: bytes, tmp_path: Path) -> None:
+def test_parts_of_several_callers_make_one_table(
+    mixed: CampaignPlan, whole: bytes, tmp_path: Path
+) -> None:
     shards, executor = shards_of(mixed, 4), SerialExecutor(1)
     for number in (2, 3):
         finished = run_campaign(mixed, tmp_path, executor, shards, part=(number, 3))
@@ -95,7 +97,7 @@ def test_parts_of_several_callers_make_one_table(mixed: Plan, whole: bytes, tmp_
     assert table_bytes(tmp_path) == whole
 
 
-def test_the_table_says_what_ran_where(mixed: Plan, whole: bytes, tmp_path: Path) -> None:
+def test_the_table_says_what_ran_where(mixed: CampaignPlan, whole: bytes, tmp_path: Path) -> None:
     (tmp_path / "table.parquet").write_bytes(whole)
     table = read_table(tmp_path)
     assert sorted(set(table["experiment"].to_pylist())) == sorted(e.hash for e in mixed.planned)
@@ -144,7 +146,9 @@ class Interrupted(AbstractExecutor):
                 stop.set()
 
 
-def test_an_interrupted_campaign_is_gone_on_with(mixed: Plan, whole: bytes, tmp_path: Path) -> None:
+def test_an_interrupted_campaign_is_gone_on_with(
+    mixed: CampaignPlan, whole: bytes, tmp_path: Path
+) -> None:
     told: list[tuple[int, int]] = []
     shards = shards_of(mixed, 4)
     stopped = run_campaign(mixed, tmp_path, Interrupted(2), shards)
@@ -169,7 +173,7 @@ def test_an_interrupted_campaign_is_gone_on_with(mixed: Plan, whole: bytes, tmp_
     assert table_bytes(tmp_path) == whole
 
 
-def test_a_stop_in_mid_shard_gives_it_up(mixed: Plan) -> None:
+def test_a_stop_in_mid_shard_gives_it_up(mixed: CampaignPlan) -> None:
     (shard, *_) = shards_of(mixed, 16)
     flag = StopFlag()
     flag.set()
@@ -306,7 +310,7 @@ def test_two_campaigns_in_one_folder(tmp_path: Path) -> None:
 
 
 def test_a_full_disk_keeps_what_is_done(
-    mixed: Plan, whole: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    mixed: CampaignPlan, whole: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     good = folder_module.write_whole
     room = [4]
@@ -367,7 +371,7 @@ class Strange(AbstractExecutor):
     [("other", "has sent another shard"), ("version", "a worker's shard was written by legbench")],
 )
 def test_workers_that_are_not_what_they_should_be(
-    mixed: Plan, way: str, why: str, tmp_path: Path
+    mixed: CampaignPlan, way: str, why: str, tmp_path: Path
 ) -> None:
     finished = run_campaign(mixed, tmp_path, Strange(way), shards_of(mixed, 4))
     assert why in finished.failures[0]

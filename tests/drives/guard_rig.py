@@ -4,13 +4,13 @@ from typing import Any
 
 from legbench.errors import PlantFault
 from legbench.limits.guard import Guard
-from legbench.limits.plausibility import Bounds
+from legbench.limits.plausibility import HealthBounds
 from legbench.limits.safety import SafetyLimits
 
 PERIOD = 0.25
 """So long that steps, ranges and speeds are exact binary numbers [s]."""
 REST = (-0.5, 0.5)
-BOUNDS = Bounds(
+BOUNDS = HealthBounds(
     period=1e-3,
     following_error=0.03,
     following_cycles=5,

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from can_rig import BUS, ROOT
 
-from legbench.commissioning.fault_table import TRIALS, Trial
+from legbench.commissioning.fault_table import TRIALS, FaultTrial
 from legbench.commissioning.fault_trial import try_fault
 from legbench.design import load_design
 from legbench.plants import BUS_LOG
@@ -23,7 +23,7 @@ def view(run: Path) -> LiveView:
 
 
 @pytest.mark.parametrize("trial", TRIALS, ids=lambda trial: trial.name.replace(" ", "-"))
-def test_no_fault_survives(trial: Trial, tmp_path: Path) -> None:
+def test_no_fault_survives(trial: FaultTrial, tmp_path: Path) -> None:
     design = load_design(ROOT / "models" / "optimal.toml")
     result = try_fault(trial, BUS, design, tmp_path, view)
     assert result.safe, result
@@ -60,7 +60,7 @@ def test_a_viewer_that_hangs_changes_neither_the_loop_nor_the_recording(tmp_path
             self.view.stop()
 
     runs = [
-        try_fault(Trial(name=name, viewer=hangs), BUS, design, tmp_path / name, Watched).run
+        try_fault(FaultTrial(name=name, viewer=hangs), BUS, design, tmp_path / name, Watched).run
         for name, hangs in (("alone", False), ("hanging", True))
     ]
     assert stopped == ["T"]

@@ -29,7 +29,7 @@ from legbench.drives.setup.config import (
     NodeConfig,
     PdoConfig,
 )
-from legbench.drives.setup.outcome import Outcome
+from legbench.drives.setup.outcome import ObjectOutcome
 from legbench.drives.setup.taken import check_taken
 from legbench.drives.sheet.bus_text import marked_lines
 from legbench.drives.sheet.candidates import link_candidates, temperature_candidates
@@ -61,7 +61,7 @@ def _on(one: NodeConfig, eds: Path) -> NodeConfig:
     return replace(one, eds=eds, link=link, link_object=LINK_POSITION, tpdos=TPDOS)
 
 
-def really(bus: BusConfig) -> tuple[Outcome, ...]:
+def really(bus: BusConfig) -> tuple[ObjectOutcome, ...]:
     """What an emulated drive makes of its configuration, by SDO on the wire."""
     with Session(LockstepBus("it", network=emulate(bus)), bus) as session:
         up = session.bring_up()
@@ -70,7 +70,7 @@ def really(bus: BusConfig) -> tuple[Outcome, ...]:
         return up.configure(bus.nodes[0])
 
 
-def same(outcomes: tuple[Outcome, ...]) -> list[tuple[object, ...]]:
+def same(outcomes: tuple[ObjectOutcome, ...]) -> list[tuple[object, ...]]:
     return [(one.parameter.key, one.agrees, one.there, one.code) for one in outcomes]
 
 

@@ -6,7 +6,7 @@ import pytest
 from can_rig import BUS, LIMITS, ROOT
 from drives_rig import rig
 
-from legbench.commissioning.fault_table import Trial
+from legbench.commissioning.fault_table import FaultTrial
 from legbench.commissioning.fault_trial import try_fault
 from legbench.control import BangBangConfig
 from legbench.design import load_design
@@ -97,7 +97,7 @@ def test_a_quiet_bus_has_nothing_to_tell(tmp_path: Path) -> None:
 def test_events_of_drives_are_in_the_recording(tmp_path: Path) -> None:
     design = load_design(ROOT / "models" / "optimal.toml")
     fault = NodeFault(kind=NodeFaultKind.WARNING, node_id=1, start_ns=1_000_000_000)
-    trial = Trial(name="drive warns", faults=(fault,))
+    trial = FaultTrial(name="drive warns", faults=(fault,))
     result = try_fault(trial, BUS, design, tmp_path)
     assert result.status == "complete"
     assert result.cause is None

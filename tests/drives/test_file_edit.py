@@ -10,7 +10,7 @@ from can_rig import BUS
 from hypothesis import given
 from hypothesis import strategies as st
 
-from legbench.commissioning.zero import Zero, write
+from legbench.commissioning.zero import EncoderZero, write
 from legbench.drives.setup.bus_file import load_bus
 from legbench.drives.setup.encoders import Side
 from legbench.drives.setup.file_edit import edit_file, edited
@@ -18,8 +18,8 @@ from legbench.errors import ConfigError, RecordingError
 from legbench.reading import UnreadableError
 
 ZEROS = (
-    Zero(node="motor1", side=Side.MOTOR, motor_offset=-6242, link_offset=17),
-    Zero(node="motor2", side=Side.MOTOR, motor_offset=123456, link_offset=-1),
+    EncoderZero(node="motor1", side=Side.MOTOR, motor_offset=-6242, link_offset=17),
+    EncoderZero(node="motor2", side=Side.MOTOR, motor_offset=123456, link_offset=-1),
 )
 OFFSET = re.compile(rb"offset_counts = [-+\w]+")
 

@@ -14,7 +14,7 @@ from legbench.drives.setup.config import BusConfig, NodeConfig, Parameter
 from legbench.drives.setup.configuration import configuration
 from legbench.drives.setup.master_watch import means_of
 from legbench.drives.setup.needs import Need, row_of
-from legbench.drives.setup.outcome import Outcome, cycle_count
+from legbench.drives.setup.outcome import ObjectOutcome, cycle_count
 from legbench.drives.setup.stopping import check_stopping
 from legbench.drives.setup.taken import check_taken, tells_heartbeat, unprotected
 from legbench.errors import ConfigError
@@ -54,7 +54,7 @@ class Table:
         self.it.tables[0][key] = value
         self.fixed.add(key)
 
-    def configured(self) -> dict[tuple[int, int], Outcome]:
+    def configured(self) -> dict[tuple[int, int], ObjectOutcome]:
         return {entry.parameter.key: entry for entry in self.up.configure(self.node)}
 
 

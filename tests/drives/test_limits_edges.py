@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from legbench.errors import ConfigError
-from legbench.limits.plausibility import Bounds
+from legbench.limits.plausibility import HealthBounds
 from legbench.limits.safety import SafetyLimits
 
 INF = math.inf
@@ -159,7 +159,7 @@ def test_limits_may_be_as_wide_as_a_design_and_no_end_wider() -> None:
 
 def test_bounds_are_the_limits_of_motion_and_the_period() -> None:
     limits = replace(SafetyLimits(**GIVEN), following_cycles=7, servo_bandwidth=25.0)
-    assert limits.bounds(0.002) == Bounds(
+    assert limits.bounds(0.002) == HealthBounds(
         period=0.002,
         following_error=0.25,
         following_cycles=7,

@@ -10,7 +10,7 @@ from drives_rig import node
 from service_rig import BENCH, opened, written
 
 from legbench.commissioning import zero as zero_module
-from legbench.commissioning.zero import Zero, measure
+from legbench.commissioning.zero import EncoderZero, measure
 from legbench.drives.errors import DriveError
 from legbench.drives.setup.config import NodeConfig
 from legbench.drives.setup.encoders import Side
@@ -21,7 +21,7 @@ Reads = list[tuple[int, int | None]]
 
 def measured(
     monkeypatch: pytest.MonkeyPatch, of: NodeConfig, angle: float, reads: Reads
-) -> tuple[Zero, int]:
+) -> tuple[EncoderZero, int]:
     """Offsets of a node whose encoders show these counts one after the other, and the reads."""
     left = list(reads)
     monkeypatch.setattr(zero_module, "read_counts", lambda _session, _node: left.pop(0))

@@ -21,7 +21,7 @@ from legbench.drives.setup.bus_file import load_bus
 from legbench.errors import ConfigError
 from legbench.imperfections import Imperfections
 from legbench.limits.guard import Guard
-from legbench.limits.momentum import LegMomentum, Pair, Reading, Support, unexplained
+from legbench.limits.momentum import LegMomentum, MomentumReading, Pair, SupportPoint, unexplained
 from legbench.limits.momentum_watch import CONTACT_TIME, MomentumWatch
 from legbench.limits.safety import SafetyLimits
 from legbench.plant.leg_momentum import momentum_of, momentum_on
@@ -51,7 +51,9 @@ def held(kind: SetupKind) -> list[PairTerms]:
     }[kind]
 
 
-def moving(terms: PairTerms, seed: int, period: float) -> tuple[Reading, Reading, Reading]:
+def moving(
+    terms: PairTerms, seed: int, period: float
+) -> tuple[MomentumReading, MomentumReading, MomentumReading]:
     """Three readings of a leg that obeys the equations of motion, as matrices."""
     dice = np.random.default_rng(seed)
     q, v, a = np.array([-0.4, 0.5]) + dice.normal(0, 0.2, 2), *dice.normal(0, (5, 50), (2, 2)).T
@@ -61,7 +63,8 @@ def moving(terms: PairTerms, seed: int, period: float) -> tuple[Reading, Reading
     shown = [(q + v * t + 0.5 * a * t * t).tolist() for t in (-period, 0.0, 1.5 * period)]
     pause = (period, period, 1.5 * period)
     first, second, third = (
-        Reading(time, both, (one[0], one[1])) for time, one in zip(pause, shown, strict=True)
+        MomentumReading(time, both, (one[0], one[1]))
+        for time, one in zip(pause, shown, strict=True)
     )
     return first, second, third
 
@@ -107,21 +110,25 @@ def test_averages_are_as_long_as_rounding_asks(step: float) -> None:
     assert shortest or torque.std() > 0.5 * allowed
 
 
-SPIN = Support(inertia=(0.02, 0.02), coupling=0.01, moment=(0.0, 0.0))
+SPIN = SupportPoint(inertia=(0.02, 0.02), coupling=0.01, moment=(0.0, 0.0))
 """A support without weight, about which a leg at rest leaves what its springs carry."""
 
 
-def springs(*supports: Support) -> LegMomentum:
+def springs(*supports: SupportPoint) -> LegMomentum:
     return replace(momentum(), supports=supports, stiffness=(4.0, 4.0))
 
 
-def wound(by: float) -> Reading:
+def wound(by: float) -> MomentumReading:
     """A leg at rest whose springs together carry the torque of one that is wound by an angle."""
-    return Reading(PERIOD, (POSTURE[0] + 0.5 * by, POSTURE[1] + 0.5 * by), POSTURE)
+    return MomentumReading(PERIOD, (POSTURE[0] + 0.5 * by, POSTURE[1] + 0.5 * by), POSTURE)
 
 
 def alarm(
-    watch: MomentumWatch, reading: Reading, *, well: Reading | None = None, stands: bool = False
+    watch: MomentumWatch,
+    reading: MomentumReading,
+    *,
+    well: MomentumReading | None = None,
+    stands: bool = False,
 ) -> int | None:
     """Cycles until a reading that repeats itself is doubted, after a second of one that is well."""
     for _ in range(1100):
@@ -154,12 +161,12 @@ def test_a_support_is_awaited_as_long_as_the_other_one_needs_to_explain() -> Non
 @pytest.mark.parametrize(
     "gap",
     [
-        Reading(2.0 * PERIOD, (0.5, 0.5), POSTURE),
-        Reading(PERIOD, (0.5, 0.5), (DESIGN.limits.hip[1], 2.0)),
+        MomentumReading(2.0 * PERIOD, (0.5, 0.5), POSTURE),
+        MomentumReading(PERIOD, (0.5, 0.5), (DESIGN.limits.hip[1], 2.0)),
     ],
     ids=["a missed cycle", "a hip at its stop"],
 )
-def test_what_cannot_be_known_begins_the_watch_anew(gap: Reading) -> None:
+def test_what_cannot_be_known_begins_the_watch_anew(gap: MomentumReading) -> None:
     watch = MomentumWatch(springs(SPIN), 0.03, PERIOD)
     for _ in range(10):
         for _ in range(30):
@@ -168,10 +175,10 @@ def test_what_cannot_be_known_begins_the_watch_anew(gap: Reading) -> None:
         assert watch.residual is None
 
 
-def apart(by: float, other: float | None = None, posture: Pair = POSTURE) -> Reading:
+def apart(by: float, other: float | None = None, posture: Pair = POSTURE) -> MomentumReading:
     """A leg at rest whose springs are wound against each other by angles [rad]."""
     motors = (posture[0] - by, posture[1] + (by if other is None else other))
-    return Reading(PERIOD, motors, posture)
+    return MomentumReading(PERIOD, motors, posture)
 
 
 def test_a_knee_stop_that_pushes_rules_no_support_out() -> None:

@@ -22,14 +22,14 @@ pytest.importorskip("matplotlib")
 
 from legbench.explain import consistency
 from legbench.explain.causes import causes_named
-from legbench.explain.consistency import Check, Predicted, checks_of, predict
+from legbench.explain.consistency import Predicted, StatementCheck, checks_of, predict
 from legbench.explain.content import explanation_content
 from legbench.explain.engine import Watch
-from legbench.explain.explanation import Explanation, Judged, Scope, explain
-from legbench.explain.fitting import Fit
-from legbench.explain.jumping import Hop, hop_of
+from legbench.explain.explanation import Explanation, JudgedFit, Scope, explain
+from legbench.explain.fitting import CauseFit
+from legbench.explain.jumping import JumpFit, hop_of
 from legbench.explain.motor_end import MotorEnd
-from legbench.explain.screening import Method, screen
+from legbench.explain.screening import ScreeningMethod, screen
 from legbench.explain.targets import Target, step_target
 from legbench.explain.words import explanation_lines, sentences
 from legbench.imperfections import Imperfections
@@ -39,7 +39,7 @@ MODELS = Path(__file__).parents[2] / "models"
 PROTOTYPE = load_design(MODELS / "prototype.toml")
 NUMBERS = published()
 QUICK = Target(name="quick", z2=1.0, dz2=0.3, shape=(0.98, 0.9, 0.82), setup=SetupKind.HFTS)
-HOP = Hop(
+HOP = JumpFit(
     stance=0.995,
     flight=0.96,
     foot_clearance=0.034,
@@ -146,7 +146,7 @@ def test_stopped_early_it_returns_what_there_is() -> None:
 def whole_explanation() -> Explanation:
     names = (["link-zero-polar", "guide-upward"], ["stiffness-apart", "damping"])
     fits = [
-        Fit(
+        CauseFit(
             causes=causes_named(pair),
             sizes=(0.02, 0.2),
             ratings=(0.97, 0.9, 0.83),
@@ -156,8 +156,8 @@ def whole_explanation() -> Explanation:
         for pair in names
     ]
     alone = replace(fits[0], causes=fits[0].causes[:1], sizes=(0.03,), misfit=2.0, worst=3.0)
-    checks = (Check(name="bang-bang", words="ffs, bang-bang", value=0.95, held=True),)
-    judged = [Judged(fit=fit, checks=checks, hop=HOP) for fit in fits]
+    checks = (StatementCheck(name="bang-bang", words="ffs, bang-bang", value=0.95, held=True),)
+    judged = [JudgedFit(fit=fit, checks=checks, hop=HOP) for fit in fits]
     perfect = replace(alone, causes=(), sizes=())
     ends = MotorEnd(
         setup=SetupKind.HFTS, z2=1.8, farthest=1.33, ends=(1.33, 1.25), levels=(0.98, 0.95)
@@ -165,7 +165,7 @@ def whole_explanation() -> Explanation:
     return Explanation(
         design=PROTOTYPE,
         target=QUICK,
-        perfect=Judged(fit=perfect, checks=checks, hop=HOP),
+        perfect=JudgedFit(fit=perfect, checks=checks, hop=HOP),
         sensitivities=(),
         screened=(),
         singles=(alone,),
@@ -242,11 +242,11 @@ def test_screening_weighs_what_matters() -> None:
     some = causes_named(["link-zero-polar", "foot-inertia"])
     if find_spec("SALib") is None:
         with pytest.raises(MissingExtraError, match=r"pip install 'legbench\[screening\]'"):
-            screen(PROTOTYPE, QUICK, some, Method.MORRIS, 0)
+            screen(PROTOTYPE, QUICK, some, ScreeningMethod.MORRIS, 0)
         return
-    rows = screen(PROTOTYPE, QUICK, some, Method.MORRIS, 0)
+    rows = screen(PROTOTYPE, QUICK, some, ScreeningMethod.MORRIS, 0)
     assert [row.cause.name for row in rows] == ["link-zero-polar", "foot-inertia"]
     assert rows[0].whole > 10.0 * rows[1].whole
-    sobol = screen(PROTOTYPE, QUICK, some, Method.SOBOL, 0)
+    sobol = screen(PROTOTYPE, QUICK, some, ScreeningMethod.SOBOL, 0)
     assert sobol[0].cause.name == "link-zero-polar"
     assert sobol[0].whole > 0.9

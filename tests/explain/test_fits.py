@@ -16,7 +16,7 @@ from legbench.explain.apart import POSTURE, differ, propose, resting
 from legbench.explain.causes import CAUSES, causes_named, combined
 from legbench.explain.engine import rate_many
 from legbench.explain.explanation import choose
-from legbench.explain.fitting import Fit, effective, fit_pairs, fit_singles
+from legbench.explain.fitting import CauseFit, effective, fit_pairs, fit_singles
 from legbench.explain.least_squares import refine
 from legbench.explain.sensitivity import sensitivities
 from legbench.explain.targets import MISSING, PERIODS, Target, step_target
@@ -78,10 +78,10 @@ def test_postures_at_rest_show_zero_errors_and_no_springs_without_gravity() -> N
     assert differ(np.array([[0.9, np.nan], [0.8, 0.5]]), np.zeros((2, 2))) == pytest.approx(5.0)
 
 
-def fit(name: str, misfit: float, worst: float) -> Fit:
+def fit(name: str, misfit: float, worst: float) -> CauseFit:
     causes = causes_named(name.split(" + "))
     sizes = (0.0,) * len(causes)
-    return Fit(causes=causes, sizes=sizes, ratings=(0.9, 0.8), misfit=misfit, worst=worst)
+    return CauseFit(causes=causes, sizes=sizes, ratings=(0.9, 0.8), misfit=misfit, worst=worst)
 
 
 def test_a_pair_explains_nothing_more_than_the_cause_that_reaches_the_target_alone() -> None:

@@ -9,21 +9,21 @@ from twins import OFF, PROTOTYPE, experiments, question, trials
 from legbench.analytic.terms import Bars
 from legbench.design.setup import SetupKind
 from legbench.identify import identify, parse_free
-from legbench.identify.base import Leg, can_be, mended
+from legbench.identify.base import FittedLeg, can_be, mended
 from legbench.identify.fitting import fit
 from legbench.identify.parameters import GROUPS, INDEX, Freedom
 from legbench.identify.prediction import Guess, nothing_moved
 from legbench.identify.problem import Problem
-from legbench.identify.trial import Trial
+from legbench.identify.trial import MeasuredRun
 from legbench.mjcf.fitting import fitted_bar_density
 
 
 def test_springs_and_dampers_that_are_thirty_percent_off_are_found(
-    steps: tuple[Trial, ...],
+    steps: tuple[MeasuredRun, ...],
 ) -> None:
     outcome = identify(question(steps))
     assert outcome.trusted, outcome.reasons
-    truth = Leg.of(PROTOTYPE)
+    truth = FittedLeg.of(PROTOTYPE)
     for each in outcome.estimates:
         true = truth.values[INDEX[each.name]]
         assert each.low <= true <= each.high
@@ -42,7 +42,7 @@ def test_nine_parameters_of_a_leg_that_was_built_otherwise_are_found() -> None:
     built = chosen[0].imperfections.leg_of(PROTOTYPE)
     outcome = identify(question(trials(chosen), PROTOTYPE, free=parse_free(["nine"])))
     assert outcome.trusted, outcome.reasons
-    truth = Leg.of(built)
+    truth = FittedLeg.of(built)
     for each in outcome.estimates:
         true = truth.values[INDEX[each.name]]
         assert abs(each.value - true) < 4.0 * each.error
@@ -51,19 +51,19 @@ def test_nine_parameters_of_a_leg_that_was_built_otherwise_are_found() -> None:
 
 @pytest.mark.long
 def test_a_leg_with_bars_is_found_by_equations_with_bars(
-    steps_of_bars: tuple[Trial, ...],
+    steps_of_bars: tuple[MeasuredRun, ...],
 ) -> None:
     bars = Bars(density=fitted_bar_density(PROTOTYPE))
     outcome = identify(question(steps_of_bars, bars=bars))
     assert outcome.trusted, outcome.reasons
     for each in outcome.estimates:
-        true = Leg.of(PROTOTYPE).values[INDEX[each.name]]
+        true = FittedLeg.of(PROTOTYPE).values[INDEX[each.name]]
         assert abs(each.value - true) < 4.0 * each.error
 
 
 @pytest.mark.long
 def test_a_run_that_begins_in_motion_is_fitted_from_its_first_row_on(
-    steps: tuple[Trial, ...],
+    steps: tuple[MeasuredRun, ...],
 ) -> None:
     cut = tuple(
         replace(
@@ -82,10 +82,12 @@ def test_a_run_that_begins_in_motion_is_fitted_from_its_first_row_on(
 
 
 @pytest.mark.parametrize("names", [("k1", "k2", "d1", "d2"), GROUPS["nine"]])
-def test_fits_converge_from_far_away(steps: tuple[Trial, ...], names: tuple[str, ...]) -> None:
+def test_fits_converge_from_far_away(
+    steps: tuple[MeasuredRun, ...], names: tuple[str, ...]
+) -> None:
     """Starts of 0.4 to 3 times the truth, mixed, mended where no leg has such inertias."""
     random = np.random.default_rng(5)
-    truth = Leg.of(PROTOTYPE)
+    truth = FittedLeg.of(PROTOTYPE)
     problem = Problem(steps, truth.reach, Freedom(names=names))
     bottom = problem.misfit(Guess(values=truth.values, starts=nothing_moved(steps))).cost
     for _ in range(3):
@@ -100,9 +102,9 @@ def test_fits_converge_from_far_away(steps: tuple[Trial, ...], names: tuple[str,
         assert found.misfit.cost <= bottom
 
 
-def test_predicted_errors_are_those_that_noise_makes(steps: tuple[Trial, ...]) -> None:
+def test_predicted_errors_are_those_that_noise_makes(steps: tuple[MeasuredRun, ...]) -> None:
     """Estimates of many noises scatter as the Jacobian says, within the chance of 25 draws."""
-    truth = Leg.of(PROTOTYPE)
+    truth = FittedLeg.of(PROTOTYPE)
     names = ("k1", "k2", "d1", "d2")
     guess = Guess(values=truth.values, starts=nothing_moved(steps))
     problem = Problem(steps, truth.reach, Freedom(names=names))

@@ -2,9 +2,9 @@
 
 from dataclasses import replace
 
-from legbench.identify.repeated import Hop, Repeated
+from legbench.identify.repeated import HopFigures, Repeated
 
-HOP = Hop(rating_stance=0.99, rating_flight=0.98, rise=0.03, hop_freq=2.0)
+HOP = HopFigures(rating_stance=0.99, rating_flight=0.98, rise=0.03, hop_freq=2.0)
 
 
 def test_a_hop_within_all_bounds_misses_nothing() -> None:
@@ -13,7 +13,7 @@ def test_a_hop_within_all_bounds_misses_nothing() -> None:
 
 
 def test_every_figure_that_is_not_predicted_is_named() -> None:
-    far = Hop(rating_stance=0.97, rating_flight=float("nan"), rise=0.0283, hop_freq=2.01)
+    far = HopFigures(rating_stance=0.97, rating_flight=float("nan"), rise=0.0283, hop_freq=2.01)
     found = Repeated(run="hop", measured=HOP, predicted=far)
     assert not found.good
     assert found.misses == (

@@ -7,20 +7,20 @@ import pytest
 from twins import OFF, PROTOTYPE, question
 
 from legbench.identify import identify
-from legbench.identify.base import Leg
+from legbench.identify.base import FittedLeg
 from legbench.identify.noise import Precision
-from legbench.identify.outcome import Outcome
+from legbench.identify.outcome import Identification
 from legbench.identify.parameters import INDEX, Freedom
 from legbench.identify.prediction import Guess, nothing_moved
 from legbench.identify.problem import Problem
 from legbench.identify.rounding import MOST_STANDS, stretches_of
-from legbench.identify.trial import Trial
+from legbench.identify.trial import MeasuredRun
 from legbench.signals import Floats
 
 COUNT = 2.0 * np.pi / 2048
 
 
-def coarse(trial: Trial) -> Trial:
+def coarse(trial: MeasuredRun) -> MeasuredRun:
     """Run whose motors are shown in coarse counts."""
     precision = Precision(sigma=COUNT / np.sqrt(12.0), count=COUNT)
     return replace(
@@ -30,7 +30,7 @@ def coarse(trial: Trial) -> Trial:
     )
 
 
-def standing(trial: Trial, motors: Floats) -> Trial:
+def standing(trial: MeasuredRun, motors: Floats) -> MeasuredRun:
     """Run of as many rows as its motor positions (n, 2), whose links stand still."""
     rows = np.arange(len(motors), dtype=np.float64)
     return replace(
@@ -39,14 +39,16 @@ def standing(trial: Trial, motors: Floats) -> Trial:
 
 
 @pytest.fixture(scope="module")
-def outcome(steps: tuple[Trial, ...]) -> Outcome:
+def outcome(steps: tuple[MeasuredRun, ...]) -> Identification:
     """What is learned from steps whose motors are shown in coarse counts."""
     return identify(question([coarse(each) for each in steps]))
 
 
-def test_stiffness_does_not_suffer_from_coarse_counts_of_the_motors(outcome: Outcome) -> None:
+def test_stiffness_does_not_suffer_from_coarse_counts_of_the_motors(
+    outcome: Identification,
+) -> None:
     assert outcome.trusted, outcome.reasons
-    truth = Leg.of(PROTOTYPE)
+    truth = FittedLeg.of(PROTOTYPE)
     for name in ("k1", "k2"):
         estimate, true = outcome.estimate(name), truth.values[INDEX[name]]
         assert estimate.low <= true <= estimate.high
@@ -54,7 +56,7 @@ def test_stiffness_does_not_suffer_from_coarse_counts_of_the_motors(outcome: Out
 
 
 def test_hidden_angles_that_are_found_are_those_that_rounding_hid(
-    steps: tuple[Trial, ...], outcome: Outcome
+    steps: tuple[MeasuredRun, ...], outcome: Identification
 ) -> None:
     assert outcome.misfit is not None
     found, place = outcome.misfit.guess.hidden, 0
@@ -70,10 +72,12 @@ def test_hidden_angles_that_are_found_are_those_that_rounding_hid(
 
 @pytest.mark.parametrize("delay", [0.0, 2e-3])
 def test_derivatives_by_hidden_angles_are_those_of_finite_differences(
-    steps: tuple[Trial, ...], delay: float
+    steps: tuple[MeasuredRun, ...], delay: float
 ) -> None:
-    problem = Problem([coarse(each) for each in steps], Leg.of(OFF).reach, Freedom(names=("k1",)))
-    guess = Guess(values=Leg.of(OFF).values, starts=nothing_moved(steps)).at("delay", delay)
+    problem = Problem(
+        [coarse(each) for each in steps], FittedLeg.of(OFF).reach, Freedom(names=("k1",))
+    )
+    guess = Guess(values=FittedLeg.of(OFF).values, starts=nothing_moved(steps)).at("delay", delay)
     misfit = problem.misfit(guess)
     _, slopes = misfit.whole()
     for column in range(len(problem.names), slopes.shape[1]):
@@ -86,7 +90,9 @@ def test_derivatives_by_hidden_angles_are_those_of_finite_differences(
         assert np.abs(slopes[: -len(misfit.prior), column]).max() > 0.5
 
 
-def test_each_stand_has_an_angle_of_its_own_and_motion_has_one(steps: tuple[Trial, ...]) -> None:
+def test_each_stand_has_an_angle_of_its_own_and_motion_has_one(
+    steps: tuple[MeasuredRun, ...],
+) -> None:
     ramp = np.linspace(0.0, 0.99, 100)
     motors = np.concatenate([np.zeros(60), ramp, np.full(70, 1.0), ramp, np.full(20, 2.0)])
     first, second, rest = stretches_of(
@@ -103,6 +109,6 @@ def test_each_stand_has_an_angle_of_its_own_and_motion_has_one(steps: tuple[Tria
     assert len(both) == 2 * (MOST_STANDS + 1)
 
 
-def test_a_motor_without_counts_hides_nothing(steps: tuple[Trial, ...]) -> None:
+def test_a_motor_without_counts_hides_nothing(steps: tuple[MeasuredRun, ...]) -> None:
     fine = replace(steps[0], motors=(Precision(sigma=1e-4, count=0.0),) * 2)
     assert stretches_of(fine) == ()

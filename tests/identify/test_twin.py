@@ -17,7 +17,7 @@ from legbench.design.toml import load_design
 from legbench.errors import ConfigError
 from legbench.experiment import Experiment
 from legbench.identify import design_text, identify, parse_free, question_of, repeat, written_back
-from legbench.identify.base import Leg
+from legbench.identify.base import FittedLeg
 from legbench.identify.parameters import INDEX
 from legbench.identify.trial import bars_of
 from legbench.imperfections import Imperfections
@@ -55,7 +55,7 @@ def test_a_twin_behind_emulated_drives_is_identified_and_its_hop_predicted(
     question = question_of(runs, free=parse_free(["nine"]), starts=1)
     outcome = identify(question)
     assert outcome.trusted, outcome.reasons
-    truth = Leg.of(HIDDEN.leg_of(PROTOTYPE), bars=bars_of(runs[0])).values
+    truth = FittedLeg.of(HIDDEN.leg_of(PROTOTYPE), bars=bars_of(runs[0])).values
     for each in outcome.estimates:
         share = {"k": 5e-4, "d": 2e-3, "s": 2e-3}.get(each.name[0], 5e-3)
         assert each.value == pytest.approx(truth[INDEX[each.name]], rel=share)

@@ -12,8 +12,8 @@ from legbench.control import ControllerSettings, PositionJumpConfig
 from legbench.design import LegDesign, load_design
 from legbench.design.setup import Setup, SetupKind
 from legbench.experiment import Experiment, run_batch
-from legbench.identify.staged import Question
-from legbench.identify.trial import FIXED, Trial, trial_of
+from legbench.identify.staged import IdentificationTask
+from legbench.identify.trial import FIXED, MeasuredRun, trial_of
 from legbench.imperfections import Imperfections
 from legbench.mjcf.options import Linkage, LinkageKind
 from legbench.servo import ServoConfig
@@ -52,7 +52,7 @@ def experiments(
     ]
 
 
-def trials(chosen: Sequence[Experiment]) -> tuple[Trial, ...]:
+def trials(chosen: Sequence[Experiment]) -> tuple[MeasuredRun, ...]:
     """Runs of experiments, each by the name of its setup."""
     recordings = run_batch(chosen, threads=1)
     return tuple(
@@ -61,12 +61,14 @@ def trials(chosen: Sequence[Experiment]) -> tuple[Trial, ...]:
     )
 
 
-def question(runs: Sequence[Trial], design: LegDesign = OFF, **more: Any) -> Question:
+def question(
+    runs: Sequence[MeasuredRun], design: LegDesign = OFF, **more: Any
+) -> IdentificationTask:
     """Question to some runs that starts once, from a leg that is 30 % off."""
-    return Question(design=design, trials=tuple(runs), starts=1, **more)
+    return IdentificationTask(design=design, trials=tuple(runs), starts=1, **more)
 
 
-def stretched(trial: Trial, factor: float) -> Trial:
+def stretched(trial: MeasuredRun, factor: float) -> MeasuredRun:
     """Run whose clock goes slow by a factor: what happened, sampled at stretched times."""
     wanted = trial.time * factor
     joint_pos = np.stack([np.interp(wanted, trial.time, q) for q in trial.joint_pos.T], axis=1)
@@ -79,13 +81,13 @@ def stretched(trial: Trial, factor: float) -> Trial:
     )
 
 
-def late(trial: Trial, cycles: int) -> Trial:
+def late(trial: MeasuredRun, cycles: int) -> MeasuredRun:
     """Run whose link encoders answer some cycles late."""
     first = np.repeat(trial.joint_pos[:1], cycles, axis=0)
     return trial.with_links(np.concatenate([first, trial.joint_pos[:-cycles]]))
 
 
-def frozen(trial: Trial, joint: int, row: int) -> Trial:
+def frozen(trial: MeasuredRun, joint: int, row: int) -> MeasuredRun:
     """Run one of whose link encoders stands still from a row on."""
     links: Floats = trial.joint_pos.copy()
     links[row:, joint] = links[row, joint]

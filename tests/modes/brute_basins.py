@@ -11,7 +11,7 @@ from legbench.analytic.taylor import TaylorLeg
 from legbench.control import JumpConfig
 from legbench.design import LegDesign
 from legbench.errors import ConfigError
-from legbench.modes.basin import Fate, GridAxis, Question, attraction_in, fate_of
+from legbench.modes.basin import BasinTask, Fate, GridAxis, attraction_in, fate_of
 from legbench.modes.drive import JumpLaw
 from legbench.modes.fixed_point import UNITS, fixed_point
 from legbench.modes.hop import NAMES, Apex, settle
@@ -22,7 +22,7 @@ NEIGHBOUR = 1e-7
 ENDINGS = {"stands": Fate.STANDS, "fell": Fate.FELL, "fault": Fate.FAULT}
 
 
-def random_question(design: LegDesign, seed: int, points: int) -> Question:
+def random_question(design: LegDesign, seed: int, points: int) -> BasinTask:
     """A window of random size over two random coordinates, around the leg's periodic hop."""
     config, random = JumpConfig(), np.random.default_rng(seed)
     law = JumpLaw(config, design)
@@ -41,7 +41,7 @@ def question_around(
     points: int,
     random: np.random.Generator,
     spans: tuple[float, float] = (1.0, 6.0),
-) -> Question:
+) -> BasinTask:
     """A window of random size, within `spans` map units, over two coordinates around a hop."""
     axes = []
     for place in pair:
@@ -50,7 +50,7 @@ def question_around(
         axes.append(
             GridAxis(name=NAMES[place], low=middle - span, high=middle + span, count=points)
         )
-    return Question(
+    return BasinTask(
         design=design,
         jump=config,
         motor=(0.0, 0.0),
@@ -61,7 +61,7 @@ def question_around(
     )
 
 
-def start_at(question: Question, column: int, row: int) -> Apex:
+def start_at(question: BasinTask, column: int, row: int) -> Apex:
     """The start of a cell."""
     vector = question.centre.vector()
     vector[NAMES.index(question.across.name)] = question.across.values()[column]
@@ -69,7 +69,7 @@ def start_at(question: Question, column: int, row: int) -> Apex:
     return Apex.of(vector)
 
 
-def fate_by_dense(question: Question, start: Apex) -> Fate:
+def fate_by_dense(question: BasinTask, start: Apex) -> Fate:
     """What becomes of a start, by DOP853."""
     model, at = LegModel.of(question.design), start
     config = question.jump or JumpConfig()
@@ -88,7 +88,7 @@ def fate_by_dense(question: Question, start: Apex) -> Fate:
     return Fate.WANDERS
 
 
-def on_an_edge(question: Question, start: Apex) -> bool:
+def on_an_edge(question: BasinTask, start: Apex) -> bool:
     """Whether starts beside this one end otherwise, at the finest tolerance."""
     leg, drive = replace(question, tolerance=FINEST).tools()
     fates = {
@@ -98,7 +98,7 @@ def on_an_edge(question: Question, start: Apex) -> bool:
     return len(fates) > 1
 
 
-def differing(question: Question, dense: int, seed: int) -> tuple[list[str], int]:
+def differing(question: BasinTask, dense: int, seed: int) -> tuple[list[str], int]:
     """Cells whose fate differs from brute force, one line each, and how many lie on an edge.
 
     All cells are compared with the finest tolerance, `dense` random ones with DOP853, too.

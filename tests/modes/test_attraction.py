@@ -17,7 +17,7 @@ pytest.importorskip("heyoka")
 from brute_basins import random_question
 
 from legbench.modes.attraction import Attraction, attraction_of
-from legbench.modes.basin import Fate, Question, attraction_in, fate_of
+from legbench.modes.basin import BasinTask, Fate, attraction_in, fate_of
 from legbench.modes.hop import Apex
 
 PROTOTYPE = load_design(Path(__file__).parents[2] / "models" / "prototype.toml")
@@ -64,11 +64,11 @@ def test_a_hop_that_repels_or_attracts_too_slowly_has_none() -> None:
 
 
 @pytest.fixture(scope="module")
-def asked() -> Question:
+def asked() -> BasinTask:
     return random_question(PROTOTYPE, 3, 6)
 
 
-def test_a_leg_that_is_attracted_returns(asked: Question, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_leg_that_is_attracted_returns(asked: BasinTask, monkeypatch: pytest.MonkeyPatch) -> None:
     found = attraction_in(asked)
     assert found is not None
     assert found.radius >= 1.0
@@ -87,6 +87,6 @@ def test_a_leg_that_is_attracted_returns(asked: Question, monkeypatch: pytest.Mo
     assert 2 * hops[True] < hops[False]
 
 
-def test_motors_that_are_held_promise_nothing(asked: Question) -> None:
+def test_motors_that_are_held_promise_nothing(asked: BasinTask) -> None:
     assert attraction_in(replace(asked, jump=None, motor=(-0.456, 0.456))) is None
     assert attraction_in(replace(asked, jump=JumpConfig(z2=0.5))) is None

@@ -14,7 +14,7 @@ from legbench.analytic.taylor import TaylorLeg
 from legbench.control import JumpConfig
 from legbench.design import LegDesign, load_design
 from legbench.errors import ConfigError
-from legbench.modes.cycles import Cycle, end_of, find_cycle, multiplied, repeats
+from legbench.modes.cycles import HopCycle, end_of, find_cycle, multiplied, repeats
 from legbench.modes.drive import JumpLaw
 from legbench.modes.fixed_point import UNITS, differences
 from legbench.modes.hop import Apex, return_map, settle
@@ -33,24 +33,24 @@ def leg_of(design: LegDesign, jump: JumpConfig = JUMP) -> tuple[TaylorLeg, JumpL
     return TaylorLeg(LegModel.of(design), probe=law.probe), law
 
 
-def settled(design: LegDesign, jump: JumpConfig = JUMP, hops: int = 60) -> Cycle:
+def settled(design: LegDesign, jump: JumpConfig = JUMP, hops: int = 60) -> HopCycle:
     leg, law = leg_of(design, jump)
     return find_cycle(leg, law, settle(leg, law, START, hops)[-1:])
 
 
 @pytest.fixture(scope="module")
-def hop() -> Cycle:
+def hop() -> HopCycle:
     return settled(OPTIMAL)
 
 
 @pytest.fixture(scope="module")
-def end(hop: Cycle) -> Cycle:
+def end(hop: HopCycle) -> HopCycle:
     _, found = end_of(*leg_of(OPTIMAL), hop, 400)
     assert found is not None
     return found
 
 
-def test_the_hop_of_the_optimal_leg_is_lost_to_a_polar_one_that_alternates(hop: Cycle) -> None:
+def test_the_hop_of_the_optimal_leg_is_lost_to_a_polar_one_that_alternates(hop: HopCycle) -> None:
     assert hop.period == 1
     assert not hop.stable
     value = hop.multipliers[0]
@@ -60,7 +60,7 @@ def test_the_hop_of_the_optimal_leg_is_lost_to_a_polar_one_that_alternates(hop: 
     assert np.max(polar[[0, 3, 5]]) < 1e-3 * np.max(polar[[1, 2, 4]])
 
 
-def test_it_ends_in_a_hop_of_period_two(hop: Cycle, end: Cycle) -> None:
+def test_it_ends_in_a_hop_of_period_two(hop: HopCycle, end: HopCycle) -> None:
     assert end.period == 2
     assert end.stable
     assert [abs(apex.z1) for apex in end.apexes] == pytest.approx([0.023] * 2, rel=0.02)
@@ -68,7 +68,7 @@ def test_it_ends_in_a_hop_of_period_two(hop: Cycle, end: Cycle) -> None:
     assert end.duration == pytest.approx(2.0 * hop.duration, rel=0.02)
 
 
-def test_cycles_close_by_an_independent_path(hop: Cycle, end: Cycle) -> None:
+def test_cycles_close_by_an_independent_path(hop: HopCycle, end: HopCycle) -> None:
     for cycle in (hop, end):
         for apex, following in zip(cycle.apexes, [*cycle.apexes[1:], cycle.apexes[0]], strict=True):
             rules = Rules(JUMP, OPTIMAL)
@@ -80,7 +80,7 @@ def test_cycles_close_by_an_independent_path(hop: Cycle, end: Cycle) -> None:
             assert np.max(np.abs(off)) < 1e-4
 
 
-def test_multipliers_of_a_cycle_are_those_of_differences(end: Cycle) -> None:
+def test_multipliers_of_a_cycle_are_those_of_differences(end: HopCycle) -> None:
     leg, law = leg_of(OPTIMAL)
     slopes = [differences(leg, law, apex) for apex in end.apexes]
     values, _ = multiplied(slopes)
@@ -91,7 +91,7 @@ def test_multipliers_of_a_cycle_are_those_of_differences(end: Cycle) -> None:
 def test_deviations_grow_along_the_direction_by_the_multiplier(
     name: str, request: pytest.FixtureRequest
 ) -> None:
-    cycle: Cycle = request.getfixturevalue(name)
+    cycle: HopCycle = request.getfixturevalue(name)
     leg, law = leg_of(OPTIMAL)
     aside = 1e-5 * np.real(cycle.directions[:, 0]) * UNITS
     at = Apex.of(cycle.apexes[0].vector() + aside)
@@ -131,7 +131,7 @@ def test_a_guess_that_is_no_cycle_is_named() -> None:
 
 
 @pytest.mark.long
-def test_damping_steadies_the_hop_and_the_family_says_where(hop: Cycle) -> None:
+def test_damping_steadies_the_hop_and_the_family_says_where(hop: HopCycle) -> None:
     seen: list[tuple[int, int]] = []
     family = follow_hop(
         OPTIMAL,
@@ -202,7 +202,7 @@ def test_a_family_that_ends_says_why_and_where() -> None:
     ],
 )
 def test_values_that_no_hop_has_are_refused(
-    setting: Setting, to: float, message: str, hop: Cycle
+    setting: Setting, to: float, message: str, hop: HopCycle
 ) -> None:
     with pytest.raises(ConfigError, match=message):
         follow_hop(OPTIMAL, JUMP, setting, hop, to)

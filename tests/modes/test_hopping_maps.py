@@ -23,7 +23,7 @@ from legbench.plant.start import Start
 pytest.importorskip("heyoka")
 
 from legbench.analytic.taylor import TaylorLeg
-from legbench.modes.basin import Fate, GridAxis, Question, map_basin
+from legbench.modes.basin import BasinTask, Fate, GridAxis, map_basin
 from legbench.modes.drive import JumpLaw, Passive
 from legbench.modes.fixed_point import UNITS, FixedPoint, derivative, differences, fixed_point
 from legbench.modes.hop import Apex, Ending, apex_of, return_map, settle
@@ -235,9 +235,9 @@ def test_template_has_the_stiffness_of_the_leg() -> None:
     assert math.isclose(slip.length, 0.253, rel_tol=1e-9)
 
 
-def question(point: FixedPoint, count: int = 5) -> Question:
+def question(point: FixedPoint, count: int = 5) -> BasinTask:
     height = point.apex.height
-    return Question(
+    return BasinTask(
         design=PROTOTYPE,
         jump=JUMP,
         motor=(0.0, 0.0),

@@ -14,7 +14,7 @@ from legbench.recording.columns import ONE_LEG, PER_CYCLE, Layout
 from legbench.recording.controller_table import controller_table
 from legbench.recording.layout import TIME
 from legbench.recording.reader import UnknownSignalError, load
-from legbench.recording.rows import Block, RowLayout
+from legbench.recording.rows import RowBlock, RowLayout
 from legbench.recording.stream import BatchEncoder, encode_schema, schema_for
 from legbench.recording.writer import RunWriter
 from legbench.signals import SIGNALS, Command, Floats, Observation, Signal, Truth
@@ -61,7 +61,7 @@ def test_two_legs_go_through_rows_and_stream() -> None:
     """Each column holds what its leg did, by hand and by name."""
     layout = Layout(own=OWN, legs=2)
     rng = np.random.default_rng(3)
-    block, pairs = Block(RowLayout(layout)), rng.normal(size=(12, 2, 2))
+    block, pairs = RowBlock(RowLayout(layout)), rng.normal(size=(12, 2, 2))
     truth = Truth(
         trunk_pos=pairs[6],
         trunk_vel=pairs[7],
@@ -109,7 +109,7 @@ def _schema(layout: Layout) -> pa.Schema:
 def test_two_legs_refuse_the_arrays_of_one() -> None:
     command, seen, *_ = cycle(0)
     with pytest.raises(ConfigError, match=r"records 2 legs, shapes \(2, 2\), not \[\(2,\)\]"):
-        Block(RowLayout(Layout(legs=2))).put(command, seen, 0.0, 0.0)
+        RowBlock(RowLayout(Layout(legs=2))).put(command, seen, 0.0, 0.0)
 
 
 def said(row: int, signals: Floats | None) -> tuple[Command, Observation, float, float]:

@@ -5,7 +5,7 @@ import pytest
 
 from legbench.errors import ConfigError
 from legbench.recording.columns import Layout
-from legbench.recording.rows import BATCH_ROWS, Block, RowLayout
+from legbench.recording.rows import BATCH_ROWS, RowBlock, RowLayout
 from legbench.signals import Command, Observation, Signal
 
 OWN = (Signal("gain", (), "-", ""), Signal("aim", ("x", "y", "z"), "m", ""))
@@ -22,14 +22,14 @@ def test_every_column_has_one_place_and_no_place_is_left(
     assert sorted(rows.disk_order) == list(range(rows.size))
     assert rows.shape == ((2,) if legs == 1 else (legs, 2))
     assert rows.own == (4 if own else 0)
-    assert Block(rows).values.shape == (BATCH_ROWS, rows.size)
+    assert RowBlock(rows).values.shape == (BATCH_ROWS, rows.size)
 
 
 @pytest.mark.parametrize("legs", [1, 3])
 def test_what_is_not_known_of_a_row_is_no_number(legs: int) -> None:
     """A real leg that tells nothing of its own: exactly the columns of truth and its own."""
     layout = Layout(own=OWN, legs=legs)
-    block = Block(RowLayout(layout))
+    block = RowBlock(RowLayout(layout))
     pair = np.ones((2,) if legs == 1 else (legs, 2))
     seen = Observation(
         time=0.5,

@@ -12,8 +12,8 @@ from recorded_rows import cycle
 from legbench.recording import store as store_module
 from legbench.recording.files import Appender, append_to
 from legbench.recording.log_file import LogFile
-from legbench.recording.rows import Block
-from legbench.recording.store import Store
+from legbench.recording.rows import RowBlock
+from legbench.recording.store import RunStore
 from legbench.recording.stream import END_MARK, WholeBatches, encode_schema, schema_for
 from legbench.signals import Floats
 
@@ -21,7 +21,7 @@ SCHEMA = schema_for({})
 
 
 def block(first: int, count: int = 50, *, truth: bool = True) -> Floats:
-    rows = Block()
+    rows = RowBlock()
     for row in range(first, first + count):
         rows.put(*cycle(row, truth=truth))
     return rows.columns()
@@ -39,7 +39,7 @@ class Files:
         patch.setattr(store_module.time, "monotonic", lambda: self.now)
         patch.setattr(os, "fsync", self._fsync)
         self.opened["samples"].append(encode_schema(SCHEMA))
-        self.store = Store(self.opened["samples"], self.opened["events"], SCHEMA)
+        self.store = RunStore(self.opened["samples"], self.opened["events"], SCHEMA)
 
     def _fsync(self, fd: int) -> None:
         (name,) = (name for name, file in self.opened.items() if file.fd == fd)

@@ -8,7 +8,7 @@ import pytest
 
 from legbench.errors import FormatError
 from legbench.recording.controller_table import parse_controller
-from legbench.recording.tables import Table
+from legbench.recording.tables import ManifestTable
 
 
 class Colour(StrEnum):
@@ -16,14 +16,14 @@ class Colour(StrEnum):
     BLUE = "blue"
 
 
-def table(**entries: Any) -> Table:
-    return Table(entries=entries, path="leg")
+def table(**entries: Any) -> ManifestTable:
+    return ManifestTable(entries=entries, path="leg")
 
 
 @pytest.mark.parametrize(
     ("read", "absent"),
     [
-        (lambda t: t.table("x"), Table(entries={}, path="leg.x")),
+        (lambda t: t.table("x"), ManifestTable(entries={}, path="leg.x")),
         (lambda t: t.tables("x"), ()),
         (lambda t: t.text("x"), None),
         (lambda t: t.texts("x"), ()),
@@ -33,7 +33,7 @@ def table(**entries: Any) -> Table:
     ],
 )
 def test_what_is_not_there_and_what_is_none_stand_for_nothing(
-    read: Callable[[Table], Any], absent: Any
+    read: Callable[[ManifestTable], Any], absent: Any
 ) -> None:
     assert read(table()) == read(table(x=None)) == absent
 
@@ -61,7 +61,7 @@ def test_what_is_not_there_and_what_is_none_stand_for_nothing(
     ],
 )
 def test_an_entry_of_its_type_comes_back(
-    read: Callable[[Table], Any], given: Any, found: Any
+    read: Callable[[ManifestTable], Any], given: Any, found: Any
 ) -> None:
     seen = read(table(x=given))
     assert seen == found
@@ -105,20 +105,20 @@ def test_not_a_number_is_a_number() -> None:
     ],
 )
 def test_an_entry_of_another_type_is_named(
-    read: Callable[[Table], Any], given: Any, message: str
+    read: Callable[[ManifestTable], Any], given: Any, message: str
 ) -> None:
     with pytest.raises(FormatError, match=f"^manifest {message}"):
         read(table(x=given))
 
 
 def test_a_name_at_the_top_has_no_dot() -> None:
-    assert Table(entries={}).name("x") == "x"
-    assert Table(entries={}).table("x").table("y").path == "x.y"
+    assert ManifestTable(entries={}).name("x") == "x"
+    assert ManifestTable(entries={}).table("x").table("y").path == "x.y"
 
 
 def test_a_controller_may_leave_out_what_has_a_usual_value() -> None:
     found = parse_controller(
-        Table(
+        ManifestTable(
             entries={
                 "phases": [{"code": 3, "name": "hold", "role": "rest"}],
                 "signals": [{"name": "gain"}],
@@ -129,7 +129,7 @@ def test_a_controller_may_leave_out_what_has_a_usual_value() -> None:
     assert (phase.late, phase.doc) == (0.0, "")
     assert (signal.components, signal.unit, signal.doc) == ((), "-", "")
     assert (found.counting.most, found.counting.smallest) == (None, 0.0)
-    assert parse_controller(Table(entries={})).phases == ()
+    assert parse_controller(ManifestTable(entries={})).phases == ()
 
 
 @pytest.mark.parametrize(
@@ -142,4 +142,4 @@ def test_a_controller_may_leave_out_what_has_a_usual_value() -> None:
 )
 def test_a_controller_must_name_what_it_declares(entries: dict[str, Any], message: str) -> None:
     with pytest.raises(FormatError, match=message):
-        parse_controller(Table(entries=entries, path="controller"))
+        parse_controller(ManifestTable(entries=entries, path="controller"))

@@ -21,7 +21,7 @@ from legbench.errors import ConfigError, RecordingError
 from legbench.metrics import summarise
 from legbench.recording.reader import Recording
 from legbench.replay.log import DecodedLog, load_log
-from legbench.replay.moved import Source
+from legbench.replay.moved import MotionSource
 from legbench.replay.recorded import recorded_controller, recorded_leg
 from legbench.replay.resimulation import resimulate
 
@@ -112,7 +112,7 @@ def test_a_log_is_rated_and_drawn_as_far_as_it_tells(
     np.testing.assert_allclose(mine.rating_periods, theirs.rating_periods, atol=1e-4)
     assert mine.status is None
     assert "controller unknown names no phase" in mine.warnings[0]
-    again = resimulate(part, recorded_leg(part), Source.MOTORS)
+    again = resimulate(part, recorded_leg(part), MotionSource.MOTORS)
     apart = {each.signal: each.max for each in again.signals.deviations()}
     assert apart["joint_pos_1"] < CONFIG.nodes[0].link_units.resolution
     with pytest.raises(ConfigError, match="does not tell its controller"):

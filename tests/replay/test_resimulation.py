@@ -14,7 +14,7 @@ from legbench.errors import ConfigError, PlantFault, RecordingError
 from legbench.metrics import summarise
 from legbench.recording.reader import Recording, load
 from legbench.replay.comparison import Replayed, same_bits
-from legbench.replay.moved import Moved, Source
+from legbench.replay.moved import MotionSource, Moved
 from legbench.replay.recorded import recorded_leg
 from legbench.replay.resimulation import resimulate
 
@@ -29,10 +29,10 @@ def worst(signals: Replayed, name: str) -> float:
     return max(found)
 
 
-@pytest.mark.parametrize("source", list(Source))
+@pytest.mark.parametrize("source", list(MotionSource))
 @pytest.mark.parametrize("name", ["sim_jump", "analytic_run", "limited_run", "guest_plant"])
 def test_what_was_simulated_repeats_itself_to_the_bit(
-    name: str, source: Source, request: pytest.FixtureRequest
+    name: str, source: MotionSource, request: pytest.FixtureRequest
 ) -> None:
     run: Recording = request.getfixturevalue(name)
     found = resimulate(run, recorded_leg(run), source)
@@ -50,13 +50,13 @@ def test_what_was_simulated_repeats_itself_to_the_bit(
 
 
 def test_measured_motors_jump_as_the_leg_did(can_jump: Recording) -> None:
-    found = resimulate(can_jump, recorded_leg(can_jump), Source.MOTORS)
+    found = resimulate(can_jump, recorded_leg(can_jump), MotionSource.MOTORS)
     assert worst(found.signals, "joint_pos") < 5e-4
 
 
 def test_commands_to_drives_are_followed_a_cycle_late(can_swing: Recording) -> None:
     """A cycle is 0.03 rad in a step of these motors, and their loop is a few milliradians slow."""
-    found = resimulate(can_swing, recorded_leg(can_swing), Source.COMMANDS)
+    found = resimulate(can_swing, recorded_leg(can_swing), MotionSource.COMMANDS)
     assert worst(found.signals, "motor_pos") < 5e-3
     assert worst(found.signals, "joint_pos") < 1e-3
 
@@ -70,11 +70,11 @@ def test_measured_motors_move_a_pinned_leg_to_within_a_count(can_swing: Recordin
     for name in ("motor_pos_2", "joint_pos_2", "joint_vel_2"):
         columns[name][row] = columns[name][row - 1]
     lost = replace(can_swing, columns=columns)
-    stale = Moved(lost, Source.MOTORS).stale
-    before = Moved(can_swing, Source.MOTORS).stale
+    stale = Moved(lost, MotionSource.MOTORS).stale
+    before = Moved(can_swing, MotionSource.MOTORS).stale
     assert stale[row, 1]
     assert stale.sum() == before.sum() + (not before[row, 1])
-    found = resimulate(lost, recorded_leg(lost), Source.MOTORS)
+    found = resimulate(lost, recorded_leg(lost), MotionSource.MOTORS)
     assert found.fault is None
     assert found.recording.description.plant == "sim"
     assert worst(found.signals, "motor_pos") < 1e-12
@@ -87,13 +87,13 @@ def test_a_run_that_begins_in_motion_says_so(can_swing: Recording) -> None:
     fast = int(np.argmax(np.abs(can_swing["joint_vel"][:, 0])))
     columns = {name: values[fast : fast + 20] for name, values in can_swing.columns.items()}
     part = replace(can_swing, time=can_swing.time[fast : fast + 20], columns=columns)
-    found = resimulate(part, recorded_leg(part), Source.MOTORS)
+    found = resimulate(part, recorded_leg(part), MotionSource.MOTORS)
     assert any("begins in motion" in note for note in found.notes)
 
 
 def test_another_leg_moves_otherwise(sim_jump: Recording, models: object) -> None:
     leg = recorded_leg(sim_jump, {"design": f"{models}/table2.toml"})
-    found = resimulate(sim_jump, leg, Source.COMMANDS)
+    found = resimulate(sim_jump, leg, MotionSource.COMMANDS)
     assert found.recording.description.design == leg.design
     assert found.recording.description.design != sim_jump.description.design
     first = found.signals.first()
@@ -104,7 +104,7 @@ def test_another_leg_moves_otherwise(sim_jump: Recording, models: object) -> Non
 
 def test_another_plant_and_another_setting_move_otherwise(sim_jump: Recording) -> None:
     leg = recorded_leg(sim_jump, {"imperfections.stiffness_error": [0.01, 0.0]}, plant="analytic")
-    found = resimulate(sim_jump, leg, Source.COMMANDS)
+    found = resimulate(sim_jump, leg, MotionSource.COMMANDS)
     assert found.recording.description.plant == "analytic"
     assert found.recording.description.imperfections.stiffness_error == (0.01, 0.0)
     assert 1e-4 < worst(found.signals, "joint_pos") < 1.0
@@ -115,7 +115,7 @@ def test_a_plant_that_cannot_go_on_ends_it_there(sim_jump: Recording) -> None:
     for name, motor in (("command_pos_1", 1.2), ("command_pos_2", -1.2)):
         columns[name][300:] = motor
     folded = replace(sim_jump, columns=columns)
-    found = resimulate(folded, recorded_leg(folded), Source.COMMANDS)
+    found = resimulate(folded, recorded_leg(folded), MotionSource.COMMANDS)
     assert found.fault is not None
     assert "no longer on the branch" in found.fault
     assert 300 < len(found.recording.time) < len(sim_jump.time)
@@ -131,14 +131,14 @@ def test_what_cannot_be_resimulated_is_refused(can_swing: Recording, sim_jump: R
         described=replace(can_swing.description, looks_only=True),
     )
     with pytest.raises(ConfigError, match="was read only: its commands moved nothing"):
-        resimulate(read_only, recorded_leg(read_only), Source.COMMANDS)
+        resimulate(read_only, recorded_leg(read_only), MotionSource.COMMANDS)
     with pytest.raises(ConfigError, match="moves no drives"):
-        resimulate(sim_jump, recorded_leg(sim_jump, plant="can"), Source.COMMANDS)
+        resimulate(sim_jump, recorded_leg(sim_jump, plant="can"), MotionSource.COMMANDS)
     with pytest.raises(ConfigError, match="needs plant 'mine'"):
         recorded_leg(sim_jump, plant="mine")
     columns = {**can_swing.columns, "motor_pos_1": np.full(len(can_swing.time), np.nan)}
     with pytest.raises(RecordingError, match="does not know its motors"):
-        Moved(replace(can_swing, columns=columns), Source.MOTORS)
+        Moved(replace(can_swing, columns=columns), MotionSource.MOTORS)
 
 
 def test_bits_are_compared_and_not_values() -> None:
@@ -176,5 +176,5 @@ def test_a_plant_that_fails_before_its_first_row_says_why(
     )
     run = load(tmp_path / "run")
     with pytest.raises(PlantFault, match="the plant failed in a resimulation after t = 0") as told:
-        resimulate(run, recorded_leg(run), Source.COMMANDS)
+        resimulate(run, recorded_leg(run), MotionSource.COMMANDS)
     assert "1 / 0" in str(told.value)

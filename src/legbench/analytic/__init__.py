@@ -10,7 +10,7 @@ from legbench.lazily import lazy_names
 
 if TYPE_CHECKING:
     from legbench.analytic.hybrid import HybridLeg
-    from legbench.analytic.smooth import Accuracy, Method
+    from legbench.analytic.smooth import Accuracy, RungeKutta
 
 __all__ = [
     "Accuracy",
@@ -19,9 +19,9 @@ __all__ = [
     "HybridLeg",
     "LegModel",
     "LegState",
-    "Method",
     "PairTerms",
     "Regime",
+    "RungeKutta",
     "Transition",
     "energy",
     "floating_terms",
@@ -37,6 +37,6 @@ __getattr__ = lazy_names(
     {
         "Accuracy": "legbench.analytic.smooth",
         "HybridLeg": "legbench.analytic.hybrid",
-        "Method": "legbench.analytic.smooth",
+        "RungeKutta": "legbench.analytic.smooth",
     },
 )

@@ -14,7 +14,7 @@ from legbench.signals import Floats
 Rates = Callable[[float, Floats], list[float]]
 
 
-class Method(StrEnum):
+class RungeKutta(StrEnum):
     """Embedded Runge-Kutta pair."""
 
     DOP853 = "dop853"
@@ -25,7 +25,7 @@ class Method(StrEnum):
     @property
     def solver(self) -> Callable[..., OdeSolver]:
         """Class of scipy that integrates by this pair."""
-        return DOP853 if self is Method.DOP853 else RK45
+        return DOP853 if self is RungeKutta.DOP853 else RK45
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,7 +36,7 @@ class Accuracy:
         ConfigError: a tolerance or a time that is not positive.
     """
 
-    method: Method = Method.DOP853
+    method: RungeKutta = RungeKutta.DOP853
     rtol: float = 1e-9
     """Relative error per step [-]."""
     atol: float = 1e-11

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from legbench.lazily import lazy_names
 
 if TYPE_CHECKING:
-    from legbench.campaign.plan import Plan
+    from legbench.campaign.plan import CampaignPlan
     from legbench.campaign.planning import plan_campaign
     from legbench.campaign.reading import load_campaign
     from legbench.campaign.rows import measured_rows
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from legbench.campaign.table import measured_table, read_table, whole_table
 
 __all__ = [
-    "Plan",
+    "CampaignPlan",
     "load_campaign",
     "measured_rows",
     "measured_table",
@@ -30,7 +30,7 @@ __all__ = [
 __getattr__ = lazy_names(
     __name__,
     {
-        "Plan": "legbench.campaign.plan",
+        "CampaignPlan": "legbench.campaign.plan",
         "load_campaign": "legbench.campaign.reading",
         "measured_rows": "legbench.campaign.rows",
         "measured_table": "legbench.campaign.table",

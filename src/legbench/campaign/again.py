@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from legbench.campaign.plan import Plan
+from legbench.campaign.plan import CampaignPlan
 from legbench.campaign.table import MEASURED
 from legbench.errors import CampaignError, ConfigError
 from legbench.experiment.canonical import experiment_hash
@@ -23,7 +23,7 @@ EXAMPLES: Final = "examples"
 """Entry of `campaign.json` that has the whole experiments."""
 
 
-def examples_of(plan: Plan) -> list[dict[str, Any]]:
+def examples_of(plan: CampaignPlan) -> list[dict[str, Any]]:
     """Tables of the first experiment of each kind of controller and plant."""
     found: dict[tuple[str, str], Experiment] = {}
     for each in plan.planned:

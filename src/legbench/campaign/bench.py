@@ -12,10 +12,10 @@ from typing import Final
 from legbench.campaign.drives import moves_drives
 from legbench.campaign.executor import Note
 from legbench.campaign.folder import is_done, open_folder, shard_path, write_into
-from legbench.campaign.plan import Plan, Planned
+from legbench.campaign.plan import CampaignPlan, Planned
 from legbench.campaign.records import RECORDS
 from legbench.campaign.rows import measured_rows
-from legbench.campaign.running import Finished, Progress, finished_of
+from legbench.campaign.running import FinishedCampaign, Progress, finished_of
 from legbench.campaign.shards import Shard, shard_bytes, shards_of
 from legbench.commissioning.idle import drive_troubles
 from legbench.drives.setup.bus_file import load_bus
@@ -41,7 +41,7 @@ def pause_for(seconds: float, stop: StopFlag) -> None:
 
 
 def run_on_bench(
-    plan: Plan,
+    plan: CampaignPlan,
     folder: Path,
     *,
     pause: float = 2.0,
@@ -49,7 +49,7 @@ def run_on_bench(
     progress: Progress | None = None,
     note: Note | None = None,
     wait: Wait = pause_for,
-) -> Finished:
+) -> FinishedCampaign:
     """Run every experiment of a campaign on its drives, those that are not there yet, in order.
 
     Every run leaves its folder under `records`: one that came to its end by its experiment's hash,
@@ -90,7 +90,7 @@ def run_on_bench(
         return finished_of(plan, folder, shards, shards, () if failure is None else (failure,))
 
 
-def _in_order(plan: Plan) -> list[Shard]:
+def _in_order(plan: CampaignPlan) -> list[Shard]:
     """Shards of one experiment each in the order of the file."""
     places = {each.hash: place for place, each in enumerate(plan.planned)}
     return sorted(shards_of(plan, 1), key=lambda shard: places[shard.planned[0].hash])
@@ -100,7 +100,7 @@ def _silent(_line: str) -> None:
     """Tell nobody."""
 
 
-def _check_buses(plan: Plan) -> None:
+def _check_buses(plan: CampaignPlan) -> None:
     """Refuse another plant and a wrong bus file before anything is begun; raises ConfigError."""
     for file in dict.fromkeys(_choice(each).bus for each in plan.planned):
         load_bus(file)

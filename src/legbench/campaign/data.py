@@ -11,7 +11,7 @@ Settings = Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Block:
+class CellBlock:
     """Block of cells: every entry of a list with every point of a grid."""
 
     name: str
@@ -42,7 +42,7 @@ class Campaign:
     """Folder to which paths are relative."""
     base: Mapping[str, Any]
     """Tables of the experiment that every cell begins with."""
-    blocks: tuple[Block, ...]
+    blocks: tuple[CellBlock, ...]
     excluded: tuple[Settings, ...]
     """Settings of cells that are left out: those that match all keys of one entry."""
     infeasible: Literal["refuse", "skip"]

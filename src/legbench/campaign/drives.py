@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from legbench.campaign.plan import Plan
+from legbench.campaign.plan import CampaignPlan
 from legbench.drives.setup.bus_file import load_bus
 from legbench.errors import CampaignError
 from legbench.experiment.data import Experiment
@@ -20,7 +20,7 @@ def moves_drives(experiment: Experiment) -> bool:
     return not choice.is_virtual(load_bus(choice.bus_file))
 
 
-def refuse_drives(plan: Plan) -> None:
+def refuse_drives(plan: CampaignPlan) -> None:
     """Refuse a plan that would move drives from several processes, or unwatched.
 
     Raises:

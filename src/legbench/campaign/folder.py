@@ -10,7 +10,7 @@ from typing import Any, Final
 from legbench.campaign.again import CAMPAIGN, EXAMPLES, examples_of
 from legbench.campaign.data import Settings
 from legbench.campaign.locks import locked
-from legbench.campaign.plan import Plan
+from legbench.campaign.plan import CampaignPlan
 from legbench.campaign.provenance import provenance
 from legbench.campaign.records import RECORDS
 from legbench.campaign.shards import NAME_KEY, SHARDS, Shard, check_version, told_of
@@ -30,7 +30,7 @@ Part = tuple[int, int]
 
 
 @contextmanager
-def open_folder(folder: Path, plan: Plan, part: Part | None = None) -> Iterator[None]:
+def open_folder(folder: Path, plan: CampaignPlan, part: Part | None = None) -> Iterator[None]:
     """Make the folder of a campaign, or go on in it, and keep others out of it meanwhile.
 
     Args:
@@ -110,7 +110,7 @@ def _clean(folder: Path) -> None:
                 draft.unlink(missing_ok=True)
 
 
-def _begin(folder: Path, plan: Plan) -> None:
+def _begin(folder: Path, plan: CampaignPlan) -> None:
     """Take over the folder for a plan, or see that it is this plan's already."""
     path = folder / CAMPAIGN
     if path.is_file():
@@ -136,7 +136,7 @@ def _begin(folder: Path, plan: Plan) -> None:
         write_into(path, json.dumps(description(plan), indent=1).encode() + b"\n")
 
 
-def description(plan: Plan) -> Mapping[str, Any]:
+def description(plan: CampaignPlan) -> Mapping[str, Any]:
     """Content of `campaign.json`: what the campaign is, and what made it."""
 
     def plain(settings: Settings) -> dict[str, Any]:

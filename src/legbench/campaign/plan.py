@@ -27,7 +27,7 @@ class Planned:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Plan:
+class CampaignPlan:
     """Plan of a campaign: everything that it will run, and what it will not."""
 
     campaign: Campaign

@@ -9,9 +9,9 @@ from dataclasses import replace
 from itertools import product
 from typing import Any, Final, final
 
-from legbench.campaign.data import Block, Campaign, Settings
+from legbench.campaign.data import Campaign, CellBlock, Settings
 from legbench.campaign.feasible import Infeasible, why_infeasible
-from legbench.campaign.plan import Plan, Planned, cost_of
+from legbench.campaign.plan import CampaignPlan, Planned, cost_of
 from legbench.errors import CampaignError, ConfigError
 from legbench.experiment.canonical import experiment_hash
 from legbench.experiment.data import LARGEST_SEED, Experiment
@@ -28,7 +28,7 @@ SEARCHED: Final = 40
 0.1 s, and nobody reads more."""
 
 
-def plan_campaign(campaign: Campaign, *, large: bool = False) -> Plan:
+def plan_campaign(campaign: Campaign, *, large: bool = False) -> CampaignPlan:
     """Make the experiments of a campaign and check each of them.
 
     Args:
@@ -73,7 +73,7 @@ def _size(campaign: Campaign, first: Experiment | None) -> str:
     )
 
 
-def cells_of(block: Block) -> Iterator[Settings]:
+def cells_of(block: CellBlock) -> Iterator[Settings]:
     """Settings of each cell of a block, exclusions not yet taken out."""
     for entry in block.entries:
         for point in product(*block.grid.values()):
@@ -114,7 +114,7 @@ class _Planner:
                     return None
         return None
 
-    def take(self, block: Block) -> None:
+    def take(self, block: CellBlock) -> None:
         """Make the experiments of a block."""
         for settings in cells_of(block):
             try:
@@ -143,9 +143,9 @@ class _Planner:
             more = f"; and {rest} more" if rest > 0 else ""
             raise ConfigError("; ".join(self._problems[:TOLD]) + more)
 
-    def plan(self) -> Plan:
+    def plan(self) -> CampaignPlan:
         """Return the plan of all blocks that were taken."""
-        return Plan(
+        return CampaignPlan(
             campaign=self._campaign,
             planned=tuple(self._planned.values()),
             settings=self._settings,
@@ -178,7 +178,7 @@ class _Planner:
                 return True
         return False
 
-    def _take_cell(self, block: Block, settings: Settings, experiment: Experiment) -> None:
+    def _take_cell(self, block: CellBlock, settings: Settings, experiment: Experiment) -> None:
         varied = [*block.grid, *{key for entry in block.entries for key in entry}]
         searched = varied if len(self._infeasible) < SEARCHED else ()
         reason = why_infeasible(experiment, settings, searched, self._experiment, block.name)

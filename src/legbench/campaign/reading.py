@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from legbench.campaign.data import Block, Campaign, Settings
+from legbench.campaign.data import Campaign, CellBlock, Settings
 from legbench.errors import ConfigError
 from legbench.experiment.files import load_experiment
 from legbench.experiment.reading import Reader, joined
@@ -110,7 +110,7 @@ class _Common:
     changes: Settings
 
 
-def _blocks(reader: Reader, tables: Mapping[str, Any], changes: Settings) -> tuple[Block, ...]:
+def _blocks(reader: Reader, tables: Mapping[str, Any], changes: Settings) -> tuple[CellBlock, ...]:
     """Blocks of the file; what stands outside of them holds for each, or is the only one."""
     common = _Common(
         trials=_trials(reader, tables.get("trials", 1), "trials"),
@@ -129,7 +129,7 @@ def _blocks(reader: Reader, tables: Mapping[str, Any], changes: Settings) -> tup
     return tuple(_block(reader, common, each, f"cells.{number}") for number, each in enumerate(raw))
 
 
-def _block(reader: Reader, common: _Common, raw: Mapping[str, Any], at: str) -> Block:
+def _block(reader: Reader, common: _Common, raw: Mapping[str, Any], at: str) -> CellBlock:
     own = _grid(reader, raw.get("grid", {}), joined(at, "grid"))
     settings = _settings(reader, raw.get("set", {}), joined(at, "set"))
     entries = common.entries
@@ -143,7 +143,7 @@ def _block(reader: Reader, common: _Common, raw: Mapping[str, Any], at: str) -> 
     for key in sorted({key for key in keys if keys.count(key) > 1}):
         reader.refuse(joined(at, key), "is given twice, in set, grid or list; leave one out")
     changed = common.changes
-    return Block(
+    return CellBlock(
         name=_text(reader, raw.get("name", at or "cells"), joined(at, "name")),
         trials=trials,
         settings=_without(settings, changed) | dict(changed),

@@ -19,7 +19,7 @@ from legbench.campaign.folder import (
     shard_path,
     write_into,
 )
-from legbench.campaign.plan import Plan
+from legbench.campaign.plan import CampaignPlan
 from legbench.campaign.records import RECORDS
 from legbench.campaign.shards import (
     NAME_KEY,
@@ -41,7 +41,7 @@ none while that is not known."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Finished:
+class FinishedCampaign:
     """What has become of a campaign, or of the part that was asked for."""
 
     folder: Path
@@ -60,7 +60,7 @@ class Finished:
 
 
 def run_campaign(
-    plan: Plan,
+    plan: CampaignPlan,
     folder: Path,
     executor: AbstractExecutor,
     shards: Sequence[Shard],
@@ -70,7 +70,7 @@ def run_campaign(
     stop: StopFlag | None = None,
     progress: Progress | None = None,
     note: Note | None = None,
-) -> Finished:
+) -> FinishedCampaign:
     """Run the shards of a campaign that are not there yet, and make its table once all are.
 
     A call that was interrupted or killed is gone on with by calling again: what is there is kept,
@@ -105,17 +105,17 @@ def run_campaign(
 
 
 def finished_of(
-    plan: Plan,
+    plan: CampaignPlan,
     folder: Path,
     shards: Sequence[Shard],
     mine: Sequence[Shard],
     failures: tuple[str, ...],
-) -> Finished:
+) -> FinishedCampaign:
     """Look what is there, and make the table if that is all."""
     there = {shard.name for shard in shards if is_done(folder, shard)}
     done = sum(len(shard.planned) for shard in mine if shard.name in there)
     wanted = sum(len(shard.planned) for shard in mine)
-    return Finished(
+    return FinishedCampaign(
         folder=folder,
         done=done,
         wanted=wanted,
@@ -199,7 +199,7 @@ class _Clock:
             self._progress(self._done, self._total, left)
 
 
-def _assembled(plan: Plan, folder: Path, shards: Sequence[Shard]) -> Path:
+def _assembled(plan: CampaignPlan, folder: Path, shards: Sequence[Shard]) -> Path:
     """Write the table of all shards and return its path."""
     with one_at_a_time(folder):
         made: set[bytes] = set()

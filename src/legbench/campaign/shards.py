@@ -15,7 +15,7 @@ from typing import Any, Final
 import pyarrow as pa
 from pyarrow import parquet
 
-from legbench.campaign.plan import Plan, Planned, cost_of
+from legbench.campaign.plan import CampaignPlan, Planned, cost_of
 from legbench.campaign.provenance import provenance, versions
 from legbench.campaign.rows import Row
 from legbench.campaign.table import FORMAT_KEY, PROVENANCE_KEY, TABLE_FORMAT, measured_table
@@ -49,7 +49,7 @@ class Shard:
         return sum(cost_of(each.experiment) for each in self.planned)
 
 
-def shards_of(plan: Plan, size: int | None = None) -> tuple[Shard, ...]:
+def shards_of(plan: CampaignPlan, size: int | None = None) -> tuple[Shard, ...]:
     """Shards of a plan, those of experiments that are alike next to each other.
 
     They follow from the plan alone, not from who runs it, so that a campaign that goes on finds

@@ -13,8 +13,8 @@ from legbench.errors import CampaignError, ConfigError
 
 if TYPE_CHECKING:
     from legbench.campaign.executor import AbstractExecutor
-    from legbench.campaign.plan import Plan
-    from legbench.campaign.running import Finished
+    from legbench.campaign.plan import CampaignPlan
+    from legbench.campaign.running import FinishedCampaign
     from legbench.campaign.shards import Shard
 
 EXECUTORS = "serial, local, dask, dask://HOST:PORT, slurm"
@@ -161,7 +161,7 @@ def _executor(flags: CampaignArguments, out: Path) -> "AbstractExecutor":
     raise ConfigError(f"no executor '{name}'; there are {EXECUTORS}")
 
 
-def _on_bench(plan: "Plan", out: Path, flags: CampaignArguments) -> int:
+def _on_bench(plan: "CampaignPlan", out: Path, flags: CampaignArguments) -> int:
     """Run every cell on the bench."""
     from legbench.campaign.bench import run_on_bench
     from legbench.interrupts import stop_on_interrupt
@@ -173,7 +173,7 @@ def _on_bench(plan: "Plan", out: Path, flags: CampaignArguments) -> int:
     return _report(plan, finished, as_json=flags.json)
 
 
-def _note_skipped(plan: "Plan") -> None:
+def _note_skipped(plan: "CampaignPlan") -> None:
     """Say which cells are left out because the leg cannot do them."""
     from legbench.campaign.planning import TOLD
 
@@ -183,7 +183,7 @@ def _note_skipped(plan: "Plan") -> None:
         report_error(f"skipped: {len(plan.infeasible) - TOLD} more; --plan tells all of them")
 
 
-def _tell_plan(plan: "Plan", shards: "tuple[Shard, ...]", flags: CampaignArguments) -> None:
+def _tell_plan(plan: "CampaignPlan", shards: "tuple[Shard, ...]", flags: CampaignArguments) -> None:
     from legbench.campaign.folder import description
 
     simulated = sum(each.experiment.duration for each in plan.planned)
@@ -220,7 +220,7 @@ def _settings_text(settings: Any) -> str:
     return ", ".join(f"{key} = {toml_value(value)}" for key, value in settings.items())
 
 
-def _report(plan: "Plan", finished: "Finished", *, as_json: bool) -> int:
+def _report(plan: "CampaignPlan", finished: "FinishedCampaign", *, as_json: bool) -> int:
     """Tell how the campaign has ended; returns the exit status."""
     for failure in finished.failures:
         report_error(f"not run: {failure}")
@@ -263,7 +263,7 @@ def _report(plan: "Plan", finished: "Finished", *, as_json: bool) -> int:
     return 0
 
 
-def _count(finished: "Finished", column: str, value: str) -> int:
+def _count(finished: "FinishedCampaign", column: str, value: str) -> int:
     """Number of runs in the table with a value; 0 while there is no table."""
     if finished.table is None:
         return 0

@@ -13,7 +13,7 @@ from legbench.cli import (
     drives_sheets,
     drives_timing,
 )
-from legbench.cli.drives_reading import Bench
+from legbench.cli.drives_reading import BenchFlags
 from legbench.cli.parse import parse
 from legbench.interrupts import stop_on_interrupt
 
@@ -83,7 +83,7 @@ class DrivesArguments:
             subcommand("monitor", description="listen, and tell what the drives say"),
         ]
     )
-    bench: Bench
+    bench: BenchFlags
 
 
 def main(arguments: list[str]) -> int:

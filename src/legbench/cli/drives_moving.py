@@ -3,7 +3,7 @@
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from legbench.cli.drives_reading import Bench
+from legbench.cli.drives_reading import BenchFlags
 from legbench.cli.output import note, print_json
 from legbench.cli.waived import note_waived
 from legbench.drives.master.session import Session
@@ -26,7 +26,7 @@ class Configure:
     write: bool = False
     """Write the whole configuration and read every object back."""
 
-    def run(self, bench: Bench) -> int:
+    def run(self, bench: BenchFlags) -> int:
         """Print the differences; 1 if there are any left."""
         from legbench.commissioning.configure import differences, write
 
@@ -69,7 +69,7 @@ class Zero:
     dry_run: bool = False
     """Whether to print the offsets without writing them."""
 
-    def run(self, bench: Bench) -> int:
+    def run(self, bench: BenchFlags) -> int:
         """Measure, print, write the offsets into the bus file."""
         from legbench.commissioning.zero import measure, write
 
@@ -101,7 +101,7 @@ class Home:
     timeout: float = 20.0
     """Longest duration of the search [s]."""
 
-    def run(self, bench: Bench) -> int:
+    def run(self, bench: BenchFlags) -> int:
         """Home and print the counts before and after."""
         from legbench.commissioning.home import home
 
@@ -132,7 +132,7 @@ class Jog:
     stay: bool = False
     """Whether to stay at the end of the motion instead of going back."""
 
-    def run(self, bench: Bench) -> int:
+    def run(self, bench: BenchFlags) -> int:
         """Jog the motor and print the positions of motors and links."""
         from legbench.commissioning.jog import jog
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Bench:
+class BenchFlags:
     """Flags of every action on a bus: which bus it is, and how results are printed."""
 
     bus: Path = Path("hardware/leg.toml")
@@ -70,7 +70,7 @@ class Scan:
     last: int = 127
     """Highest node id to ask."""
 
-    def run(self, bench: Bench) -> int:
+    def run(self, bench: BenchFlags) -> int:
         """Print every node; 1 if a node of the bus file is not there, or two drives share an id."""
         from legbench.commissioning.scan import scan
         from legbench.drives.protocol.frame import LAST_NODE
@@ -109,7 +109,7 @@ class Scan:
 class Status:
     """Print what the drives say of themselves, in words."""
 
-    def run(self, bench: Bench) -> int:
+    def run(self, bench: BenchFlags) -> int:
         """Print state, mode, error and encoders of every drive."""
         from legbench.commissioning.status import status
 
@@ -138,7 +138,7 @@ class Budget:
     files against each other.
     """
 
-    def run(self, bench: Bench) -> int:
+    def run(self, bench: BenchFlags) -> int:
         """Print every frame; raises ConfigError where a channel or the files do not fit."""
         from legbench.commissioning.learn import known_means
         from legbench.drives.setup.checks import check_together

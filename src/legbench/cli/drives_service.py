@@ -3,7 +3,7 @@
 from dataclasses import asdict, dataclass
 
 from legbench.cli.drives_moving import nodes_named
-from legbench.cli.drives_reading import Bench
+from legbench.cli.drives_reading import BenchFlags
 from legbench.cli.output import note, print_json
 
 
@@ -14,7 +14,7 @@ class Reset:
     node: str | None = None
     """Name in the bus file of the only drive to reset; by default all that are in fault."""
 
-    def run(self, bench: Bench) -> int:
+    def run(self, bench: BenchFlags) -> int:
         """Print how every drive is; 1 if one is still in fault."""
         from legbench.commissioning.reset import reset
 
@@ -47,7 +47,7 @@ class Store:
     timeout: float = 10.0
     """Longest wait for a drive that writes its memory [s]."""
 
-    def run(self, bench: Bench) -> int:
+    def run(self, bench: BenchFlags) -> int:
         """Print which drives have stored."""
         from legbench.commissioning.store import store
 
@@ -70,7 +70,7 @@ class NodeId:
     to: int
     """New node id, 1 to 127."""
 
-    def run(self, bench: Bench) -> int:
+    def run(self, bench: BenchFlags) -> int:
         """Print the drive and its node ids; 1 if it could not store the new one."""
         from legbench.commissioning.node_id import set_node_id
 

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from legbench.cli.drives_reading import Bench
+from legbench.cli.drives_reading import BenchFlags
 from legbench.cli.output import note, print_json, report_error
 from legbench.errors import ConfigError
 from legbench.shipped import locate
@@ -90,7 +90,7 @@ class Emulate:
     seconds: float = math.inf
     """Time after which the command ends [s]."""
 
-    def run(self, bench: Bench) -> int:
+    def run(self, bench: BenchFlags) -> int:
         """Serve until ^C or SIGTERM, printing every change of a drive's state."""
         _check_time("seconds", self.seconds)
         self._check_way(bench)
@@ -137,7 +137,7 @@ class Emulate:
         return 0
 
     @staticmethod
-    def _tell_ready(bench: Bench, bitrate: int, server: "Server") -> None:
+    def _tell_ready(bench: BenchFlags, bitrate: int, server: "Server") -> None:
         """Say how a program reaches the drives."""
         from legbench.drives.emulated.slcan_server import SlcanServer
 
@@ -146,7 +146,7 @@ class Emulate:
             interface, channel, at = SLCAN, server.path, f" --bitrate {bitrate}"
         note(f"serving {channel}; use it with --interface {interface} --channel {channel}{at}")
 
-    def _paths(self, bench: Bench, config: "BusConfig") -> tuple[Path, ...]:
+    def _paths(self, bench: BenchFlags, config: "BusConfig") -> tuple[Path, ...]:
         """Socket files to serve, one a channel; none where it is another bus.
 
         Raises:
@@ -167,7 +167,7 @@ class Emulate:
             )
         return tuple(map(Path, given))
 
-    def _leg(self, bench: Bench) -> "tuple[tuple[float, ...], Body]":
+    def _leg(self, bench: BenchFlags) -> "tuple[tuple[float, ...], Body]":
         """Motor positions at power-on [rad], and what hangs on the shafts."""
         from legbench.control import JumpConfig
         from legbench.drives.emulated.body import stiff_body
@@ -180,7 +180,7 @@ class Emulate:
         body = stiff_body if bare else EmulatedLeg(chosen.design, chosen.options, start)
         return tuple(start.motor_pos.tolist()), body
 
-    def _check_way(self, bench: Bench) -> None:
+    def _check_way(self, bench: BenchFlags) -> None:
         from legbench.drives.transport.system import require_linux
 
         require_linux("serving an emulated leg to other processes")
@@ -207,7 +207,7 @@ class Monitor:
     every: float = 0.2
     """Time between two looks [s]."""
 
-    def run(self, bench: Bench) -> int:
+    def run(self, bench: BenchFlags) -> int:
         """Print a line a drive, in place on a terminal, until ^C."""
         from legbench.commissioning.monitor import monitor
 

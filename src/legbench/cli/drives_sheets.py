@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from tyro.conf import Positional, UseAppendAction
 
-from legbench.cli.drives_reading import Bench
+from legbench.cli.drives_reading import BenchFlags
 from legbench.cli.output import note, print_json, report_error
 from legbench.plant.can_choice import LIMITS_NAME
 from legbench.shipped import locate
@@ -31,7 +31,7 @@ class Learn:
     """Object that shows the position of the link, such as "60E4:01 i32", or none for a drive with
     one encoder; else the likeliest."""
 
-    def run(self, bench: Bench) -> int:
+    def run(self, bench: BenchFlags) -> int:
         """Print what is there, fixed or missing; 1 if the drives cannot be used."""
         from legbench.commissioning.learn import learn, write_bus
         from legbench.drives.setup.bus_file import parse_object
@@ -52,7 +52,7 @@ class Check:
     eds: Path | None = None
     """Data sheet of all drives; by default those that the bus file names."""
 
-    def run(self, bench: Bench) -> int:
+    def run(self, bench: BenchFlags) -> int:
         """Print what is there, fixed or missing; 1 if the drives cannot be used."""
         from legbench.commissioning.learn import check
         from legbench.drives.setup.exchange import check_budget

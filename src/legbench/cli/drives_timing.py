@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import arg
 
-from legbench.cli.drives_reading import Bench
+from legbench.cli.drives_reading import BenchFlags
 from legbench.cli.output import note, print_json
 from legbench.errors import ConfigError
 
@@ -37,7 +37,7 @@ class Jitter:
     plot: Annotated[Path | None, arg(metavar="FILE")] = None
     """Draw both distributions: .png, .svg or .pdf."""
 
-    def run(self, bench: Bench) -> int:
+    def run(self, bench: BenchFlags) -> int:
         """Measure and print a table, with what the system granted."""
         from legbench.commissioning.jitter import measure
 

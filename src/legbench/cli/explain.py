@@ -60,7 +60,7 @@ def main(arguments: list[str]) -> int:
     from legbench.explain.causes import causes_named
     from legbench.explain.content import explanation_content
     from legbench.explain.explanation import Scope, explain
-    from legbench.explain.screening import Method
+    from legbench.explain.screening import ScreeningMethod
     from legbench.explain.targets import step_target
     from legbench.explain.words import explanation_lines
     from legbench.interrupts import stop_on_interrupt
@@ -71,7 +71,7 @@ def main(arguments: list[str]) -> int:
     design, numbers = load_design(flags.design), published(path)
     scope = Scope(
         pairs=flags.pairs,
-        method=None if flags.screen == "none" else Method(flags.screen),
+        method=None if flags.screen == "none" else ScreeningMethod(flags.screen),
         setups=flags.setups,
         jump=flags.jump,
         seed=flags.seed,

@@ -19,8 +19,8 @@ from legbench.cli.hop_tables import (
 from legbench.cli.output import note, timed_progress
 from legbench.design import LegDesign
 from legbench.errors import ConfigError
-from legbench.modes.basin import Fate, GridAxis, Question, map_basin
-from legbench.modes.cycles import LONGEST, Cycle, end_of, find_cycle, repeats
+from legbench.modes.basin import BasinTask, Fate, GridAxis, map_basin
+from legbench.modes.cycles import LONGEST, HopCycle, end_of, find_cycle, repeats
 from legbench.modes.drive import JumpLaw
 from legbench.modes.hop import Apex, Ending, return_map, settle
 from legbench.modes.hop_family import HopFamily, follow_hop
@@ -114,7 +114,7 @@ def _hopped(leg: TaylorLeg, law: JumpLaw, start: Apex, hops: int) -> list[Apex]:
     return apexes
 
 
-def _cycles(leg: TaylorLeg, law: JumpLaw, apexes: list[Apex]) -> list[Cycle]:
+def _cycles(leg: TaylorLeg, law: JumpLaw, apexes: list[Apex]) -> list[HopCycle]:
     """The periodic hop near the last ones, and, if it is not stable, the one it ends in."""
     period = repeats(apexes) or 1
     found = [find_cycle(leg, law, apexes[-period:])]
@@ -129,7 +129,7 @@ def _cycles(leg: TaylorLeg, law: JumpLaw, apexes: list[Apex]) -> list[Cycle]:
     return found
 
 
-def _chosen(cycles: list[Cycle], period: int | None) -> Cycle:
+def _chosen(cycles: list[HopCycle], period: int | None) -> HopCycle:
     """The cycle that was asked for.
 
     Raises:
@@ -147,7 +147,7 @@ def _chosen(cycles: list[Cycle], period: int | None) -> Cycle:
     )
 
 
-def _plot_return(out: Path, design: LegDesign, apexes: list[Apex], cycle: Cycle) -> None:
+def _plot_return(out: Path, design: LegDesign, apexes: list[Apex], cycle: HopCycle) -> None:
     from legbench.viz.print.hops import plot_return
 
     heights = np.array([apex.height for apex in apexes])
@@ -166,14 +166,14 @@ def _plot_family(out: Path, design: LegDesign, family: HopFamily) -> None:
     note(f"wrote {out / 'family.png'}")
 
 
-def _basin(flags: "HopArguments", design: LegDesign, cycle: Cycle, out: Path) -> Ints:
+def _basin(flags: "HopArguments", design: LegDesign, cycle: HopCycle, out: Path) -> Ints:
     from legbench.viz.print.hops import plot_basin
 
     def axis(name: str, span: float) -> GridAxis:
         middle = getattr(cycle.apexes[0], name, 0.0)
         return GridAxis(name=name, low=middle - span, high=middle + span, count=flags.basin)
 
-    question = Question(
+    question = BasinTask(
         design=design,
         jump=flags.jump,
         motor=(0.0, 0.0),

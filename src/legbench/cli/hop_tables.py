@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from legbench.design import LegDesign
-from legbench.modes.cycles import Cycle
+from legbench.modes.cycles import HopCycle
 from legbench.modes.fixed_point import UNITS, FixedPoint
 from legbench.modes.hop import NAMES, Apex
 from legbench.modes.hop_family import HopFamily
@@ -56,7 +56,7 @@ def point_content(point: FixedPoint) -> dict[str, Any]:
     }
 
 
-def cycle_lines(cycle: Cycle) -> list[str]:
+def cycle_lines(cycle: HopCycle) -> list[str]:
     """A cycle of hops: apexes, times, multipliers and the direction of the largest one."""
     many = cycle.period > 1
     lines = ["", f"hop of period {cycle.period}" if many else "periodic hop"]
@@ -75,7 +75,7 @@ def cycle_lines(cycle: Cycle) -> list[str]:
     ]
 
 
-def _growth(cycle: Cycle) -> str:
+def _growth(cycle: HopCycle) -> str:
     """Words for the growth by the largest multiplier, and for its direction."""
     value, direction = cycle.multipliers[0], cycle.directions[:, 0] * UNITS
     largest = int(np.argmax(np.abs(cycle.directions[:, 0])))
@@ -90,7 +90,7 @@ def _growth(cycle: Cycle) -> str:
     return f"deviations along ({parts}) {verb} by {abs(change):.2g} % a period{how}"
 
 
-def cycle_content(cycle: Cycle) -> dict[str, Any]:
+def cycle_content(cycle: HopCycle) -> dict[str, Any]:
     """A cycle of hops, as JSON."""
     first = cycle.hops[0]
     kept = [abs(value) > SMALL for value in cycle.multipliers]

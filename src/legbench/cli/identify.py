@@ -15,7 +15,7 @@ from legbench.errors import ConfigError
 from legbench.recording.reader import Recording
 
 if TYPE_CHECKING:
-    from legbench.identify import Outcome, Question
+    from legbench.identify import Identification, IdentificationTask
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,7 +88,9 @@ def main(arguments: list[str]) -> int:
         return _answer(flags, question, held_out)
 
 
-def _answer(flags: IdentifyArguments, question: "Question", held_out: list[Recording]) -> int:
+def _answer(
+    flags: IdentifyArguments, question: "IdentificationTask", held_out: list[Recording]
+) -> int:
     """Identify, print and write what was asked for; returns the exit status."""
     from legbench.identify import UnidentifiableError, identify
     from legbench.identify.words import content_of, lines_of
@@ -127,7 +129,7 @@ def _noise(flags: IdentifyArguments) -> float | None:
     return math.radians(flags.noise_deg)
 
 
-def _check(flags: IdentifyArguments, question: "Question") -> None:
+def _check(flags: IdentifyArguments, question: "IdentificationTask") -> None:
     """Refuse what would only be found after the fit."""
     if flags.sharpen is not None and flags.plan is None:
         raise ConfigError("--sharpen says what a plan is for; give --plan, the file to write")
@@ -143,8 +145,8 @@ def _check(flags: IdentifyArguments, question: "Question") -> None:
 
 def _hops(
     held_out: list[Recording],
-    question: "Question",
-    outcome: "Outcome",
+    question: "IdentificationTask",
+    outcome: "Identification",
     lines: list[str],
     content: dict[str, Any],
 ) -> bool:
@@ -171,8 +173,8 @@ def _hops(
 
 def _extras(
     flags: IdentifyArguments,
-    question: "Question",
-    outcome: "Outcome",
+    question: "IdentificationTask",
+    outcome: "Identification",
     lines: list[str],
     content: dict[str, Any],
 ) -> None:
@@ -203,8 +205,8 @@ def _extras(
 def _plan(
     path: Path,
     flags: IdentifyArguments,
-    question: "Question",
-    outcome: "Outcome | None",
+    question: "IdentificationTask",
+    outcome: "Identification | None",
     lines: list[str],
     content: dict[str, Any],
 ) -> None:

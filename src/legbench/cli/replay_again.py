@@ -78,12 +78,12 @@ def _controller(recording: Recording, chosen: ReplayArguments, edits: dict[str, 
 
 
 def _leg(recording: Recording, chosen: ReplayArguments, edits: dict[str, Any]) -> Again:
-    from legbench.replay.moved import Source
+    from legbench.replay.moved import MotionSource
     from legbench.replay.recorded import recorded_leg
     from legbench.replay.resimulation import resimulate
 
     leg = recorded_leg(recording, edits, plant=chosen.plant)
-    source = Source(chosen.resimulate)
+    source = MotionSource(chosen.resimulate)
     found = resimulate(recording, leg, source, timed_progress())
     for line in found.notes:
         note(f"legbench: {line}")

@@ -9,7 +9,7 @@ from tyro.conf import Positional, UseAppendAction, arg
 from legbench.cli.playback_arguments import PlaybackArguments
 from legbench.design.setup import SetupKind
 from legbench.errors import ConfigError
-from legbench.replay.moved import Source
+from legbench.replay.moved import MotionSource
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,7 +24,7 @@ class ReplayArguments:
     controller: bool = False
     """Whether to show its controller what was recorded, and to compare the commands to the bit; the
     exit status is 1 if those of the recorded controller differ. A controller's own file is run."""
-    resimulate: Source | None = None
+    resimulate: MotionSource | None = None
     """Let the leg move again: commands drives its servos as recorded, motors puts the motors where
     they were measured, which is what a run on drives is for."""
     settings: Annotated[UseAppendAction[tuple[str, ...]], arg(name="set")] = ()

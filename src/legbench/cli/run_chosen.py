@@ -32,7 +32,7 @@ SCANNED = {"--setup": "setup.kind", "--linkage": "linkage.kind", "--plant": "pla
 
 
 @dataclass(slots=True, kw_only=True)
-class Scan:
+class ChosenWords:
     """Words of the command line that decide which flags there are."""
 
     subject: str | None = None
@@ -45,9 +45,9 @@ class Scan:
     """Words of the command line without the subject."""
 
 
-def scan(words: Sequence[str]) -> Scan:
+def scan(words: Sequence[str]) -> ChosenWords:
     """Pick out of the command line what decides which flags there are."""
-    found = Scan()
+    found = ChosenWords()
     waiting = list(words)
     if waiting and not waiting[0].startswith("-"):
         found.subject = waiting.pop(0)
@@ -93,7 +93,7 @@ class Tables:
         return entry
 
 
-def first_tables(words: Scan) -> Tables:
+def first_tables(words: ChosenWords) -> Tables:
     """Tables of the file, the run or the controller that was named, with `--set` in them.
 
     Raises:
@@ -178,7 +178,7 @@ CONTROLLER_HELP = (
 )
 
 
-def _command(scanned: Scan) -> str:
+def _command(scanned: ChosenWords) -> str:
     return "run" if scanned.subject is None else f"run {scanned.subject}"
 
 

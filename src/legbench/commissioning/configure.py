@@ -7,7 +7,7 @@ from legbench.drives.setup.taken import check_taken, unprotected
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Difference:
+class ObjectDifference:
     """Object whose value in a drive differs from the bus file's."""
 
     node: str
@@ -17,12 +17,12 @@ class Difference:
     wanted: int
 
 
-def differences(session: Session) -> list[Difference]:
+def differences(session: Session) -> list[ObjectDifference]:
     """Objects that differ, after the identities have been checked; raises DriveError."""
     up = session.bring_up()
     up.identify()
     return [
-        Difference(
+        ObjectDifference(
             node=node.name,
             object=entry.name,
             holds=entry.there,
@@ -34,7 +34,7 @@ def differences(session: Session) -> list[Difference]:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Written:
+class WrittenConfiguration:
     """Result of writing a configuration."""
 
     objects: int
@@ -45,7 +45,7 @@ class Written:
     """Node and object of every value that a drive holds otherwise and cannot change."""
 
 
-def write(session: Session) -> Written:
+def write(session: Session) -> WrittenConfiguration:
     """Write the configuration and read every object back. No drive is enabled.
 
     Raises:
@@ -63,7 +63,7 @@ def write(session: Session) -> Written:
     outcomes = {node.name: up.configure(node) for node in session.config.nodes}
     check_taken(session.config, outcomes)
     entries = [(name, entry) for name, found in outcomes.items() for entry in found]
-    return Written(
+    return WrittenConfiguration(
         objects=sum(entry.agrees for _, entry in entries),
         lines=unprotected(outcomes),
         held=frozenset((name, entry.name) for name, entry in entries if not entry.agrees),

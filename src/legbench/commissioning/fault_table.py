@@ -20,7 +20,7 @@ MS = 1_000_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Trial:
+class FaultTrial:
     """Trial of one fault, and its expected result."""
 
     name: str
@@ -62,92 +62,98 @@ def _babble(every_us: int) -> Fault:
 _F, _N = FrameFaultKind, NodeFaultKind
 LOST, EMERGENCY, FOLLOWING = "process data lost", "drive emergency", "following error"
 TRIALS = (
-    Trial(name="answers of a drive dropped", faults=(_frame(_F.DROP, 0x181),), cause=LOST),
-    Trial(
+    FaultTrial(name="answers of a drive dropped", faults=(_frame(_F.DROP, 0x181),), cause=LOST),
+    FaultTrial(
         name="answers dropped for 2 cycles",
         faults=(_frame(_F.DROP, 0x181, until_ns=BRIEF_NS),),
     ),
-    Trial(name="SYNC dropped", faults=(_frame(_F.DROP, 0x080),), cause=LOST),
-    Trial(name="commands of a drive dropped", faults=(_frame(_F.DROP, 0x202),), cause=EMERGENCY),
-    Trial(name="master's heartbeat dropped", faults=(_frame(_F.DROP, 0x77E),), cause=EMERGENCY),
-    Trial(name="cable pulled", faults=(_frame(_F.DROP, None),), cause=LOST),
-    Trial(
+    FaultTrial(name="SYNC dropped", faults=(_frame(_F.DROP, 0x080),), cause=LOST),
+    FaultTrial(
+        name="commands of a drive dropped", faults=(_frame(_F.DROP, 0x202),), cause=EMERGENCY
+    ),
+    FaultTrial(
+        name="master's heartbeat dropped", faults=(_frame(_F.DROP, 0x77E),), cause=EMERGENCY
+    ),
+    FaultTrial(name="cable pulled", faults=(_frame(_F.DROP, None),), cause=LOST),
+    FaultTrial(
         name="answers 0.3 ms late",
         faults=(_frame(_F.DELAY, 0x181, delay_ns=300_000),),
         cause=LOST,
     ),
-    Trial(
+    FaultTrial(
         name="answers 0.7 ms late",
         faults=(_frame(_F.DELAY, 0x181, delay_ns=700_000),),
         cause=LOST,
     ),
-    Trial(
+    FaultTrial(
         name="answers 1 ms late",
         faults=(_frame(_F.DELAY, 0x181, delay_ns=1_000_000),),
         cause=LOST,
     ),
-    Trial(
+    FaultTrial(
         name="answers 2 ms late",
         faults=(_frame(_F.DELAY, 0x182, delay_ns=2_000_000),),
         cause=LOST,
     ),
-    Trial(
+    FaultTrial(
         name="answers of one cycle 1 ms late",
         faults=(_frame(_F.DELAY, 0x181, until_ns=MS, delay_ns=1_000_000),),
     ),
-    Trial(
+    FaultTrial(
         name="answers doubled",
         faults=(_frame(_F.DUPLICATE, 0x181, delay_ns=10_000),),
     ),
-    Trial(
+    FaultTrial(
         name="answers too short",
         faults=(_frame(_F.WRONG_LENGTH, 0x182, length=7),),
         cause=LOST,
     ),
-    Trial(
+    FaultTrial(
         name="commands too short",
         faults=(_frame(_F.WRONG_LENGTH, 0x202, length=5),),
         cause=EMERGENCY,
     ),
-    Trial(name="bits of answers flipped", faults=(_frame(_F.BAD_BITS, 0x181),), cause=LOST),
-    Trial(
+    FaultTrial(name="bits of answers flipped", faults=(_frame(_F.BAD_BITS, 0x181),), cause=LOST),
+    FaultTrial(
         name="bits of commands flipped",
         faults=(_frame(_F.BAD_BITS, 0x201),),
         cause="bus off",
         or_cause=EMERGENCY,
     ),
-    Trial(name="a node babbles, wire full", faults=(_babble(100),), cause=LOST),
-    Trial(name="a node babbles, 1 frame/ms", faults=(_babble(1000),)),
-    Trial(name="drive bus-off", faults=(_node(_N.BUS_OFF, 1),), cause=LOST),
-    Trial(name="drive restarts", faults=(_node(_N.RESET, 2),), cause=LOST),
-    Trial(name="drive unplugged", faults=(_node(_N.SILENT, 2),), cause=LOST),
-    Trial(
+    FaultTrial(name="a node babbles, wire full", faults=(_babble(100),), cause=LOST),
+    FaultTrial(name="a node babbles, 1 frame/ms", faults=(_babble(1000),)),
+    FaultTrial(name="drive bus-off", faults=(_node(_N.BUS_OFF, 1),), cause=LOST),
+    FaultTrial(name="drive restarts", faults=(_node(_N.RESET, 2),), cause=LOST),
+    FaultTrial(name="drive unplugged", faults=(_node(_N.SILENT, 2),), cause=LOST),
+    FaultTrial(
         name="drive's heartbeat lost",
         faults=(_node(_N.HEARTBEAT_LOSS, 1),),
         cause="heartbeat lost",
     ),
-    Trial(name="under-voltage", faults=(_node(_N.UNDER_VOLTAGE, 1),), cause=EMERGENCY),
-    Trial(name="over-temperature", faults=(_node(_N.OVER_TEMPERATURE, 2),), cause=EMERGENCY),
-    Trial(name="drive warns", faults=(_node(_N.WARNING, 1),)),
-    Trial(name="jammed motor", faults=(_part(_N.JAMMED, 1),), cause=FOLLOWING),
-    Trial(name="frozen motor encoder", faults=(_part(_N.MOTOR_FROZEN, 2),), cause=FOLLOWING),
-    Trial(
+    FaultTrial(name="under-voltage", faults=(_node(_N.UNDER_VOLTAGE, 1),), cause=EMERGENCY),
+    FaultTrial(name="over-temperature", faults=(_node(_N.OVER_TEMPERATURE, 2),), cause=EMERGENCY),
+    FaultTrial(name="drive warns", faults=(_node(_N.WARNING, 1),)),
+    FaultTrial(name="jammed motor", faults=(_part(_N.JAMMED, 1),), cause=FOLLOWING),
+    FaultTrial(name="frozen motor encoder", faults=(_part(_N.MOTOR_FROZEN, 2),), cause=FOLLOWING),
+    FaultTrial(
         name="motor encoder steps 0.1 rad", faults=(_part(_N.MOTOR_STEP, 1, 0.1),), cause=FOLLOWING
     ),
-    Trial(
+    FaultTrial(
         name="motor encoder drifts 1 rad/s",
         faults=(_part(_N.MOTOR_DRIFT, 2, 1.0),),
         cause=FOLLOWING,
     ),
-    Trial(name="frozen link encoder", faults=(_part(_N.LINK_FROZEN, 1),), cause="sway"),
-    Trial(
+    FaultTrial(name="frozen link encoder", faults=(_part(_N.LINK_FROZEN, 1),), cause="sway"),
+    FaultTrial(
         name="link encoder steps 0.1 rad",
         faults=(_part(_N.LINK_STEP, 2, 0.1),),
         cause="joint speed",
     ),
-    Trial(name="link encoder drifts 1 rad/s", faults=(_part(_N.LINK_DRIFT, 1, 1.0),), cause="sway"),
-    Trial(name="process data repeated", faults=(_part(_N.REPEATING, 2),), cause="sway"),
-    Trial(name="master killed or frozen", gone=True, cause="master gone"),
-    Trial(name="^C", interrupted=True),
-    Trial(name="the viewer hangs", viewer=True),
+    FaultTrial(
+        name="link encoder drifts 1 rad/s", faults=(_part(_N.LINK_DRIFT, 1, 1.0),), cause="sway"
+    ),
+    FaultTrial(name="process data repeated", faults=(_part(_N.REPEATING, 2),), cause="sway"),
+    FaultTrial(name="master killed or frozen", gone=True, cause="master gone"),
+    FaultTrial(name="^C", interrupted=True),
+    FaultTrial(name="the viewer hangs", viewer=True),
 )

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Protocol
 
 from legbench.commissioning.command_excess import excess_of
-from legbench.commissioning.fault_table import MS, STRIKE_NS, Trial
+from legbench.commissioning.fault_table import MS, STRIKE_NS, FaultTrial
 from legbench.control import JumpConfig
 from legbench.design import LegDesign
 from legbench.drives.emulated.bus import LockstepBus
@@ -82,7 +82,11 @@ class Result:
 
 
 def try_fault(
-    trial: Trial, bus_file: Path, design: LegDesign, out: Path, start_view: StartView | None = None
+    trial: FaultTrial,
+    bus_file: Path,
+    design: LegDesign,
+    out: Path,
+    start_view: StartView | None = None,
 ) -> Result:
     """Jump on the emulated leg, let the fault strike, see what is left.
 
@@ -92,8 +96,7 @@ def try_fault(
     """
     if trial.viewer and start_view is None:
         raise ConfigError(f"the trial '{trial.name}' needs a viewer to freeze: give start_view")
-    config = load_bus(bus_file)
-    limits = load_limits(bus_file.parent / LIMITS_NAME)
+    config, limits = load_bus(bus_file), load_limits(bus_file.parent / LIMITS_NAME)
     choice = CanChoice(bus=bus_file, interface=EMULATED, faults=trial.faults, end=End.STOP)
     chosen = Experiment(design=design, controller=JumpConfig())
     start = start_of(chosen)
@@ -144,7 +147,7 @@ def _network(opened: OpenPlant) -> Network:
 
 
 def _viewed(
-    trial: Trial,
+    trial: FaultTrial,
     opened: OpenPlant,
     chosen: Experiment,
     writer: RunWriter,
@@ -162,7 +165,7 @@ def _viewed(
 
 
 def _run(
-    trial: Trial,
+    trial: FaultTrial,
     opened: OpenPlant,
     chosen: Experiment,
     writer: RunWriter,

@@ -23,7 +23,7 @@ STILL_COUNTS = 40
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Zero:
+class EncoderZero:
     """Encoder offsets of one node."""
 
     node: str
@@ -35,7 +35,7 @@ class Zero:
     """Offset of the second encoder, none without one [counts]."""
 
 
-def measure(session: Session, posture: Sequence[float]) -> list[Zero]:
+def measure(session: Session, posture: Sequence[float]) -> list[EncoderZero]:
     """Offsets with which both encoders of every node show `posture`, one angle a node [rad].
 
     Raises:
@@ -56,7 +56,7 @@ def measure(session: Session, posture: Sequence[float]) -> list[Zero]:
     ]
 
 
-def _node(session: Session, node: NodeConfig, angle: float) -> Zero:
+def _node(session: Session, node: NodeConfig, angle: float) -> EncoderZero:
     reads = [read_counts(session, node) for _ in range(READS)]
     offsets = []
     for place, (axis, units) in enumerate(((node.side.value, node.motor), ("link", node.link))):
@@ -69,7 +69,7 @@ def _node(session: Session, node: NodeConfig, angle: float) -> Zero:
                 f"is read, the limit is {STILL_COUNTS}; hold the leg still"
             )
         offsets.append(_offset(units, shown[READS // 2], angle))
-    return Zero(
+    return EncoderZero(
         node=node.name,
         side=node.side,
         motor_offset=offsets[0],
@@ -81,7 +81,7 @@ def _offset(units: AxisUnits, shown: int, angle: float) -> int:
     return units.nearest(shown - replace(units, offset_counts=0).to_counts(angle), 0)
 
 
-def write(path: Path, zeros: Sequence[Zero], out: Path | None = None) -> Path:
+def write(path: Path, zeros: Sequence[EncoderZero], out: Path | None = None) -> Path:
     """Put the offsets into the bus file that was measured with; whole or not at all.
 
     Everything else in the file is kept, see `file_edit.edit_file`.

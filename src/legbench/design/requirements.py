@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from legbench.design.leg import Limits
-from legbench.design.toml import UNITS, Table, load_tables, tables_to_toml, units_per_si
+from legbench.design.toml import UNITS, TomlTable, load_tables, tables_to_toml, units_per_si
 from legbench.errors import DesignError
 from legbench.signals import Floats
 from legbench.writing import save_whole
@@ -203,7 +203,7 @@ def requirements_from_mapping(content: Mapping[str, Any]) -> Requirements:
         )
     per_si = units_per_si(content.get("units", {}), REQUIREMENT_UNITS) | {"ratio": 1.0}
     leg, bounds, weights, limits, constraints = (
-        Table(name, content.get(name, {}), per_si) for name in known[1:]
+        TomlTable(name, content.get(name, {}), per_si) for name in known[1:]
     )
     values: dict[str, Any] = {
         key: leg.number(key, LEG_KEYS[key]) for key in LEG_KEYS if key in leg.content
@@ -221,7 +221,7 @@ def requirements_from_mapping(content: Mapping[str, Any]) -> Requirements:
     )
 
 
-def _range(table: Table, name: str) -> Range:
+def _range(table: TomlTable, name: str) -> Range:
     lower, start, upper = table.numbers(name, "ratio", ("lower", "start", "upper"))
     try:
         return Range(lower=lower, start=start, upper=upper)
@@ -229,7 +229,7 @@ def _range(table: Table, name: str) -> Range:
         raise DesignError(f"[bounds] {name}: {error}") from None
 
 
-def _weights(table: Table) -> Weights:
+def _weights(table: TomlTable) -> Weights:
     given: dict[str, Any] = {}
     if "mass_share" in table.content:
         given["mass_share"] = table.numbers("mass_share", "ratio", ("thigh", "shank", "foot"))
@@ -239,13 +239,13 @@ def _weights(table: Table) -> Weights:
     return replace(PAPER.weights, **given)
 
 
-def _limits(table: Table) -> Limits:
+def _limits(table: TomlTable) -> Limits:
     given = {name: table.pair(name, "angle") for name in ("hip", "knee") if name in table.content}
     table.finish()
     return replace(PAPER.limits, **given)
 
 
-def _overhang(table: Table) -> float | None:
+def _overhang(table: TomlTable) -> float | None:
     value = table.number("overhang", "length") if "overhang" in table.content else None
     table.finish()
     return value

@@ -30,7 +30,7 @@ SEGMENT_KEYS = {"mass": "mass", "length": "length", "com": "length", "inertia": 
 SECTIONS = ("units", "trunk", "thigh", "shank", "foot", "springs", "limits")
 
 
-class Table:
+class TomlTable:
     """One table of the file, which gives numbers in SI and remembers which keys were read."""
 
     def __init__(self, name: str, content: Mapping[str, Any], per_si: Mapping[str, float]) -> None:
@@ -122,10 +122,10 @@ def design_from_mapping(content: Mapping[str, Any]) -> LegDesign:
         raise DesignError(f"unknown entries: {', '.join(sorted(unknown))}")
     per_si = units_per_si(content.get("units", {}))
 
-    def table(name: str) -> Table:
+    def table(name: str) -> TomlTable:
         if name not in content:
             raise DesignError(f"[{name}] is missing; a design has {', '.join(SECTIONS[1:])}")
-        return Table(name, content[name], per_si)
+        return TomlTable(name, content[name], per_si)
 
     def segment(name: str) -> Segment:
         entries = table(name)

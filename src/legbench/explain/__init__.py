@@ -16,15 +16,15 @@ if TYPE_CHECKING:
     from legbench.explain.causes import CAUSES, Cause, causes_named, combined
     from legbench.explain.engine import rate_many
     from legbench.explain.explanation import Explanation, explain
-    from legbench.explain.fitting import Fit, fit_pairs, fit_singles
+    from legbench.explain.fitting import CauseFit, fit_pairs, fit_singles
     from legbench.explain.rating import Shapes
     from legbench.explain.targets import Target, step_target
 
 __all__ = [
     "CAUSES",
     "Cause",
+    "CauseFit",
     "Explanation",
-    "Fit",
     "Shapes",
     "Target",
     "causes_named",
@@ -41,7 +41,7 @@ __getattr__ = lazy_names(
         "CAUSES": "legbench.explain.causes",
         "Cause": "legbench.explain.causes",
         "Explanation": "legbench.explain.explanation",
-        "Fit": "legbench.explain.fitting",
+        "CauseFit": "legbench.explain.fitting",
         "Shapes": "legbench.explain.rating",
         "Target": "legbench.explain.targets",
         "causes_named": "legbench.explain.causes",

@@ -14,7 +14,7 @@ from legbench.errors import ConfigError, DesignError
 from legbench.experiment import Experiment, targets_of
 from legbench.explain.consistency import only_counted
 from legbench.explain.engine import NOBODY, Watch, in_setup, rate_many
-from legbench.explain.fitting import Fit
+from legbench.explain.fitting import CauseFit
 from legbench.explain.targets import PERIODS, READING, step_experiment
 from legbench.imperfections import Imperfections
 from legbench.kinematics import joint_to_modal
@@ -34,7 +34,7 @@ TOLD = 2.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Proposal:
+class ProposedExperiment:
     """One experiment and what the explanations say of it."""
 
     setup: SetupKind
@@ -58,7 +58,9 @@ class Proposal:
     """Angle z1 that the encoders show at rest, before and after the step (k, 2) [rad]."""
 
 
-def propose(design: LegDesign, fits: Sequence[Fit], watch: Watch = NOBODY) -> list[Proposal]:
+def propose(
+    design: LegDesign, fits: Sequence[CauseFit], watch: Watch = NOBODY
+) -> list[ProposedExperiment]:
     """Steps that tell explanations apart, the one that tells most first; none for a single one.
 
     What a step shows are the ratings of its periods and the postures before and after it.
@@ -108,14 +110,14 @@ def resting(experiment: Experiment, legs: Sequence[Imperfections]) -> Floats:
 
 
 def _proposal(
-    experiment: Experiment, fits: Sequence[Fit], ratings: Floats, posture: Floats
-) -> Proposal:
+    experiment: Experiment, fits: Sequence[CauseFit], ratings: Floats, posture: Floats
+) -> ProposedExperiment:
     pairs = list(combinations(range(len(fits)), 2))
     apart = [differ(ratings[[a, b]], posture[[a, b]]) for a, b in pairs]
     least = int(np.argmin(apart))
     first, second = pairs[least]
     controller = experiment.controller
-    return Proposal(
+    return ProposedExperiment(
         setup=experiment.setup.kind,
         z2=controller.z2,  # pyrefly: ignore[missing-attribute]
         dz2=controller.dz2,  # pyrefly: ignore[missing-attribute]

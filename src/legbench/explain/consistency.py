@@ -15,7 +15,7 @@ from legbench.design import LegDesign
 from legbench.design.setup import Setup, SetupKind
 from legbench.experiment import Experiment
 from legbench.explain.engine import NOBODY, Watch, rate_many
-from legbench.explain.jumping import Hop
+from legbench.explain.jumping import JumpFit
 from legbench.explain.targets import READING, Target, step_experiment
 from legbench.imperfections import Imperfections
 from legbench.paper import Published
@@ -27,7 +27,7 @@ are rated, and as many as show a saturated rating where there are more."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Check:
+class StatementCheck:
     """One statement of the paper, tried on one leg."""
 
     name: str
@@ -116,12 +116,12 @@ def only_counted(ratings: Floats, counted: Ints) -> Floats:
 
 
 def checks_of(
-    predicted: Predicted, leg: int, hop: Hop | None, numbers: Mapping[str, Published]
-) -> tuple[Check, ...]:
+    predicted: Predicted, leg: int, hop: JumpFit | None, numbers: Mapping[str, Published]
+) -> tuple[StatementCheck, ...]:
     """Statements of the paper on one of the legs; without a hop, none on the jump."""
     level, wanted = float(predicted.bang_bang[leg]), numbers["bang_bang_rating"].value
     found = [
-        Check(
+        StatementCheck(
             name="bang-bang",
             words=f"ffs, bang-bang settles at {wanted:.2f}",
             value=level,
@@ -136,7 +136,7 @@ def checks_of(
     for setup, (lower, usual) in predicted.folded.items():
         fall = float(usual[leg] - lower[leg])
         found.append(
-            Check(
+            StatementCheck(
                 name=f"{setup}-folded",
                 words=f"{setup}, bang-bang falls at z2 = {z2:g} by",
                 value=fall,
@@ -151,12 +151,12 @@ def checks_of(
     return tuple(found)
 
 
-def _order(predicted: Predicted, leg: int, high: SetupKind, low: SetupKind) -> Check:
+def _order(predicted: Predicted, leg: int, high: SetupKind, low: SetupKind) -> StatementCheck:
     """Order of two setups in the last period that the paper would count in both."""
     rows = [predicted.steps[setup][leg] for setup in (high, low)]
     common = np.flatnonzero(np.isfinite(rows[0]) & np.isfinite(rows[1]))
     value = float(rows[0][common[-1]] - rows[1][common[-1]]) if len(common) else float("nan")
-    return Check(
+    return StatementCheck(
         name=f"{high}-over-{low}",
         words=f"step, {high} is rated over {low} by",
         value=value,
@@ -164,12 +164,12 @@ def _order(predicted: Predicted, leg: int, high: SetupKind, low: SetupKind) -> C
     )
 
 
-def _decline(predicted: Predicted, leg: int, setup: SetupKind) -> Check:
+def _decline(predicted: Predicted, leg: int, setup: SetupKind) -> StatementCheck:
     """Fall of the rating from the first to the last period that the paper would count."""
     rating = predicted.steps[setup][leg]
     known = rating[np.isfinite(rating)]
     value = float(known[0] - known[-1]) if len(known) > 1 else float("nan")
-    return Check(
+    return StatementCheck(
         name=f"{setup}-declines",
         words=f"step, {setup} declines, by",
         value=value,
@@ -177,10 +177,10 @@ def _decline(predicted: Predicted, leg: int, setup: SetupKind) -> Check:
     )
 
 
-def _lowest(phase: str, value: float, numbers: Mapping[str, Published]) -> Check:
+def _lowest(phase: str, value: float, numbers: Mapping[str, Published]) -> StatementCheck:
     """Bound of the ratings of a phase of the jump, which holds whatever height it reaches."""
     least = numbers[f"jump_rating_{phase}"].value
-    return Check(
+    return StatementCheck(
         name=f"jump-{phase}",
         words=f"jump, every {phase} is rated over {least:.2f}",
         value=value,

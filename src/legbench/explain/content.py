@@ -3,9 +3,9 @@
 from dataclasses import asdict
 from typing import Any
 
-from legbench.explain.apart import Proposal
-from legbench.explain.explanation import Explanation, Judged
-from legbench.explain.fitting import Fit
+from legbench.explain.apart import ProposedExperiment
+from legbench.explain.explanation import Explanation, JudgedFit
+from legbench.explain.fitting import CauseFit
 from legbench.explain.words import sentences
 
 
@@ -42,7 +42,7 @@ def explanation_content(found: Explanation) -> dict[str, Any]:
     }
 
 
-def _fit(fit: Fit) -> dict[str, Any]:
+def _fit(fit: CauseFit) -> dict[str, Any]:
     return {
         "causes": [
             {"cause": cause.name, "size": size, "unit": cause.unit or "1"}
@@ -57,7 +57,7 @@ def _fit(fit: Fit) -> dict[str, Any]:
     }
 
 
-def _judged(judged: Judged) -> dict[str, Any]:
+def _judged(judged: JudgedFit) -> dict[str, Any]:
     return {
         **_fit(judged.fit),
         "checks": [asdict(check) for check in judged.checks],
@@ -65,7 +65,7 @@ def _judged(judged: Judged) -> dict[str, Any]:
     }
 
 
-def _proposal(proposal: Proposal) -> dict[str, Any]:
+def _proposal(proposal: ProposedExperiment) -> dict[str, Any]:
     rows = zip(proposal.names, proposal.ratings.tolist(), proposal.posture.tolist(), strict=True)
     return {
         "setup": str(proposal.setup),

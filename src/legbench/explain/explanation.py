@@ -6,21 +6,21 @@ from dataclasses import dataclass, replace
 from legbench.design import LegDesign
 from legbench.experiment import Experiment
 from legbench.experiment.data import check_seed
-from legbench.explain.apart import Proposal, count_proposals, propose
+from legbench.explain.apart import ProposedExperiment, count_proposals, propose
 from legbench.explain.causes import Cause
-from legbench.explain.consistency import Check, checks_of, count_predictions, predict
+from legbench.explain.consistency import StatementCheck, checks_of, count_predictions, predict
 from legbench.explain.engine import NOBODY, Watch, in_setup
 from legbench.explain.fitting import (
-    Fit,
+    CauseFit,
     count_fitted,
     effective,
     fit_pairs,
     fit_singles,
     perfect_fit,
 )
-from legbench.explain.jumping import Hop, hop_of
+from legbench.explain.jumping import JumpFit, hop_of
 from legbench.explain.motor_end import MotorEnd, count_ends, motor_ends
-from legbench.explain.screening import Method, Screened, count_screened, screen
+from legbench.explain.screening import Screened, ScreeningMethod, count_screened, screen
 from legbench.explain.sensitivity import Sensitivity, count_sensitivities, sensitivities
 from legbench.explain.targets import MISSING, Target
 from legbench.paper import Published
@@ -33,13 +33,13 @@ AT_LEAST = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Judged:
+class JudgedFit:
     """One fit and how it agrees with everything else that was measured."""
 
-    fit: Fit
-    checks: tuple[Check, ...]
+    fit: CauseFit
+    checks: tuple[StatementCheck, ...]
     """Statements of the paper; empty if there was no time for them."""
-    hop: Hop | None
+    hop: JumpFit | None
     """Jump of this leg; none if it was not simulated."""
 
     @property
@@ -55,34 +55,34 @@ class Explanation:
     design: LegDesign
     """Leg that its controller believes in."""
     target: Target
-    perfect: Judged
+    perfect: JudgedFit
     """Leg without any imperfection."""
     sensitivities: tuple[Sensitivity, ...]
     """Effects of plausible sizes, the largest first."""
     screened: tuple[Screened, ...]
     """Weights when everything is there at once; empty if that was not asked for."""
-    singles: tuple[Fit, ...]
+    singles: tuple[CauseFit, ...]
     """Fits of one cause, the best first."""
-    pairs: tuple[Fit, ...]
+    pairs: tuple[CauseFit, ...]
     """Fits of two causes, the best first; empty if they were not asked for."""
-    judged: tuple[Judged, ...]
+    judged: tuple[JudgedFit, ...]
     """Best fits, those first that agree best with everything else."""
     ends: tuple[MotorEnd, ...]
     """One motor that ends at its range, in each setup."""
-    proposals: tuple[Proposal, ...]
+    proposals: tuple[ProposedExperiment, ...]
     """Steps that tell apart the fits that reach the target, the best first."""
     complete: bool
     """Whether nobody stopped it."""
 
     @property
-    def best(self) -> Judged | None:
+    def best(self) -> JudgedFit | None:
         """Fit that agrees best: it reaches the target if one does, then most statements hold, then
         its sizes are the most plausible.
         """
         return self.judged[0] if self.judged else None
 
     @property
-    def alike(self) -> tuple[Fit, ...]:
+    def alike(self) -> tuple[CauseFit, ...]:
         """Fits that the target cannot tell apart: every period is within its tolerance."""
         return tuple(judged.fit for judged in self.judged if judged.fit.within)
 
@@ -106,7 +106,7 @@ class Scope:
 
     pairs: bool = False
     """Whether to fit two causes together."""
-    method: Method | None = None
+    method: ScreeningMethod | None = None
     """Method of global screening; none: no screening."""
     setups: bool = True
     """Whether to try the best fits in the other setups, and a motor that ends at its range."""
@@ -178,7 +178,9 @@ def _ends(
     return motor_ends(design, numbers, watch)
 
 
-def _proposals(design: LegDesign, fits: Sequence[Fit], watch: Watch) -> list[Proposal]:
+def _proposals(
+    design: LegDesign, fits: Sequence[CauseFit], watch: Watch
+) -> list[ProposedExperiment]:
     alike = [fit for fit in fits if fit.within]
     if len(alike) < 2 or watch.stopped():
         return []
@@ -186,7 +188,9 @@ def _proposals(design: LegDesign, fits: Sequence[Fit], watch: Watch) -> list[Pro
     return propose(design, alike, watch)
 
 
-def _pairs(design: LegDesign, target: Target, causes: Sequence[Cause], watch: Watch) -> list[Fit]:
+def _pairs(
+    design: LegDesign, target: Target, causes: Sequence[Cause], watch: Watch
+) -> list[CauseFit]:
     """Fits of every two causes that matter at all."""
     if watch.stopped():
         return []
@@ -199,19 +203,19 @@ def _pairs(design: LegDesign, target: Target, causes: Sequence[Cause], watch: Wa
     return _reached(fit_pairs(design, target, some, watch))
 
 
-def _reached(fits: Sequence[Fit]) -> list[Fit]:
+def _reached(fits: Sequence[CauseFit]) -> list[CauseFit]:
     """Fits that were computed before somebody stopped."""
     return [fit for fit in fits if fit.worst < MISSING]
 
 
-def choose(singles: Sequence[Fit], pairs: Sequence[Fit]) -> list[Fit]:
+def choose(singles: Sequence[CauseFit], pairs: Sequence[CauseFit]) -> list[CauseFit]:
     """Fits that are worth to be judged: those within the target, or else the best few."""
     ranked = sorted(plain(singles, pairs), key=lambda fit: fit.misfit)
     within = [fit for fit in ranked if fit.within]
     return within[:JUDGED] if len(within) >= AT_LEAST else ranked[:AT_LEAST]
 
 
-def plain(singles: Sequence[Fit], pairs: Sequence[Fit]) -> list[Fit]:
+def plain(singles: Sequence[CauseFit], pairs: Sequence[CauseFit]) -> list[CauseFit]:
     """Fits of one cause, and of two where neither of them reaches the target alone.
 
     A pair of which one cause is enough explains nothing more.
@@ -225,27 +229,27 @@ def _judge(
     design: LegDesign,
     target: Target,
     numbers: Mapping[str, Published],
-    fits: Sequence[Fit],
+    fits: Sequence[CauseFit],
     scope: Scope,
     watch: Watch,
-) -> tuple[Judged, list[Judged]]:
+) -> tuple[JudgedFit, list[JudgedFit]]:
     """Try the perfect leg and the fits against everything else; the best come first."""
     perfect = perfect_fit(design, target)
     all_fits = [perfect, *fits]
     if watch.stopped() or not scope.setups:
-        bare = [Judged(fit=fit, checks=(), hop=None) for fit in all_fits]
+        bare = [JudgedFit(fit=fit, checks=(), hop=None) for fit in all_fits]
         return bare[0], bare[1:]
     legs = [PERFECT, *(fit.imperfections for fit in fits)]
     watch.begin("the other setups", count_predictions(len(legs)))
     predicted = predict(design, target, numbers, legs, watch)
-    hops: list[Hop | None] = [None] * len(legs)
+    hops: list[JumpFit | None] = [None] * len(legs)
     if scope.jump and not watch.stopped():
         watch.begin("the jump", len(legs))
         hops = [*hop_of(design, legs)]
         watch.advance(len(legs))
     known = not watch.stopped()
     judged = [
-        Judged(
+        JudgedFit(
             fit=fit,
             checks=checks_of(predicted, place, hop, numbers) if known else (),
             hop=hop,
@@ -255,7 +259,7 @@ def _judge(
     return judged[0], sorted(judged[1:], key=_order)
 
 
-def _order(one: Judged) -> tuple[bool, int, float, float]:
+def _order(one: JudgedFit) -> tuple[bool, int, float, float]:
     """Order of merit: the target, then what else holds, then plausible sizes, then the misfit."""
     # Sizes that are alike to a tenth of what is plausible are equally so.
     return not one.fit.within, -one.held, round(one.fit.stretch, 1), one.fit.misfit

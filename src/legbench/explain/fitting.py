@@ -35,7 +35,7 @@ FOLLOWED = 40
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Fit:
+class CauseFit:
     """Sizes of some causes at which a leg comes closest to a target."""
 
     causes: tuple[Cause, ...]
@@ -115,7 +115,7 @@ def fit_singles(
     target: Target,
     causes: Sequence[Cause],
     watch: Watch = NOBODY,
-) -> list[Fit]:
+) -> list[CauseFit]:
     """Fit each cause alone, the best first."""
     return _fit(design, target, [(cause,) for cause in causes], GRID_SINGLE, watch)
 
@@ -125,7 +125,7 @@ def fit_pairs(
     target: Target,
     causes: Sequence[Cause],
     watch: Watch = NOBODY,
-) -> list[Fit]:
+) -> list[CauseFit]:
     """Fit every two causes together, the best first."""
     return _fit(design, target, list(combinations(causes, 2)), GRID_PAIR, watch)
 
@@ -164,7 +164,7 @@ def _fit(
     groups: Sequence[tuple[Cause, ...]],
     count: int,
     watch: Watch,
-) -> list[Fit]:
+) -> list[CauseFit]:
     grids = [_grid(group, count) for group in groups]
     found = _evaluated(design, target, list(zip(groups, grids, strict=True)), watch)
     costs = [np.mean(np.square(residuals), axis=1) for residuals, _ in found]
@@ -220,7 +220,7 @@ def _followed(
     target: Target,
     valleys: Sequence[tuple[tuple[Cause, ...], Floats]],
     watch: Watch,
-) -> list[Fit]:
+) -> list[CauseFit]:
     """Follow the valleys (v, d) of all groups at once to the best bottom of each group."""
     owners = [group for group, starts in valleys for _ in starts]
 
@@ -242,10 +242,10 @@ def _followed(
     return [_best(*point, *values) for point, values in zip(points, found, strict=True)]
 
 
-def _best(group: tuple[Cause, ...], sizes: Floats, residuals: Floats, ratings: Floats) -> Fit:
+def _best(group: tuple[Cause, ...], sizes: Floats, residuals: Floats, ratings: Floats) -> CauseFit:
     cost = np.mean(np.square(residuals), axis=1)
     place = int(np.argmin(cost))
-    return Fit(
+    return CauseFit(
         causes=group,
         sizes=tuple(sizes[place].tolist()),
         ratings=tuple(ratings[place].tolist()),
@@ -254,6 +254,6 @@ def _best(group: tuple[Cause, ...], sizes: Floats, residuals: Floats, ratings: F
     )
 
 
-def perfect_fit(design: LegDesign, target: Target) -> Fit:
+def perfect_fit(design: LegDesign, target: Target) -> CauseFit:
     """Fit without any cause: the leg as its controller believes it."""
     return _best((), np.zeros((1, 0)), *rate(design, target, [PERFECT]))

@@ -19,7 +19,7 @@ DURATION = 4.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Hop:
+class JumpFit:
     """Figures of the hop of one leg; NaN where there is none."""
 
     stance: float
@@ -52,13 +52,13 @@ def hop_of(
     design: LegDesign,
     legs: Sequence[Imperfections],
     progress: Callable[[int, int], None] | None = None,
-) -> list[Hop]:
+) -> list[JumpFit]:
     """Simulate the hop of each leg and measure it."""
     experiments = [jump_experiment(design, leg) for leg in legs]
     return [measure_hop(run) for run in run_batch(experiments, progress=progress)]
 
 
-def measure_hop(run: Recording) -> Hop:
+def measure_hop(run: Recording) -> JumpFit:
     """Figures of a hopping run."""
     analysis = Analysis(run)
     figures, ratings = analysis.jump_figures, analysis.ratings.chosen
@@ -66,7 +66,7 @@ def measure_hop(run: Recording) -> Hop:
     cause = analysis.description.cause
     if cause is None and figures.count <= begin:
         cause = "the leg does not hop"
-    return Hop(
+    return JumpFit(
         stance=_lowest(ratings.stance[begin:]),
         flight=_lowest(ratings.flight[begin:]),
         foot_clearance=figures.foot_clearance,

@@ -23,7 +23,7 @@ BASE = 32
 """Base number of points of Saltelli's sequence [-]; there are as many times causes plus two."""
 
 
-class Method(StrEnum):
+class ScreeningMethod(StrEnum):
     """Method of global screening."""
 
     MORRIS = "morris"
@@ -52,7 +52,7 @@ def screen(
     design: LegDesign,
     target: Target,
     causes: Sequence[Cause],
-    method: Method,
+    method: ScreeningMethod,
     seed: int,
     watch: Watch = NOBODY,
 ) -> list[Screened]:
@@ -70,12 +70,12 @@ def screen(
         "names": [cause.name for cause in causes],
         "bounds": [[-c.plausible if c.signed else 0.0, c.plausible] for c in causes],
     }
-    size = (TRAJECTORIES, LEVELS) if method is Method.MORRIS else (BASE,)
+    size = (TRAJECTORIES, LEVELS) if method is ScreeningMethod.MORRIS else (BASE,)
     points: Floats = draw(problem, *size, seed)
     values = _mean_rating(design, target, causes, points, watch)
     if watch.stopped():
         return []
-    if method is Method.MORRIS:
+    if method is ScreeningMethod.MORRIS:
         whole, other = weigh(problem, points, values, LEVELS, seed)
     else:
         whole, other = weigh(problem, values, seed)
@@ -87,15 +87,15 @@ def screen(
 
 
 _FUNCTIONS = {
-    Method.MORRIS: ("morris_points", "morris_effects"),
-    Method.SOBOL: ("sobol_points", "sobol_shares"),
+    ScreeningMethod.MORRIS: ("morris_points", "morris_effects"),
+    ScreeningMethod.SOBOL: ("sobol_points", "sobol_shares"),
 }
 """Method -> names of what draws its points and what weighs the causes."""
 
 
-def count_screened(method: Method, causes: int) -> int:
+def count_screened(method: ScreeningMethod, causes: int) -> int:
     """Number of legs that `screen` rates for so many causes [-]."""
-    return TRAJECTORIES * (causes + 1) if method is Method.MORRIS else BASE * (causes + 2)
+    return TRAJECTORIES * (causes + 1) if method is ScreeningMethod.MORRIS else BASE * (causes + 2)
 
 
 def _mean_rating(

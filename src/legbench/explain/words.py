@@ -4,9 +4,9 @@ import math
 from collections.abc import Sequence
 
 from legbench.design.setup import SetupKind
-from legbench.explain.apart import Proposal
-from legbench.explain.explanation import Explanation, Judged
-from legbench.explain.fitting import Fit
+from legbench.explain.apart import ProposedExperiment
+from legbench.explain.explanation import Explanation, JudgedFit
+from legbench.explain.fitting import CauseFit
 from legbench.explain.motor_end import MotorEnd
 from legbench.explain.screening import Screened
 from legbench.explain.sensitivity import Sensitivity
@@ -85,7 +85,7 @@ def _alone(found: Explanation) -> str:
     )
 
 
-def _proposal(best: Proposal) -> str:
+def _proposal(best: ProposedExperiment) -> str:
     posture = 1e3 * best.posture
     return (
         f"The experiment to do next: in {best.setup}, a step from z2 = {best.z2 + best.dz2:g} to "
@@ -138,7 +138,7 @@ def _screened(rows: Sequence[Screened]) -> list[str]:
     return lines + [f"  {row.cause.name:<18} {row.whole:8.4f} {row.other:8.4f}" for row in rows]
 
 
-def _fits(title: str, fits: Sequence[Fit]) -> list[str]:
+def _fits(title: str, fits: Sequence[CauseFit]) -> list[str]:
     lines = [
         f"fits of {title}: misfit in tolerances (rms, worst), size over what is plausible, P^r"
     ]
@@ -156,7 +156,7 @@ def _fits(title: str, fits: Sequence[Fit]) -> list[str]:
     return lines
 
 
-def _statements(judged: Sequence[Judged]) -> list[str]:
+def _statements(judged: Sequence[JudgedFit]) -> list[str]:
     """Table of the statements of the paper, one row each, and a column for each leg."""
     letters = "0ABCDEFGHIJKLMNOPQRSTUVWXYZ"[: len(judged)]
     lines = ["what else the paper says; + it holds"]

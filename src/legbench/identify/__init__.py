@@ -11,16 +11,16 @@ if TYPE_CHECKING:
     from legbench.identify.asking import question_of, read_runs
     from legbench.identify.back_to_design import design_text, written_back
     from legbench.identify.gate import UnidentifiableError
-    from legbench.identify.outcome import Estimate, Outcome
+    from legbench.identify.outcome import Estimate, Identification
     from legbench.identify.parameters import Freedom, parse_free
     from legbench.identify.repeated import Repeated, repeat
-    from legbench.identify.staged import Question, identify
+    from legbench.identify.staged import IdentificationTask, identify
 
 __all__ = [
     "Estimate",
     "Freedom",
-    "Outcome",
-    "Question",
+    "Identification",
+    "IdentificationTask",
     "Repeated",
     "UnidentifiableError",
     "design_text",
@@ -36,8 +36,8 @@ __getattr__ = lazy_names(
     {
         "Estimate": "legbench.identify.outcome",
         "Freedom": "legbench.identify.parameters",
-        "Outcome": "legbench.identify.outcome",
-        "Question": "legbench.identify.staged",
+        "Identification": "legbench.identify.outcome",
+        "IdentificationTask": "legbench.identify.staged",
         "Repeated": "legbench.identify.repeated",
         "UnidentifiableError": "legbench.identify.gate",
         "design_text": "legbench.identify.back_to_design",

@@ -6,7 +6,7 @@ from pathlib import Path
 from legbench.design import LegDesign
 from legbench.errors import ConfigError
 from legbench.identify.parameters import Freedom
-from legbench.identify.staged import Question
+from legbench.identify.staged import IdentificationTask
 from legbench.identify.trial import FIXED, bars_of, trial_of
 from legbench.recording.reader import Recording, load
 
@@ -62,7 +62,7 @@ def question_of(
     mass: float | None = None,
     noise: float | None = None,
     starts: int = 3,
-) -> Question:
+) -> IdentificationTask:
     """Make the question to some runs.
 
     Args:
@@ -80,7 +80,7 @@ def question_of(
     for other in held_out:
         check_same_leg(runs[0], other)
     fixed = [each for each in held_out if each.description.setup.kind in FIXED]
-    return Question(
+    return IdentificationTask(
         design=design or runs[0].description.design,
         trials=tuple(trial_of(each, noise=noise) for each in runs),
         held_out=tuple(trial_of(each, noise=noise) for each in fixed),

@@ -17,7 +17,7 @@ from legbench.design.statics import GRAVITY
 from legbench.design.toml import design_to_mapping, tables_to_toml
 from legbench.errors import ConfigError, DesignError
 from legbench.identify.base import base_of
-from legbench.identify.outcome import Outcome
+from legbench.identify.outcome import Identification
 from legbench.identify.parameters import GROUPS, INDEX, PARAMETERS
 from legbench.signals import Floats
 
@@ -32,7 +32,7 @@ DIFFERENCE: Final = 1e-7
 the third degree at most."""
 
 
-def written_back(design: LegDesign, outcome: Outcome, bars: Bars | None = None) -> LegDesign:
+def written_back(design: LegDesign, outcome: Identification, bars: Bars | None = None) -> LegDesign:
     """Leg that has what was identified, nearest to its design.
 
     Raises:
@@ -134,7 +134,7 @@ def _changed(design: LegDesign, change: Floats) -> LegDesign:
     return replace(design, trunk_mass=design.trunk_mass * (1.0 + float(change[9])), **segments)
 
 
-def design_text(design: LegDesign, outcome: Outcome) -> str:
+def design_text(design: LegDesign, outcome: Identification) -> str:
     """Design file of an identified leg, with where its numbers come from as comments."""
     lines = [f"# Identified by legbench {__version__} from the runs {', '.join(outcome.runs)}."]
     if not outcome.trusted:

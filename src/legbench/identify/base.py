@@ -31,7 +31,7 @@ radian a second of a swinging leg, wide enough for a smooth integrator."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Leg:
+class FittedLeg:
     """What a fit keeps of a leg: its lever, and the parameters that it starts from."""
 
     reach: float
@@ -40,7 +40,9 @@ class Leg:
     """All parameters in the order of `PARAMETERS` (p,)."""
 
     @classmethod
-    def of(cls, design: LegDesign, *, bars: Bars | None = None, mass: float | None = None) -> "Leg":
+    def of(
+        cls, design: LegDesign, *, bars: Bars | None = None, mass: float | None = None
+    ) -> "FittedLeg":
         """Collect the parameters of a design, of its bars, and of the mass that was weighed.
 
         Args:

@@ -18,8 +18,8 @@ from legbench.design.setup import Setup, SetupKind
 from legbench.experiment.data import Experiment
 from legbench.experiment.run import run
 from legbench.experiment.start import targets_of
-from legbench.identify.staged import Question
-from legbench.identify.trial import FIXED, Trial, trial_of
+from legbench.identify.staged import IdentificationTask
+from legbench.identify.trial import FIXED, MeasuredRun, trial_of
 from legbench.mjcf.options import Linkage, LinkageKind
 from legbench.plant.start import PERIOD
 from legbench.signals import Observation
@@ -28,7 +28,7 @@ DURATION: Final = 3.0
 """Length of a candidate [s]."""
 
 
-def candidates(question: Question) -> Iterator[tuple[str, Experiment]]:
+def candidates(question: IdentificationTask) -> Iterator[tuple[str, Experiment]]:
     """Experiments by a name that says setup and motion."""
     bars = question.bars
     linkage = (
@@ -62,7 +62,9 @@ def _motions() -> Iterator[tuple[str, ControllerSettings]]:
         yield f"chirp in {coordinate} 1 to 12 Hz", ChirpConfig(coordinate=coordinate)
 
 
-def trial_of_candidate(name: str, experiment: Experiment, question: Question) -> Trial:
+def trial_of_candidate(
+    name: str, experiment: Experiment, question: IdentificationTask
+) -> MeasuredRun:
     """Run of a candidate as far as a prediction needs it: when the motors would be where.
 
     Motions that are the same whatever the leg does are asked of their controller; others are
@@ -78,7 +80,7 @@ def trial_of_candidate(name: str, experiment: Experiment, question: Question) ->
     rows = round(experiment.duration / PERIOD)
     asked = [controller.step(_moment(row * PERIOD)).motor_pos for row in range(rows)]
     motors = np.array([controller.start_motor_pos, *asked[:-1]])
-    return Trial(
+    return MeasuredRun(
         name=name,
         setup=experiment.setup.kind,
         time=PERIOD * np.arange(rows, dtype=np.float64),

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from legbench.design.leg import Limits
-from legbench.identify.trial import Trial
+from legbench.identify.trial import MeasuredRun
 from legbench.signals import Bools, Floats, Ints
 
 RATE_ERROR: Final = 1e-3
@@ -26,7 +26,7 @@ LIMITED_COUNTS: Final = 3.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Finding:
+class DataFinding:
     """Something about the data of a run that is not as it should be."""
 
     run: str
@@ -38,16 +38,16 @@ class Finding:
     """Whether nothing can be learned from the run before it is mended."""
 
 
-def check_data(trial: Trial, limits: Limits) -> list[Finding]:
+def check_data(trial: MeasuredRun, limits: Limits) -> list[DataFinding]:
     """Find what is wrong with the data of one run by itself."""
     found = [*_rate(trial), *_stops(trial, limits), *_frozen_links(trial), *_frozen_motors(trial)]
     return [
-        Finding(run=trial.name, what=what, text=text, hopeless=what == "frozen")
+        DataFinding(run=trial.name, what=what, text=text, hopeless=what == "frozen")
         for what, text in found
     ]
 
 
-def _rate(trial: Trial) -> list[tuple[str, str]]:
+def _rate(trial: MeasuredRun) -> list[tuple[str, str]]:
     gaps = np.diff(trial.time)
     found = []
     wide = gaps > GAP * trial.period
@@ -75,7 +75,7 @@ def _rate(trial: Trial) -> list[tuple[str, str]]:
     return found
 
 
-def _stops(trial: Trial, limits: Limits) -> list[tuple[str, str]]:
+def _stops(trial: MeasuredRun, limits: Limits) -> list[tuple[str, str]]:
     """Joints that touch their stops, which the equations of a fit do not have."""
     found = []
     q1, q2 = trial.joint_pos.T
@@ -93,7 +93,7 @@ def _stops(trial: Trial, limits: Limits) -> list[tuple[str, str]]:
     return found
 
 
-def _frozen_links(trial: Trial) -> list[tuple[str, str]]:
+def _frozen_links(trial: MeasuredRun) -> list[tuple[str, str]]:
     found = []
     for joint in (0, 1):
         other = trial.joint_pos[:, 1 - joint]
@@ -110,7 +110,7 @@ def _frozen_links(trial: Trial) -> list[tuple[str, str]]:
     return found
 
 
-def _frozen_motors(trial: Trial) -> list[tuple[str, str]]:
+def _frozen_motors(trial: MeasuredRun) -> list[tuple[str, str]]:
     found = []
     for joint in (0, 1):
         command = trial.applied_pos[:, joint]
@@ -129,7 +129,7 @@ def _frozen_motors(trial: Trial) -> list[tuple[str, str]]:
 
 
 def _frozen(
-    trial: Trial, values: Floats, other: Floats, sigma: float
+    trial: MeasuredRun, values: Floats, other: Floats, sigma: float
 ) -> tuple[float, float, float] | None:
     """Longest stretch of one value during which another signal swings: begin, end, swing."""
     begins, ends = stretches(np.diff(values) == 0.0)

@@ -33,7 +33,7 @@ FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Fit:
+class LeastSquaresFit:
     """End of a fit."""
 
     misfit: Misfit
@@ -43,14 +43,16 @@ class Fit:
     """Whether it ended because nothing was left to gain."""
 
 
-def fit(problem: Problem, guess: Guess, horizons: Sequence[float | None] = HORIZONS) -> Fit:
+def fit(
+    problem: Problem, guess: Guess, horizons: Sequence[float | None] = HORIZONS
+) -> LeastSquaresFit:
     """Fit a problem from one guess.
 
     Raises:
         PlantFault: no leg can be predicted from the guess.
     """
     longest = max(float(trial.time[-1] - trial.time[0]) for trial in problem.trials)
-    found: Fit | None = None
+    found: LeastSquaresFit | None = None
     evaluations = 0
     for horizon in horizons:
         if horizon is not None and horizon > longest:
@@ -59,10 +61,10 @@ def fit(problem: Problem, guess: Guess, horizons: Sequence[float | None] = HORIZ
         evaluations += found.evaluations
     if found is None:
         raise PlantFault("no horizon", "no horizon of the fit is as short as the runs")
-    return Fit(misfit=found.misfit, evaluations=evaluations, converged=found.converged)
+    return LeastSquaresFit(misfit=found.misfit, evaluations=evaluations, converged=found.converged)
 
 
-def _descend(problem: Problem, guess: Guess, horizon: float | None) -> Fit:
+def _descend(problem: Problem, guess: Guess, horizon: float | None) -> LeastSquaresFit:
     """Levenberg's and Marquardt's method over one horizon."""
     rough = horizon is not None
     gain, most = (ROUGH_GAIN, ROUGH_STEPS) if rough else (SMALLEST_GAIN, MOST_STEPS)
@@ -77,12 +79,12 @@ def _descend(problem: Problem, guess: Guess, horizon: float | None) -> Fit:
             damping = max(damping / 10.0, 1e-12) if better is not None else damping * 4.0
         if better is None:
             # No step helps any more, however short: the bottom, to rounding.
-            return Fit(misfit=best, evaluations=evaluations, converged=True)
+            return LeastSquaresFit(misfit=best, evaluations=evaluations, converged=True)
         gained = best.cost - better.cost
         best = better
         if gained <= gain * best.cost and damping < 1.0:
-            return Fit(misfit=best, evaluations=evaluations, converged=True)
-    return Fit(misfit=best, evaluations=evaluations, converged=rough)
+            return LeastSquaresFit(misfit=best, evaluations=evaluations, converged=True)
+    return LeastSquaresFit(misfit=best, evaluations=evaluations, converged=rough)
 
 
 def _try(problem: Problem, best: Misfit, step: Floats, horizon: float | None) -> Misfit | None:

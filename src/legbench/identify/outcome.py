@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from legbench.identify.adequacy import Residual, Score
 from legbench.identify.alternatives import Alternative
-from legbench.identify.checks import Finding
+from legbench.identify.checks import DataFinding
 from legbench.identify.gate import Gate
 from legbench.identify.held_out import HeldOut
 from legbench.identify.problem import Misfit
@@ -32,11 +32,11 @@ class Estimate:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Outcome:
+class Identification:
     """What was learned from some runs."""
 
     runs: tuple[str, ...]
-    findings: tuple[Finding, ...]
+    findings: tuple[DataFinding, ...]
     """What is wrong with the data."""
     left_out: tuple[int, ...] = ()
     """Rows of each run that were left out because a drive had not answered [-]."""

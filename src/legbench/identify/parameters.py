@@ -14,7 +14,7 @@ from legbench.errors import ConfigError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Parameter:
+class FitParameter:
     """One parameter: its name, unit, and the scale on which a fit moves it."""
 
     name: str
@@ -30,27 +30,27 @@ class Parameter:
 
 
 NINE: Final = (
-    Parameter(name="J1", unit="kg m^2", doc="inertia of all that turns with q1 about the hip"),
-    Parameter(name="J2", unit="kg m^2", doc="inertia of all that turns with q2 about the hip"),
-    Parameter(name="B", unit="kg m^2", doc="coupling of the two inertias"),
-    Parameter(name="s1", unit="kg m", doc="first moment about the hip along q1"),
-    Parameter(name="s2", unit="kg m", doc="first moment about the hip along q2"),
-    Parameter(name="k1", unit="N m/rad", doc="stiffness of the spring on q1"),
-    Parameter(name="k2", unit="N m/rad", doc="stiffness of the spring on q2"),
-    Parameter(name="d1", unit="N m s/rad", doc="viscous damping of q1"),
-    Parameter(name="d2", unit="N m s/rad", doc="viscous damping of q2"),
+    FitParameter(name="J1", unit="kg m^2", doc="inertia of all that turns with q1 about the hip"),
+    FitParameter(name="J2", unit="kg m^2", doc="inertia of all that turns with q2 about the hip"),
+    FitParameter(name="B", unit="kg m^2", doc="coupling of the two inertias"),
+    FitParameter(name="s1", unit="kg m", doc="first moment about the hip along q1"),
+    FitParameter(name="s2", unit="kg m", doc="first moment about the hip along q2"),
+    FitParameter(name="k1", unit="N m/rad", doc="stiffness of the spring on q1"),
+    FitParameter(name="k2", unit="N m/rad", doc="stiffness of the spring on q2"),
+    FitParameter(name="d1", unit="N m s/rad", doc="viscous damping of q1"),
+    FitParameter(name="d2", unit="N m s/rad", doc="viscous damping of q2"),
 )
 """Combinations of inertia, stiffness and damping in the equations of motion."""
 OTHERS: Final = (
-    Parameter(name="mass", unit="kg", doc="mass of the whole leg with its trunk"),
-    Parameter(name="f1", unit="N m", doc="Coulomb friction of q1", scale=1e-2),
-    Parameter(name="f2", unit="N m", doc="Coulomb friction of q2", scale=1e-2),
-    Parameter(name="link_zero1", unit="rad", doc="zero error of link encoder 1", scale=1e-2),
-    Parameter(name="link_zero2", unit="rad", doc="zero error of link encoder 2", scale=1e-2),
-    Parameter(name="motor_zero1", unit="rad", doc="zero error of motor encoder 1", scale=1e-2),
-    Parameter(name="motor_zero2", unit="rad", doc="zero error of motor encoder 2", scale=1e-2),
-    Parameter(name="delay", unit="s", doc="lateness of the link encoders", scale=1e-3),
-    Parameter(name="time_base", unit="-", doc="true time over recorded time"),
+    FitParameter(name="mass", unit="kg", doc="mass of the whole leg with its trunk"),
+    FitParameter(name="f1", unit="N m", doc="Coulomb friction of q1", scale=1e-2),
+    FitParameter(name="f2", unit="N m", doc="Coulomb friction of q2", scale=1e-2),
+    FitParameter(name="link_zero1", unit="rad", doc="zero error of link encoder 1", scale=1e-2),
+    FitParameter(name="link_zero2", unit="rad", doc="zero error of link encoder 2", scale=1e-2),
+    FitParameter(name="motor_zero1", unit="rad", doc="zero error of motor encoder 1", scale=1e-2),
+    FitParameter(name="motor_zero2", unit="rad", doc="zero error of motor encoder 2", scale=1e-2),
+    FitParameter(name="delay", unit="s", doc="lateness of the link encoders", scale=1e-3),
+    FitParameter(name="time_base", unit="-", doc="true time over recorded time"),
 )
 """What else a recording can show."""
 PARAMETERS: Final = {each.name: each for each in (*NINE, *OTHERS)}

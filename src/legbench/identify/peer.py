@@ -17,9 +17,9 @@ from legbench.design import LegDesign
 from legbench.design.setup import Setup
 from legbench.errors import ConfigError
 from legbench.identify._sysid import load_sysid
-from legbench.identify.outcome import Outcome
-from legbench.identify.staged import Question
-from legbench.identify.trial import Trial
+from legbench.identify.outcome import Identification
+from legbench.identify.staged import IdentificationTask
+from legbench.identify.trial import MeasuredRun
 from legbench.mjcf import BuildOptions, Linkage, LinkageKind, build_spec, rest_qpos
 from legbench.plant.start import PERIOD
 from legbench.signals import Floats
@@ -39,7 +39,7 @@ class PeerAnswer:
     seconds: float
     """Wall time that it took [s]."""
 
-    def lines(self, outcome: Outcome) -> list[str]:
+    def lines(self, outcome: Identification) -> list[str]:
         """Lines for people: its values beside ours."""
         ours = {each.name: each.value for each in outcome.estimates}
         rows = [
@@ -50,7 +50,7 @@ class PeerAnswer:
         return [f"mujoco.sysid, {self.seconds:.1f} s", *rows]
 
 
-def ask_peer(question: Question) -> PeerAnswer:
+def ask_peer(question: IdentificationTask) -> PeerAnswer:
     """Fit the same runs with `mujoco.sysid`.
 
     Raises:
@@ -111,7 +111,7 @@ def _damps(joint: int) -> Callable[[mujoco.MjSpec, Any], None]:
     return write
 
 
-def _sequence(sysid: Any, trial: Trial, question: Question) -> Any:
+def _sequence(sysid: Any, trial: MeasuredRun, question: IdentificationTask) -> Any:
     """Model and measurement of one run, with the motors at every step of the model."""
     bars = question.bars
     linkage = (
@@ -147,7 +147,7 @@ def _sequence(sysid: Any, trial: Trial, question: Question) -> Any:
     )
 
 
-def _still(trial: Trial) -> int:
+def _still(trial: MeasuredRun) -> int:
     """Number of rows before the motors move."""
     moved = np.flatnonzero(np.any(trial.motor_pos != trial.motor_pos[0], axis=1))
     return int(moved[0]) if len(moved) and moved[0] > 0 else 1

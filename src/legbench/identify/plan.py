@@ -15,12 +15,12 @@ from legbench.errors import ConfigError, PlantFault
 from legbench.experiment.data import Experiment
 from legbench.experiment.run import run
 from legbench.identify.candidates import candidates, trial_of_candidate
-from legbench.identify.outcome import Outcome
+from legbench.identify.outcome import Identification
 from legbench.identify.parameters import PARAMETERS
 from legbench.identify.prediction import Guess, nothing_moved
 from legbench.identify.problem import Problem
-from legbench.identify.staged import Question
-from legbench.identify.trial import Trial
+from legbench.identify.staged import IdentificationTask
+from legbench.identify.trial import MeasuredRun
 from legbench.limits.safety import SafetyLimits
 from legbench.plants import SimChoice
 from legbench.signals import Floats
@@ -30,7 +30,7 @@ SHOWN: Final = 8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Plan:
+class PlannedExperiment:
     """One candidate, and the errors that it would leave."""
 
     name: str
@@ -48,12 +48,12 @@ class Plan:
 
 
 def ranked(
-    question: Question,
-    outcome: Outcome | None,
+    question: IdentificationTask,
+    outcome: Identification | None,
     *,
     sharpen: str | None = None,
     among: Iterable[tuple[str, Experiment]] | None = None,
-) -> list[Plan]:
+) -> list[PlannedExperiment]:
     """Rank candidates, the best first.
 
     Args:
@@ -83,7 +83,7 @@ def ranked(
         logarithms = np.log(after)
         chosen = logarithms if sharpen is None else logarithms[names.index(sharpen)]
         found.append(
-            Plan(
+            PlannedExperiment(
                 name=name,
                 experiment=experiment,
                 errors=dict(zip(names, _in_units(names, after), strict=True)),
@@ -97,10 +97,10 @@ def ranked(
 
 
 def best_of(
-    plans: Sequence[Plan],
+    plans: Sequence[PlannedExperiment],
     limits: SafetyLimits | None = None,
     say: Callable[[str], None] = lambda _: None,
-) -> Plan:
+) -> PlannedExperiment:
     """Return the best candidate that a simulated leg can do within the safety limits.
 
     Raises:
@@ -117,7 +117,7 @@ def best_of(
     raise ConfigError(f"no candidate stays within the limits ({first}); loosen them")
 
 
-def plan_lines(plans: Sequence[Plan]) -> list[str]:
+def plan_lines(plans: Sequence[PlannedExperiment]) -> list[str]:
     """Lines for people: the best candidates, and by what factor each parameter's error shrinks."""
     names = list(plans[0].shrinks)
     width = max(len(plan.name) for plan in plans[:SHOWN])
@@ -129,7 +129,7 @@ def plan_lines(plans: Sequence[Plan]) -> list[str]:
     return [head, *rows]
 
 
-def _information(question: Question, trial: Trial, values: Floats) -> Floats:
+def _information(question: IdentificationTask, trial: MeasuredRun, values: Floats) -> Floats:
     """Normal matrix (m, m) of one run, what is free in its first row being eliminated."""
     problem = Problem([trial], question.leg.reach, question.free)
     guess = Guess(values=values, starts=nothing_moved([trial]))

@@ -23,7 +23,7 @@ from legbench.analytic.parameters import (
 from legbench.identify.base import FRICTION_WIDTH, equation_parameters, mended
 from legbench.identify.parameters import INDEX, NINE, PARAMETERS, Freedom
 from legbench.identify.prediction import Guess
-from legbench.identify.trial import Trial
+from legbench.identify.trial import MeasuredRun
 from legbench.signals import Floats
 
 WIDTH: Final = 1e-2
@@ -39,7 +39,9 @@ LINEAR: Final = (*(each.name for each in NINE), "f1", "f2")
 """Parameters in which the equations are linear."""
 
 
-def regressed(trials: Sequence[Trial], guess: Guess, free: Freedom, reach: float) -> Guess | None:
+def regressed(
+    trials: Sequence[MeasuredRun], guess: Guess, free: Freedom, reach: float
+) -> Guess | None:
     """Guess whose free linear parameters are those of a regression, mended to be a leg's.
 
     Args:
@@ -71,7 +73,7 @@ def regressed(trials: Sequence[Trial], guess: Guess, free: Freedom, reach: float
 
 
 def _rows(
-    trial: Trial, guess: Guess, names: Sequence[str], reach: float
+    trial: MeasuredRun, guess: Guess, names: Sequence[str], reach: float
 ) -> tuple[Floats, Floats] | None:
     """Torques of one run by its free parameters (m, p), and those that the guess leaves (m,)."""
     q, v, a, motors = _smoothed(trial)
@@ -100,7 +102,7 @@ def _torques(q: Floats, v: Floats, a: Floats, motors: Floats) -> Floats:
     return found
 
 
-def _smoothed(trial: Trial) -> tuple[Floats, Floats, Floats, Floats]:
+def _smoothed(trial: MeasuredRun) -> tuple[Floats, Floats, Floats, Floats]:
     """Angles, rates, accelerations and motor positions of the rows but those at the ends (m, 2)."""
     step = float(trial.time[-1] - trial.time[0]) / (len(trial.time) - 1)
     half = int(np.ceil(REACH * WIDTH / step))

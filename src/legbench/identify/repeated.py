@@ -30,7 +30,7 @@ FREQ_WITHIN: Final = 0.003
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Hop:
+class HopFigures:
     """Figures of a hopping run, means over its limit cycle."""
 
     rating_stance: float
@@ -49,8 +49,8 @@ class Repeated:
     """Figures of a recorded hop, and of the same experiment with the identified leg."""
 
     run: str
-    measured: Hop
-    predicted: Hop
+    measured: HopFigures
+    predicted: HopFigures
 
     @property
     def misses(self) -> tuple[str, ...]:
@@ -151,10 +151,10 @@ def _shares(one: tuple[float, float], other: tuple[float, float]) -> tuple[float
     return one[0] / other[0] - 1.0, one[1] / other[1] - 1.0
 
 
-def _hop(recording: Recording) -> Hop:
+def _hop(recording: Recording) -> HopFigures:
     figures = summarise(Analysis(recording))
     late = slice(figures.first, None)
-    return Hop(
+    return HopFigures(
         rating_stance=_mean(figures.rating_stance[late]),
         rating_flight=_mean(figures.rating_flight[late]),
         rise=GRAVITY * figures.flight_time**2 / 8.0,

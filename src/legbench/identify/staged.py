@@ -18,19 +18,19 @@ from legbench.design import LegDesign
 from legbench.errors import ConfigError, PlantFault
 from legbench.identify.adequacy import residuals_of, scores_of
 from legbench.identify.alternatives import OtherBars, explain
-from legbench.identify.base import Leg, mended
-from legbench.identify.checks import Finding, check_data
+from legbench.identify.base import FittedLeg, mended
+from legbench.identify.checks import DataFinding, check_data
 from legbench.identify.estimates import estimates_of
-from legbench.identify.fitting import Fit, fit
+from legbench.identify.fitting import LeastSquaresFit, fit
 from legbench.identify.gate import check_gate, look, pairs_alike
 from legbench.identify.held_out import hold_out
-from legbench.identify.outcome import Outcome
+from legbench.identify.outcome import Identification
 from legbench.identify.parameters import INDEX, Freedom
 from legbench.identify.prediction import Guess, nothing_moved
 from legbench.identify.problem import Misfit, Problem
 from legbench.identify.regression import regressed
 from legbench.identify.spread import spread_of
-from legbench.identify.trial import Trial
+from legbench.identify.trial import MeasuredRun
 from legbench.identify.verdict import reasons_against
 from legbench.identify.wiring import check_wiring
 from legbench.mjcf.fitting import fitted_bar_density
@@ -47,13 +47,13 @@ Say = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Question:
+class IdentificationTask:
     """What is to be learned, from which runs, starting where."""
 
     design: LegDesign
     """Leg as designed, where a fit starts."""
-    trials: tuple[Trial, ...]
-    held_out: tuple[Trial, ...] = ()
+    trials: tuple[MeasuredRun, ...]
+    held_out: tuple[MeasuredRun, ...] = ()
     free: Freedom = field(default_factory=Freedom)
     mass: float | None = None
     """Mass of the whole leg as weighed [kg]; none: that of the design."""
@@ -73,9 +73,9 @@ class Question:
             raise ConfigError(f"mass is {self.mass:g} kg; it must be positive and finite")
 
     @property
-    def leg(self) -> Leg:
+    def leg(self) -> FittedLeg:
         """Leg that the fit starts from."""
-        return Leg.of(self.design, bars=self.bars, mass=self.mass)
+        return FittedLeg.of(self.design, bars=self.bars, mass=self.mass)
 
     @property
     def other_bars(self) -> OtherBars | None:
@@ -85,11 +85,11 @@ class Question:
             bars = None if held else Bars(density=fitted_bar_density(self.design))
         except ConfigError:
             return None
-        leg = Leg.of(self.design, bars=bars, mass=self.mass)
+        leg = FittedLeg.of(self.design, bars=bars, mass=self.mass)
         return OtherBars(held=held, density=0.0 if bars is None else bars.density, leg=leg)
 
 
-def identify(question: Question, say: Say = lambda _: None) -> Outcome:
+def identify(question: IdentificationTask, say: Say = lambda _: None) -> Identification:
     """Learn the parameters of a leg from runs.
 
     Raises:
@@ -104,7 +104,9 @@ def identify(question: Question, say: Say = lambda _: None) -> Outcome:
     findings = _findings(question, leg)
     if any(finding.hopeless for finding in findings):
         reasons = tuple(f"{each.run}: {each.text}" for each in findings)
-        return Outcome(runs=runs, left_out=left_out, findings=tuple(findings), reasons=reasons)
+        return Identification(
+            runs=runs, left_out=left_out, findings=tuple(findings), reasons=reasons
+        )
     problem = Problem(trials, leg.reach, question.free)
     guess = Guess(values=leg.values, starts=nothing_moved(trials))
     gate = look(problem.misfit(guess), problem.names)
@@ -113,7 +115,7 @@ def identify(question: Question, say: Say = lambda _: None) -> Outcome:
     fits = fits_from(problem, guess, question.starts, question.seed)
     best = min(fits, key=lambda each: each.misfit.cost)
     agreeing = [each for each in fits if each.misfit.cost <= best.misfit.cost * (1.0 + SAME)]
-    outcome = Outcome(
+    outcome = Identification(
         runs=runs,
         left_out=left_out,
         findings=tuple(findings),
@@ -126,7 +128,9 @@ def identify(question: Question, say: Say = lambda _: None) -> Outcome:
     return _judged(question, problem, best.misfit, outcome)
 
 
-def _judged(question: Question, problem: Problem, misfit: Misfit, begun: Outcome) -> Outcome:
+def _judged(
+    question: IdentificationTask, problem: Problem, misfit: Misfit, begun: Identification
+) -> Identification:
     """Add to an outcome what is known once the fit has ended."""
     trials, names = question.trials, question.free.names
     gate = look(misfit, problem.names)
@@ -151,7 +155,7 @@ def _judged(question: Question, problem: Problem, misfit: Misfit, begun: Outcome
     return replace(outcome, reasons=tuple(reasons_against(outcome)))
 
 
-def _findings(question: Question, leg: Leg) -> list[Finding]:
+def _findings(question: IdentificationTask, leg: FittedLeg) -> list[DataFinding]:
     limits = question.design.limits
     found = [each for trial in question.trials for each in check_data(trial, limits)]
     if any(finding.hopeless for finding in found):
@@ -163,7 +167,7 @@ def _findings(question: Question, leg: Leg) -> list[Finding]:
     return [each for each in found if each.run not in rewired or each.what != "stop"] + wrong
 
 
-def fits_from(problem: Problem, guess: Guess, starts: int, seed: int = 0) -> list[Fit]:
+def fits_from(problem: Problem, guess: Guess, starts: int, seed: int = 0) -> list[LeastSquaresFit]:
     """Fits from a guess, from what a regression makes of the runs, and from legs beside it.
 
     Args:

@@ -31,7 +31,7 @@ SETTLED_ROWS: Final = 50
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Trial:
+class MeasuredRun:
     """One run: measured motors and links, the same rows."""
 
     name: str
@@ -71,12 +71,12 @@ class Trial:
         )
         return np.concatenate([parabola[0], parabola[1]])
 
-    def with_links(self, joint_pos: Floats) -> "Trial":
+    def with_links(self, joint_pos: Floats) -> "MeasuredRun":
         """Return this trial with other link angles (n, 2), as if wired otherwise."""
         return replace(self, joint_pos=joint_pos)
 
 
-def trial_of(recording: Recording, *, noise: float | None = None) -> Trial:
+def trial_of(recording: Recording, *, noise: float | None = None) -> MeasuredRun:
     """Take from a recording what a fit needs.
 
     Args:
@@ -113,7 +113,7 @@ def trial_of(recording: Recording, *, noise: float | None = None) -> Trial:
     # A drive that has not answered repeats itself: what it says is no reading of that row.
     missing = unanswered(recording)
     motor_pos, joint_pos = (between_answers(each, missing) for each in (motor_pos, joint_pos))
-    return Trial(
+    return MeasuredRun(
         name=name,
         setup=run.setup.kind,
         time=time,

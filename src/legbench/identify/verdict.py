@@ -4,13 +4,13 @@ from typing import Final
 
 from legbench.identify.adequacy import SIGNIFICANT
 from legbench.identify.alternatives import named
-from legbench.identify.outcome import Outcome
+from legbench.identify.outcome import Identification
 
 UNCERTAIN: Final = 0.2
 """Half width of an interval, as a share of the value, from which a parameter is not known [-]."""
 
 
-def reasons_against(outcome: Outcome) -> list[str]:
+def reasons_against(outcome: Identification) -> list[str]:
     """Reasons not to trust an outcome; none if there is nothing against it."""
     found = [f"{each.run}: {each.text}" for each in outcome.findings]
     if not outcome.converged:
@@ -28,7 +28,7 @@ def reasons_against(outcome: Outcome) -> list[str]:
     return found
 
 
-def _not_white(outcome: Outcome) -> list[str]:
+def _not_white(outcome: Identification) -> list[str]:
     return [
         f"{each.run}, q{each.joint}: residuals hang together, {each.coloured:.2g} rad where the "
         f"encoders explain {each.allowed:.2g} rad (rms {each.rms:.2g} rad, noise "
@@ -38,7 +38,7 @@ def _not_white(outcome: Outcome) -> list[str]:
     ]
 
 
-def _explained(outcome: Outcome) -> list[str]:
+def _explained(outcome: Identification) -> list[str]:
     """What else would explain the data, where something does."""
     if outcome.alternatives:
         best = "; or ".join(each.text for each in named(outcome.alternatives))

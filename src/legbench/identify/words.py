@@ -3,11 +3,11 @@
 from dataclasses import asdict
 from typing import Any
 
-from legbench.identify.outcome import Estimate, Outcome
+from legbench.identify.outcome import Estimate, Identification
 from legbench.identify.parameters import PARAMETERS
 
 
-def lines_of(outcome: Outcome) -> list[str]:
+def lines_of(outcome: Identification) -> list[str]:
     """Lines for people: verdict, data, estimates, residuals, held-out runs, reasons."""
     verdict = "trusted" if outcome.trusted else "not to be trusted"
     lines = [f"verdict           {verdict}", f"runs              {', '.join(outcome.runs)}"]
@@ -26,7 +26,7 @@ def lines_of(outcome: Outcome) -> list[str]:
     return lines
 
 
-def _fit_lines(outcome: Outcome) -> list[str]:
+def _fit_lines(outcome: Identification) -> list[str]:
     gate = outcome.gate
     condition = "" if gate is None else f"{gate.condition:.3g}"
     return [
@@ -36,7 +36,7 @@ def _fit_lines(outcome: Outcome) -> list[str]:
     ]
 
 
-def _estimate_lines(outcome: Outcome) -> list[str]:
+def _estimate_lines(outcome: Identification) -> list[str]:
     head = f"{'':<12} {'value':>12} {'95 % interval':>28} {'change':>9}  unit"
     return [head, *(_estimate_line(each) for each in outcome.estimates)]
 
@@ -47,7 +47,7 @@ def _estimate_line(each: Estimate) -> str:
     return f"{each.name:<12} {each.value:>12.6g} {interval:>28} {change:>9}  {each.unit}"
 
 
-def _residual_lines(outcome: Outcome) -> list[str]:
+def _residual_lines(outcome: Identification) -> list[str]:
     lines = [f"{'residuals [urad]':<36} {'rms':>8} {'noise':>8} {'coloured':>9} {'allowed':>8}"]
     for each in outcome.residuals:
         name = f"{each.run} q{each.joint}"
@@ -58,7 +58,7 @@ def _residual_lines(outcome: Outcome) -> list[str]:
     return lines
 
 
-def content_of(outcome: Outcome) -> dict[str, Any]:
+def content_of(outcome: Identification) -> dict[str, Any]:
     """The outcome as one JSON object, in SI units."""
     gate = outcome.gate
     return {

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import final
 
-from legbench.limits.momentum import LegMomentum, Reading
+from legbench.limits.momentum import LegMomentum, MomentumReading
 from legbench.limits.momentum_watch import MomentumWatch
 from legbench.limits.plausibility import Doubt, LinkWatch, MotorWatch
 from legbench.limits.safety import SafetyLimits
@@ -94,5 +94,5 @@ class EncoderWatch:
             return None
         motor_1, motor_2 = motor_pos
         joint_1, joint_2 = joint_pos
-        reading = Reading(interval, (motor_1, motor_2), (joint_1, joint_2))
+        reading = MomentumReading(interval, (motor_1, motor_2), (joint_1, joint_2))
         return watch.see(reading, stands=self._links.stands)

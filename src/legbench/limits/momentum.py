@@ -21,7 +21,7 @@ Pair = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Support:
+class SupportPoint:
     """Constants of q1 and q2 about a point, in the form of Appendix I: `M qddot + C + g = tau`."""
 
     inertia: Pair
@@ -55,7 +55,7 @@ class LegMomentum:
     """Stiffness of the series springs [N m/rad]."""
     damping: Pair
     """Viscous damping of q1 and q2 [N m s/rad]."""
-    supports: tuple[Support, ...]
+    supports: tuple[SupportPoint, ...]
     """Supports between which the leg may change, such as the ground and free fall."""
     hip_range: Range
     """Range of q1 between its stops [rad]."""
@@ -65,7 +65,7 @@ class LegMomentum:
     """Smallest step that the link encoders can show [rad]."""
 
 
-class Reading(NamedTuple):
+class MomentumReading(NamedTuple):
     """What the encoders of a leg showed in one cycle."""
 
     interval: float
@@ -87,7 +87,9 @@ class Unexplained(NamedTuple):
     """Torque of spring 2 less that of spring 1 [N m]."""
 
 
-def unexplained(leg: LegMomentum, support: Support, readings: Sequence[Reading]) -> Unexplained:
+def unexplained(
+    leg: LegMomentum, support: SupportPoint, readings: Sequence[MomentumReading]
+) -> Unexplained:
     """Return the unexplained torque at the second one of three readings.
 
     Turning the whole leg changes no inertia, so `(I1 + C c) v1 + (I2 + C c) v2` with

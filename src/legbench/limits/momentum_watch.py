@@ -6,7 +6,13 @@ from collections.abc import Sequence
 from typing import final
 
 from legbench.limits.knee import Range
-from legbench.limits.momentum import LegMomentum, Reading, Support, Unexplained, unexplained
+from legbench.limits.momentum import (
+    LegMomentum,
+    MomentumReading,
+    SupportPoint,
+    Unexplained,
+    unexplained,
+)
 from legbench.limits.plausibility import Doubt
 
 CONTACT_TIME = 0.02
@@ -52,7 +58,9 @@ class _SupportWatch:
         reach: cycles over which the averages reach.
     """
 
-    def __init__(self, leg: LegMomentum, support: Support, torque: float, period: float) -> None:
+    def __init__(
+        self, leg: LegMomentum, support: SupportPoint, torque: float, period: float
+    ) -> None:
         self._leg, self._support = leg, support
         self._cycles = support.average_cycles(leg.link_step, NOISE_SHARE * torque, period)
         self.reach = 3 * self._cycles
@@ -62,7 +70,7 @@ class _SupportWatch:
         """Begin to average anew."""
         self._averages = [_Average(self._cycles) for _ in Unexplained._fields]
 
-    def after(self, readings: Sequence[Reading]) -> Unexplained:
+    def after(self, readings: Sequence[MomentumReading]) -> Unexplained:
         """Take three readings; return the average."""
         torque = unexplained(self._leg, self._support, readings)
         both = zip(self._averages, torque, strict=True)
@@ -148,13 +156,13 @@ class MomentumWatch:
     def restart(self) -> None:
         """Begin anew with whatever is shown next."""
         self.residual: float | None = None
-        self._readings = deque[Reading](maxlen=3)
+        self._readings = deque[MomentumReading](maxlen=3)
         for support in self._supports:
             support.restart()
         self._seen = self._age = self._pushed = 0
         self._patience = max(self._patiences)
 
-    def see(self, reading: Reading, *, stands: bool = False) -> Doubt | None:
+    def see(self, reading: MomentumReading, *, stands: bool = False) -> Doubt | None:
         """Look at one more cycle, in which every drive has told something new.
 
         Args:
@@ -206,7 +214,7 @@ class MomentumWatch:
             "stiffness, and whether the foot slides",
         )
 
-    def _regular(self, reading: Reading) -> bool:
+    def _regular(self, reading: MomentumReading) -> bool:
         """Whether a reading came about a period after the one before."""
         return 0.5 * self._period < reading.interval < 1.5 * self._period
 

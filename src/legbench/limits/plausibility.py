@@ -39,7 +39,7 @@ class Doubt(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Bounds:
+class HealthBounds:
     """What a healthy leg stays within; a bound that is infinite does not act."""
 
     period: float
@@ -70,7 +70,7 @@ class MotorWatch:
         suspicion: what is wrong in this cycle, though it may not have lasted yet.
     """
 
-    def __init__(self, bounds: Bounds) -> None:
+    def __init__(self, bounds: HealthBounds) -> None:
         self._bounds = bounds
         self._gain = 1.0 - math.exp(-2.0 * math.pi * bounds.servo_bandwidth * bounds.period)
         self._low = self._high = 0.0
@@ -117,7 +117,7 @@ class LinkWatch:
         stands: one link stands while the other one swings, as it may in a leg that sways.
     """
 
-    def __init__(self, bounds: Bounds) -> None:
+    def __init__(self, bounds: HealthBounds) -> None:
         self._bounds = bounds
         self._step_max = bounds.joint_speed * bounds.period
         self._forget = bounds.period / MEMORY

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from legbench.errors import ConfigError
 from legbench.limits.knee import Range, check_knee
-from legbench.limits.plausibility import Bounds
+from legbench.limits.plausibility import HealthBounds
 from legbench.limits.upper_ends import LIMIT_ENDS, WIDEST_ANGLE, check_limit, check_waivers
 
 UNLIMITED: Range = (-math.inf, math.inf)
@@ -170,9 +170,9 @@ class SafetyLimits:
                     f"[{outer[0]:g}, {outer[1]:g}] rad; tighten it"
                 )
 
-    def bounds(self, period: float) -> Bounds:
+    def bounds(self, period: float) -> HealthBounds:
         """Return what a healthy leg stays within, for cycles of a period [s]."""
-        return Bounds(
+        return HealthBounds(
             period=period,
             following_error=self.following_error,
             following_cycles=self.following_cycles,

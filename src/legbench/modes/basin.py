@@ -87,7 +87,7 @@ class GridAxis:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Question:
+class BasinTask:
     """Everything that decides a basin map.
 
     Raises:
@@ -132,7 +132,7 @@ class Question:
 def fate_of(
     leg: TaylorLeg,
     drive: AbstractDrive,
-    question: Question,
+    question: BasinTask,
     start: Apex,
     attraction: Attraction | None = None,
 ) -> Fate:
@@ -161,7 +161,7 @@ def fate_of(
     return Fate.WANDERS
 
 
-def attraction_in(question: Question) -> Attraction | None:
+def attraction_in(question: BasinTask) -> Attraction | None:
     """Neighbourhood of the periodic hop from which every leg returns, if there is one.
 
     Motors that are held give no derivative at a touchdown without speed, and so no neighbourhood.
@@ -172,15 +172,15 @@ def attraction_in(question: Question) -> Attraction | None:
     return find_attraction(leg, exact, drive, question.centre, question.near, question.hops)
 
 
-_worker: tuple[Question, TaylorLeg, AbstractDrive] | None = None
+_worker: tuple[BasinTask, TaylorLeg, AbstractDrive] | None = None
 
 
-def _start_worker(question: Question) -> None:
+def _start_worker(question: BasinTask) -> None:
     global _worker
     _worker = (question, *question.tools())
 
 
-def _start_process(question: Question) -> None:
+def _start_process(question: BasinTask) -> None:
     # ^C goes to the whole group; a worker that dies of it takes the queue's lock along, and the
     # one who tidies up waits for ever.
     ignore_interrupts()
@@ -201,7 +201,7 @@ def _row(attraction: Attraction | None, index: int) -> tuple[int, list[int]]:
     return index, fates
 
 
-def _read(path: Path, question: Question) -> dict[int, list[int]]:
+def _read(path: Path, question: BasinTask) -> dict[int, list[int]]:
     """Rows that an earlier run has finished; a last line that was cut off is left out."""
     lines = path.read_text(encoding="utf-8").splitlines()
     if not lines or lines[0] != question.text():
@@ -221,7 +221,7 @@ def _read(path: Path, question: Question) -> dict[int, list[int]]:
 
 
 def map_basin(
-    question: Question, path: Path, *, workers: int = 2, progress: Progress | None = None
+    question: BasinTask, path: Path, *, workers: int = 2, progress: Progress | None = None
 ) -> Ints:
     """Fates (up, across) of the whole grid; written to `path` row by row.
 
@@ -252,7 +252,7 @@ def _line(index: int, fates: list[int]) -> str:
     return json.dumps({"row": index, "fates": fates})
 
 
-def _rows(question: Question, todo: list[int], workers: int) -> Iterator[tuple[int, list[int]]]:
+def _rows(question: BasinTask, todo: list[int], workers: int) -> Iterator[tuple[int, list[int]]]:
     if not todo:
         return
     large = len(todo) * question.across.count >= LARGE
@@ -274,7 +274,7 @@ def _rows(question: Question, todo: list[int], workers: int) -> Iterator[tuple[i
 
 
 @contextmanager
-def _pool(question: Question, workers: int) -> Iterator[ProcessPoolExecutor]:
+def _pool(question: BasinTask, workers: int) -> Iterator[ProcessPoolExecutor]:
     """Pool of new processes; they are not forked, since a compiled leg does not survive a fork."""
     context: Any = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(

@@ -12,7 +12,7 @@ import numpy as np
 
 from legbench.errors import ConfigError
 from legbench.modes.carry import Carrier
-from legbench.modes.continuation import Solution, correct
+from legbench.modes.continuation import CurvePoint, correct
 from legbench.modes.monodromy import Monodromy, monodromy
 from legbench.modes.roots import bracketed
 from legbench.modes.scene import Scene
@@ -76,7 +76,7 @@ class BrakeShooting:
         """State at rest (4,) where the orbit of some unknowns begins."""
         return np.concatenate([unknown[:2], [0.0, 0.0]])
 
-    def correct(self, guess: Floats, row: Floats) -> Solution | None:
+    def correct(self, guess: Floats, row: Floats) -> CurvePoint | None:
         """The orbit near `guess` (3,) with the same component along `row` (3,), if there is one."""
         return correct(self.equations, guess, row, float(row @ guess), RESIDUAL)
 

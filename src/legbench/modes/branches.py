@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from legbench.modes.continuation import LOST, MANY, Solution
+from legbench.modes.continuation import LOST, MANY, CurvePoint
 from legbench.modes.family import Family, Passing
 from legbench.modes.monodromy import energy_slope
 from legbench.modes.periodic import PeriodicOrbit, Shooting, orbits_along
@@ -89,7 +89,7 @@ def _eigenvector(shooting: Shooting, start: Floats, period: float, periods: int)
 
 def _followed(
     shooting: Shooting,
-    first: Solution,
+    first: CurvePoint,
     along: Floats,
     passing: Passing,
     side: int,

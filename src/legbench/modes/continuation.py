@@ -22,7 +22,7 @@ FARTHEST = 0.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Solution:
+class CurvePoint:
     """One point of a curve."""
 
     unknown: Floats
@@ -32,7 +32,7 @@ class Solution:
     tangent: Floats
     """Unit vector along the curve (n + 1,)."""
 
-    def towards(self, along: Floats) -> "Solution":
+    def towards(self, along: Floats) -> "CurvePoint":
         """This solution with its tangent on the side of `along` (n + 1,)."""
         return replace(self, tangent=tangent_of(self.slope, along))
 
@@ -57,7 +57,7 @@ def correct(
     tolerance: float,
     *,
     stiff: float = 0.0,
-) -> Solution | None:
+) -> CurvePoint | None:
     """Newton's method on the equations and `row . unknown = value`; None if it does not converge.
 
     Directions whose singular value is below `stiff` times the largest one are not corrected: near a
@@ -70,7 +70,7 @@ def correct(
         if not np.all(np.isfinite(wrong)):
             return None
         if np.max(np.abs(wrong)) < tolerance:
-            return Solution(unknown=unknown, slope=slope, tangent=tangent_of(slope, row))
+            return CurvePoint(unknown=unknown, slope=slope, tangent=tangent_of(slope, row))
         change = np.linalg.lstsq(np.vstack([slope, row]), wrong, rcond=stiff)[0]
         if not np.all(np.isfinite(change)) or np.max(np.abs(change)) > FARTHEST:
             return None
@@ -98,12 +98,12 @@ LOST = "no solution continues it"
 """Reason of the end of a curve beyond which Newton's method does not converge."""
 Answer = str | Refused | None
 """Answer to a solution: None to go on, a refusal, or the reason why the curve ends with it."""
-Visit = Callable[[Solution], Answer]
+Visit = Callable[[CurvePoint], Answer]
 """Function that is called with every solution."""
 
 
 def trace(
-    equations: Equations, first: Solution, stride: Stride, tolerance: float, visit: Visit
+    equations: Equations, first: CurvePoint, stride: Stride, tolerance: float, visit: Visit
 ) -> str:
     """Follow a curve from its first solution on, which is not visited; return why it ended.
 
@@ -125,8 +125,8 @@ def trace(
 
 
 def _next(
-    equations: Equations, last: Solution, step: float, tolerance: float, visit: Visit
-) -> tuple[Solution, Answer]:
+    equations: Equations, last: CurvePoint, step: float, tolerance: float, visit: Visit
+) -> tuple[CurvePoint, Answer]:
     """Solution one step further, or the last one, and the visitor's answer to it."""
     row = last.tangent
     value = float(row @ last.unknown) + step

@@ -27,7 +27,7 @@ NUDGE = 0.01
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Cycle:
+class HopCycle:
     """Cycle of hops, the last of which ends where the first began."""
 
     apexes: tuple[Apex, ...]
@@ -85,7 +85,7 @@ def stacked(
     return residual, slope, slopes
 
 
-def find_cycle(leg: TaylorLeg, drive: AbstractDrive, guess: Sequence[Apex]) -> Cycle:
+def find_cycle(leg: TaylorLeg, drive: AbstractDrive, guess: Sequence[Apex]) -> HopCycle:
     """Cycle near some consecutive apexes, by Newton's method on all of them together.
 
     Raises:
@@ -109,11 +109,11 @@ def find_cycle(leg: TaylorLeg, drive: AbstractDrive, guess: Sequence[Apex]) -> C
 
 def described(
     leg: TaylorLeg, drive: AbstractDrive, at: Floats, slopes: list[Floats], residual: float
-) -> Cycle:
+) -> HopCycle:
     """The cycle of solved apexes in `UNITS` (n, 6), with the derivatives of its hops."""
     values, directions = multiplied(slopes)
     apexes = tuple(Apex.of(row * UNITS) for row in at)
-    return Cycle(
+    return HopCycle(
         apexes=apexes,
         hops=tuple(return_map(leg, drive, apex) for apex in apexes),
         multipliers=tuple(complex(value) for value in values),
@@ -143,8 +143,8 @@ def repeats(apexes: Sequence[Apex], longest: int = LONGEST) -> int | None:
 
 
 def end_of(
-    leg: TaylorLeg, drive: AbstractDrive, cycle: Cycle, hops: int
-) -> tuple[list[Apex], Cycle | None]:
+    leg: TaylorLeg, drive: AbstractDrive, cycle: HopCycle, hops: int
+) -> tuple[list[Apex], HopCycle | None]:
     """Disturb a hop along its largest multiplier's direction, and follow the motion to its end.
 
     Returns:

@@ -18,8 +18,8 @@ from legbench.modes.continuation import (
     LOST,
     MANY,
     Answer,
+    CurvePoint,
     Refused,
-    Solution,
     Stride,
     tangent_of,
     trace,
@@ -155,7 +155,7 @@ def _grow(
     With an energy of zero the family is followed down to the amplitude `FIRST`.
     """
 
-    def visit(found: Solution) -> Answer:
+    def visit(found: CurvePoint) -> Answer:
         orbit = shooting.orbit(found.unknown)
         if orbit.outside:
             largest = max(one.energy for one in orbits)
@@ -170,7 +170,7 @@ def _grow(
         return "the energy asked for" if energy and orbit.energy >= energy else None
 
     slope = shooting.equations(unknown)[1]
-    first = Solution(unknown=unknown, slope=slope, tangent=tangent_of(slope, along))
+    first = CurvePoint(unknown=unknown, slope=slope, tangent=tangent_of(slope, along))
     ended = trace(shooting.equations, first, stride, RESIDUAL, visit)
     if ended == MANY:
         return f"{stride.most} orbits"

@@ -14,12 +14,12 @@ from legbench.errors import ConfigError, DesignError
 from legbench.modes.continuation import (
     LOST,
     MANY,
-    Solution,
+    CurvePoint,
     Stride,
     correct,
     trace,
 )
-from legbench.modes.cycles import Cycle, described, stacked
+from legbench.modes.cycles import HopCycle, described, stacked
 from legbench.modes.drive import JumpLaw
 from legbench.modes.fixed_point import UNITS
 from legbench.modes.hop import Apex, return_map
@@ -48,7 +48,7 @@ class Member:
     """Periodic hop at one value of the setting."""
 
     value: float
-    cycle: Cycle
+    cycle: HopCycle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -132,7 +132,7 @@ def follow_hop(
     design: LegDesign,
     jump: JumpConfig,
     setting: Setting,
-    start: Cycle,
+    start: HopCycle,
     to: float,
     *,
     progress: Callable[[int, int], None] | None = None,
@@ -175,7 +175,7 @@ def follow_hop(
     )
 
 
-def _first(equations: _Equations, start: Cycle, value: float) -> Solution:
+def _first(equations: _Equations, start: HopCycle, value: float) -> CurvePoint:
     """The hop at the present value of the setting, as a solution of the equations."""
     apexes = np.array([apex.vector() for apex in start.apexes]) / UNITS
     guess = np.append(apexes.ravel(), value / equations.span)
@@ -194,7 +194,7 @@ class _Walk:
     def __init__(
         self,
         equations: _Equations,
-        first: Solution,
+        first: CurvePoint,
         value: float,
         to: float,
         progress: Callable[[int, int], None] | None,
@@ -203,7 +203,7 @@ class _Walk:
         self._equations, self._from, self._to = equations, value, to
         self._passed, self._progress = [first.unknown], progress
 
-    def visit(self, found: Solution) -> str | None:
+    def visit(self, found: CurvePoint) -> str | None:
         """Add a hop; return why it is the last one, or None if it is not."""
         self._equations.why = ""
         setting, member = self._equations.setting, _member(self._equations, found)
@@ -255,7 +255,7 @@ def _excess(member: Member) -> float:
     return abs(member.cycle.multipliers[0]) - 1.0
 
 
-def _member(equations: _Equations, found: Solution) -> Member:
+def _member(equations: _Equations, found: CurvePoint) -> Member:
     value = float(found.unknown[-1]) * equations.span
     apexes = found.unknown[:-1].reshape(-1, 6)
     leg, law = equations.tools(value)

@@ -17,7 +17,7 @@ import numpy as np
 from legbench.analytic.parameters import DAMPING, MOTOR
 from legbench.modes.brake import beyond_limits
 from legbench.modes.carry import Carrier
-from legbench.modes.continuation import Answer, Refused, Solution, Stride, correct, trace
+from legbench.modes.continuation import Answer, CurvePoint, Refused, Stride, correct, trace
 from legbench.modes.monodromy import Monodromy, monodromy
 from legbench.signals import Floats
 
@@ -110,7 +110,7 @@ class Shooting:
         closed = (done.end - raw[:4]) / size
         return np.append(closed, self._phase @ (unknown[:4] - self._reference)), slope
 
-    def correct(self, guess: Floats, row: Floats) -> Solution | None:
+    def correct(self, guess: Floats, row: Floats) -> CurvePoint | None:
         """The orbit near `guess` (6,) with the same component along `row` (6,), if there is one."""
         return correct(self.equations, guess, row, float(row @ guess), CLOSED)
 
@@ -171,7 +171,7 @@ class Shooting:
 
 
 def orbits_along(
-    shooting: Shooting, first: Solution, most: int, energy: float = math.inf
+    shooting: Shooting, first: CurvePoint, most: int, energy: float = math.inf
 ) -> tuple[list[PeriodicOrbit], str]:
     """Follow closed orbits from a first one on; return them and why there are no more.
 
@@ -183,7 +183,7 @@ def orbits_along(
     """
     orbits = [shooting.orbit(first.unknown)]
 
-    def visit(found: Solution) -> Answer:
+    def visit(found: CurvePoint) -> Answer:
         orbit = shooting.orbit(found.unknown)
         if orbit.outside:
             return Refused(f"{orbit.outside} beyond {orbits[-1].energy:.4g} J")

@@ -19,8 +19,8 @@ from legbench.modes.continuation import (
     LOST,
     MANY,
     Answer,
+    CurvePoint,
     Refused,
-    Solution,
     Stride,
     correct,
     trace,
@@ -191,7 +191,7 @@ def respond(
         raise ConfigError(f"no response to motors of {dz2:g} rad is found; take a smaller dz2")
     found: list[Response] = []
 
-    def visit(one: Solution) -> Answer:
+    def visit(one: CurvePoint) -> Answer:
         period = float(one.unknown[4]) * switched.unit
         half = 0.5 * period
         response = switched.response(one.unknown[:4] * switched.size, (half, half), dz2)

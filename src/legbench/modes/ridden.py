@@ -15,8 +15,8 @@ from legbench.modes.continuation import (
     LOST,
     MANY,
     Answer,
+    CurvePoint,
     Refused,
-    Solution,
     Stride,
     correct,
     trace,
@@ -185,7 +185,7 @@ def ride(
         raise ConfigError(f"bang-bang with dz2 = {dz2:g} rad does not settle on a cycle")
     found: list[Response] = []
 
-    def visit(one: Solution) -> Answer:
+    def visit(one: CurvePoint) -> Answer:
         cycle = law.cycle(one.unknown)
         if cycle.outside:
             last = found[-1].dz2 if found else dz2

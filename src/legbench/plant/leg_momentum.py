@@ -7,7 +7,7 @@ from legbench.design import LegDesign
 from legbench.design.setup import Setup, SetupKind
 from legbench.drives.setup.config import BusConfig
 from legbench.imperfections import Imperfections
-from legbench.limits.momentum import LegMomentum, Support
+from legbench.limits.momentum import LegMomentum, SupportPoint
 
 
 def momentum_of(
@@ -59,5 +59,5 @@ def _held(design: LegDesign, kind: SetupKind) -> tuple[PairTerms, ...]:
             return (floating_terms(design, gravity=0.0).hanging(),)
 
 
-def _support(terms: PairTerms) -> Support:
-    return Support(inertia=terms.inertia, coupling=terms.coupling, moment=terms.moment)
+def _support(terms: PairTerms) -> SupportPoint:
+    return SupportPoint(inertia=terms.inertia, coupling=terms.coupling, moment=terms.moment)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from legbench.closing import Closing
 from legbench.recording.files import Appender
-from legbench.recording.rows import BATCH_ROWS, Block
+from legbench.recording.rows import BATCH_ROWS, RowBlock
 
 MAX_WAITING = 60_000 // BATCH_ROWS
 """Largest number of blocks that may wait for the disk: 60 s at 1 kHz, 14 MB."""
@@ -62,7 +62,7 @@ class AbstractDisk(ABC):
         """Whether more rows wait than a run may have in memory."""
 
     @abstractmethod
-    def take(self, block: Block) -> None:
+    def take(self, block: RowBlock) -> None:
         """Take the rows of a block and empty it; raises nothing, an error is in `kept`."""
 
     @abstractmethod

@@ -6,7 +6,7 @@ from typing import Any
 
 from legbench.errors import ConfigError, FormatError
 from legbench.phases import ControllerDescription, Counting, PhaseInfo, Role
-from legbench.recording.tables import Table
+from legbench.recording.tables import ManifestTable
 from legbench.signals import Signal
 
 
@@ -15,7 +15,7 @@ def controller_table(kind: str, description: ControllerDescription) -> dict[str,
     return {"kind": kind, **asdict(description)}
 
 
-def parse_controller(table: Table) -> ControllerDescription:
+def parse_controller(table: ManifestTable) -> ControllerDescription:
     """Description that a table holds; an empty one for an empty table.
 
     Raises:
@@ -34,7 +34,7 @@ def parse_controller(table: Table) -> ControllerDescription:
         raise FormatError(f"manifest {table.path}: {error}") from None
 
 
-def parse_signals(table: Table) -> tuple[Signal, ...]:
+def parse_signals(table: ManifestTable) -> tuple[Signal, ...]:
     """Own signals that a table `controller` declares.
 
     Raises:
@@ -51,7 +51,7 @@ def parse_signals(table: Table) -> tuple[Signal, ...]:
     )
 
 
-def _phase(entry: Table) -> PhaseInfo:
+def _phase(entry: ManifestTable) -> PhaseInfo:
     code = entry.whole("code")
     if code is None:
         raise entry.refusal("code", None, "a whole number")
@@ -64,7 +64,7 @@ def _phase(entry: Table) -> PhaseInfo:
     )
 
 
-def _text(entry: Table, key: str) -> str:
+def _text(entry: ManifestTable, key: str) -> str:
     found = entry.text(key)
     if not found:
         raise entry.refusal(key, found, "a text")
@@ -77,4 +77,4 @@ def declared_signals(manifest: Mapping[str, Any]) -> tuple[Signal, ...]:
     Raises:
         FormatError: an entry is no signal.
     """
-    return parse_signals(Table(entries=manifest).table("controller"))
+    return parse_signals(ManifestTable(entries=manifest).table("controller"))

@@ -18,7 +18,7 @@ from legbench.recording.controller_table import declared_signals, parse_controll
 from legbench.recording.format_1 import upgraded
 from legbench.recording.imperfections_table import parse_imperfections
 from legbench.recording.layout import COMPLETE, FORMAT
-from legbench.recording.tables import Table
+from legbench.recording.tables import ManifestTable
 
 Angles = tuple[float, float]
 
@@ -144,9 +144,11 @@ def describe(manifest: Mapping[str, Any], fallback_id: str = "") -> RunDescripti
         FormatError: it describes no leg, controller or setup that can be, names a convention that
             does not exist, or has an entry of a wrong type.
     """
-    head = Table(entries=upgraded(manifest) if manifest.get("format", FORMAT) == 1 else manifest)
+    head = ManifestTable(
+        entries=upgraded(manifest) if manifest.get("format", FORMAT) == 1 else manifest
+    )
     # Messages leave out "experiment": the entries have the same names in either format.
-    experiment = Table(entries=head.table("experiment").entries)
+    experiment = ManifestTable(entries=head.table("experiment").entries)
     controller, provenance = experiment.table("controller"), head.table("provenance")
     settings, conventions = controller.table("settings"), experiment.table("conventions")
     kind = head.table("plant").text("kind") or experiment.table("plant").text("kind")
@@ -183,7 +185,7 @@ def describe(manifest: Mapping[str, Any], fallback_id: str = "") -> RunDescripti
     )
 
 
-def _versions(table: Table) -> Mapping[str, str]:
+def _versions(table: ManifestTable) -> Mapping[str, str]:
     return MappingProxyType({str(name): str(text) for name, text in table.entries.items()})
 
 
@@ -201,21 +203,21 @@ def layout_of(manifest: Mapping[str, Any]) -> Layout:
         raise FormatError(f"manifest controller: {error}") from None
 
 
-def _design(table: Table) -> LegDesign:
+def _design(table: ManifestTable) -> LegDesign:
     try:
         return design_from_mapping(table.entries)
     except DesignError as error:
         raise FormatError(f"manifest design: {error}") from None
 
 
-def _setup(table: Table) -> Setup:
+def _setup(table: ManifestTable) -> Setup:
     try:
         return Setup(kind=table.choice("kind", SetupKind), boom_radius=table.number("boom_radius"))
     except ConfigError as error:
         raise FormatError(f"manifest setup: {error}") from None
 
 
-def _reference(conventions: Table, setup: SetupKind) -> Reference:
+def _reference(conventions: ManifestTable, setup: SetupKind) -> Reference:
     """Reference by which a run is judged."""
     asked = conventions.choice("rating_reference", ReferenceChoice, ReferenceChoice.SETUP)
     if asked is ReferenceChoice.SETUP:
@@ -223,21 +225,21 @@ def _reference(conventions: Table, setup: SetupKind) -> Reference:
     return Reference(asked.value)
 
 
-def _crank_length(linkage: Table) -> float | None:
+def _crank_length(linkage: ManifestTable) -> float | None:
     if linkage.text("kind") != BARS:
         return None
     length = linkage.number("crank_length")
     return CRANK_LENGTH if length is None else length
 
 
-def _setting(settings: Table, key: str) -> float | None:
+def _setting(settings: ManifestTable, key: str) -> float | None:
     """Setting of a controller when it is a number; a guest may mean anything by the word."""
     found = settings.entries.get(key)
     number = isinstance(found, int | float) and not isinstance(found, bool)
     return settings.number(key) if number else None
 
 
-def _initial_state(table: Table) -> InitialState | None:
+def _initial_state(table: ManifestTable) -> InitialState | None:
     joint_pos, motor_pos = table.pair("joint_pos"), table.pair("motor_pos")
     if joint_pos is None or motor_pos is None:
         return None

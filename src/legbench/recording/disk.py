@@ -11,8 +11,8 @@ import pyarrow as pa
 from legbench.recording.abstract_disk import AbstractDisk, AbstractLog
 from legbench.recording.files import Appender
 from legbench.recording.logs import LoopLog
-from legbench.recording.rows import Block
-from legbench.recording.store import Store
+from legbench.recording.rows import RowBlock
+from legbench.recording.store import RunStore
 from legbench.recording.stream import encode_schema
 
 
@@ -23,7 +23,7 @@ class Disk(AbstractDisk):
     def __init__(self, samples: Appender, events: Appender, schema: pa.Schema) -> None:
         """Write the opening of the stream; raises OSError."""
         self._samples, self._events = samples, events
-        self._store = Store(samples, events, schema)
+        self._store = RunStore(samples, events, schema)
         self.kept = self._store.kept
         samples.append(encode_schema(schema))
 
@@ -32,7 +32,7 @@ class Disk(AbstractDisk):
         """False: nothing waits here."""
         return False
 
-    def take(self, block: Block) -> None:
+    def take(self, block: RowBlock) -> None:
         """Write the rows of a block and empty it."""
         self._store.write(block.columns())
         block.count = 0

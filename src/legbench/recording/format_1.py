@@ -11,7 +11,7 @@ from typing import Any, Final
 from legbench.errors import ConfigError, FormatError
 from legbench.phases import ControllerDescription, Counting, PhaseInfo, Role
 from legbench.recording.controller_table import controller_table
-from legbench.recording.tables import Table
+from legbench.recording.tables import ManifestTable
 
 TABLES: Final = (
     "design",
@@ -60,7 +60,7 @@ def built_in(kind: str, settings: Mapping[str, Any]) -> ControllerDescription:
     Raises:
         FormatError: a setting that decides how a run is measured is no number.
     """
-    table = Table(entries=settings, path="controller")
+    table = ManifestTable(entries=settings, path="controller")
     jump = _jump_phases(table.number("touchdown_time") or 0.0)
     families = {**PHASES, "jump": jump}
     chosen = [families[kind]] if kind in families else families.values()
@@ -98,7 +98,7 @@ def upgraded(manifest: Mapping[str, Any]) -> dict[str, Any]:
     experiment = _some(manifest, TABLES)
     if isinstance(manifest.get("plant"), str):
         experiment["plant"] = {"kind": manifest["plant"]}
-    table = Table(entries=manifest).table("controller")
+    table = ManifestTable(entries=manifest).table("controller")
     kind = table.text("kind") or ""
     settings = {key: value for key, value in table.entries.items() if key != "kind"}
     if "controller" in manifest:

@@ -14,7 +14,7 @@ from legbench.recording.events import Event
 from legbench.recording.layout import COMPLETE, TIME, run_name
 from legbench.recording.manifest import new_manifest, plain
 from legbench.recording.reader import Recording, described
-from legbench.recording.rows import BATCH_ROWS, Block, RowLayout
+from legbench.recording.rows import BATCH_ROWS, RowBlock, RowLayout
 from legbench.signals import Command, Floats, Observation
 
 
@@ -38,7 +38,7 @@ class MemoryRun:
         created = start.isoformat(timespec="seconds")
         self._manifest = new_manifest(manifest, id=self._id, created=created)
         self._layout = layout_of(self._manifest)
-        self._block: Block | None = None  # takes 25 KiB, and whole rows need none
+        self._block: RowBlock | None = None  # takes 25 KiB, and whole rows need none
         self._parts: list[Floats] = []
         self._events: list[Event] = []
 
@@ -53,13 +53,13 @@ class MemoryRun:
     ) -> None:
         """Remember one cycle; raises ConfigError if the arrays are not those of one leg."""
         if self._block is None:
-            self._block = Block(RowLayout(self._layout))
+            self._block = RowBlock(RowLayout(self._layout))
         self._block.put(command, observation, cycle_us, late_us)
         if self._block.count == BATCH_ROWS:
             self._take(self._block)
 
     def extend(self, columns: Floats) -> None:
-        """Remember whole rows (columns with time, rows), laid out as `Block.columns` does."""
+        """Remember whole rows (columns with time, rows), laid out as `RowBlock.columns` does."""
         self._parts.append(columns)
 
     def event(self, time: float, name: str, **detail: Any) -> None:
@@ -96,7 +96,7 @@ class MemoryRun:
             events=tuple(self._events),
         )
 
-    def _take(self, block: Block) -> None:
+    def _take(self, block: RowBlock) -> None:
         self._parts.append(block.columns())
         block.count = 0
 

@@ -29,7 +29,7 @@ from legbench.recording.process_disk import (
     longest_packet,
 )
 from legbench.recording.ring import Ring
-from legbench.recording.store import Store
+from legbench.recording.store import RunStore
 
 NOTHING: Final = b""
 """A packet that has not come, within `LOOK_EVERY`."""
@@ -43,7 +43,7 @@ def main(arguments: list[str]) -> int:
     samples, events, number = (int(argument) for argument in arguments)
     with open(f"/proc/self/fd/{samples}", "rb") as opening:
         schema = pa.ipc.open_stream(opening).schema
-    store = Store(_grown(samples), _grown(events), schema)
+    store = RunStore(_grown(samples), _grown(events), schema)
     with socket.socket(fileno=number) as master:
         if not _serve(master, store, len(schema), longest_packet(schema)):
             store.finish(end=False)
@@ -54,7 +54,7 @@ def main(arguments: list[str]) -> int:
     return 0
 
 
-def _serve(master: socket.socket, store: Store, columns: int, longest: int) -> bool:
+def _serve(master: socket.socket, store: RunStore, columns: int, longest: int) -> bool:
     """Write packet by packet; whether the run has ended, rather than its process."""
     line, logs = b"", list[RingDrain]()
     with ExitStack() as closing:
@@ -113,7 +113,7 @@ def _grown(descriptor: int) -> Appender:
     return file
 
 
-def _report(store: Store, *, ended: bool) -> bytes:
+def _report(store: RunStore, *, ended: bool) -> bytes:
     kept = store.kept
     errors = (_number(kept.error), _number(kept.events_error))
     return REPORT.pack(kept.rows, kept.first, kept.last, *errors, ended)

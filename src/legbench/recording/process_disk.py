@@ -24,7 +24,7 @@ from legbench.recording.abstract_disk import MAX_WAITING, AbstractDisk, Abstract
 from legbench.recording.files import Appender
 from legbench.recording.logs import RingLog
 from legbench.recording.ring import Ring
-from legbench.recording.rows import BATCH_ROWS, Block
+from legbench.recording.rows import BATCH_ROWS, RowBlock
 from legbench.recording.stream import encode_schema
 
 ROWS, EVENT, END = b"R", b"E", b"F"
@@ -73,7 +73,7 @@ class ProcessDisk(AbstractDisk):
         """Whether more waits in this process than a run may have in memory."""
         return len(self._waiting) > MAX_WAITING
 
-    def take(self, block: Block) -> None:
+    def take(self, block: RowBlock) -> None:
         """Send the rows of a block, which wait here where the kernel's queue is full."""
         packet = ROWS + block.columns().tobytes()
         block.count = 0

@@ -26,7 +26,7 @@ VECTORS: Final = (
     "energy",
     "loop_gap",
 )
-"""Signals of two components in the order in which `Block.put` joins them; own ones follow."""
+"""Signals of two components in the order in which `RowBlock.put` joins them; own ones follow."""
 
 TRUTH: Final = 12
 """Components of the signals that only a simulation knows, the last of those."""
@@ -76,7 +76,7 @@ ONE_LEG_ROWS: Final = RowLayout(ONE_LEG)
 
 
 @final
-class Block:
+class RowBlock:
     """Fifty rows that the loop fills and the disk empties.
 
     Attributes:
@@ -220,5 +220,5 @@ class LegRows:
         self.count += 1
 
     def columns(self, leg: int, rows: int) -> Floats:
-        """Return the first rows of a leg (columns with time, rows), as `Block.columns` does."""
+        """Return the first rows of a leg (columns with time, rows), as `RowBlock.columns` does."""
         return np.ascontiguousarray(self._values[:rows, leg].T[self._layout.disk_order])

@@ -18,7 +18,7 @@ SYNC_EVERY: Final = 1.0
 
 
 @final
-class Store:
+class RunStore:
     """Appends to the samples and events of a run; used by one thread of one process alone.
 
     Attributes:

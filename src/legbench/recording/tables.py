@@ -15,13 +15,13 @@ Choice = TypeVar("Choice", bound=StrEnum)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Table:
+class ManifestTable:
     """One table of a manifest, and what error messages call it."""
 
     entries: Mapping[str, Any]
     path: str = ""
 
-    def table(self, key: str) -> "Table":
+    def table(self, key: str) -> "ManifestTable":
         """Table below a key, empty where there is none.
 
         Raises:
@@ -32,9 +32,9 @@ class Table:
             found = {}
         if not isinstance(found, Mapping):
             raise self.refusal(key, found, "a table")
-        return Table(entries=found, path=self.name(key))
+        return ManifestTable(entries=found, path=self.name(key))
 
-    def tables(self, key: str) -> tuple["Table", ...]:
+    def tables(self, key: str) -> tuple["ManifestTable", ...]:
         """Tables of the list below a key, none where there is no list.
 
         Raises:
@@ -45,11 +45,11 @@ class Table:
             return ()
         if not isinstance(found, list | tuple):
             raise self.refusal(key, found, "a list of tables")
-        tables: list[Table] = []
+        tables: list[ManifestTable] = []
         for place, each in enumerate(found):
             if not isinstance(each, Mapping):
                 raise self.refusal(f"{key}[{place}]", each, "a table")
-            tables.append(Table(entries=each, path=self.name(f"{key}[{place}]")))
+            tables.append(ManifestTable(entries=each, path=self.name(f"{key}[{place}]")))
         return tuple(tables)
 
     def text(self, key: str) -> str | None:
@@ -106,7 +106,7 @@ class Table:
             return None
         if not isinstance(found, list | tuple) or len(found) != 2:
             raise self.refusal(key, found, "two numbers")
-        both = Table(entries={"0": found[0], "1": found[1]}, path=self.name(key))
+        both = ManifestTable(entries={"0": found[0], "1": found[1]}, path=self.name(key))
         first, second = both.number("0"), both.number("1")
         if first is None or second is None:
             raise self.refusal(key, found, "two numbers")

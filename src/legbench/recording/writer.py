@@ -28,7 +28,7 @@ from legbench.recording.layout import (
 )
 from legbench.recording.manifest import Manifest, new_manifest, write_manifest
 from legbench.recording.process_disk import ProcessDisk
-from legbench.recording.rows import BATCH_ROWS, Block, RowLayout
+from legbench.recording.rows import BATCH_ROWS, RowBlock, RowLayout
 from legbench.recording.stream import WholeBatches, schema_for
 from legbench.signals import Command, Observation
 from legbench.writing import reason
@@ -51,7 +51,7 @@ class RunWriter:
         self.path = path
         self._manifest = manifest
         self._disk = disk
-        self._block = Block(RowLayout(layout_of(manifest)))
+        self._block = RowBlock(RowLayout(layout_of(manifest)))
         self._handed = 0
         self._closed = False
         self._told = False

@@ -14,7 +14,7 @@ Column = NDArray[Any]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Difference:
+class FirstDifference:
     """First row in which a replayed signal is not the recorded one."""
 
     cycle: int
@@ -72,7 +72,7 @@ class Replayed:
         """Whether all columns agree to the bit."""
         return self.first() is None
 
-    def first(self) -> Difference | None:
+    def first(self) -> FirstDifference | None:
         """First row in which any column differs to the bit, none if none does."""
         rows = {name: _first(unlike) for name, unlike in self._unlike()}
         known = {name: row for name, row in rows.items() if row is not None}
@@ -80,7 +80,7 @@ class Replayed:
             return None
         name = min(known, key=lambda each: known[each])
         row = known[name]
-        return Difference(
+        return FirstDifference(
             cycle=row,
             time=float(self.time[row]),
             signal=name,

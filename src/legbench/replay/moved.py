@@ -17,7 +17,7 @@ MOST_REST: Final = 500
 """Largest number of rows at rest that are looked at."""
 
 
-class Source(StrEnum):
+class MotionSource(StrEnum):
     """Rows of a run that move the motors of a resimulation."""
 
     COMMANDS = "commands"
@@ -37,16 +37,16 @@ class Moved:
         first: positions of the motors before the first row (2,) [rad].
     """
 
-    def __init__(self, recording: Recording, source: Source) -> None:
+    def __init__(self, recording: Recording, source: MotionSource) -> None:
         """Take the rows of a run.
 
         Raises:
             ConfigError: its commands were never sent.
             RecordingError: it does not know its motors in every row.
         """
-        run, self._measured = recording.description, source is Source.MOTORS
+        run, self._measured = recording.description, source is MotionSource.MOTORS
         self.on_drives = run.plant == DRIVES
-        if source is Source.COMMANDS and run.looks_only:
+        if source is MotionSource.COMMANDS and run.looks_only:
             raise ConfigError(
                 f"{recording.path} was read only: its commands moved nothing; use --resimulate "
                 "motors"

@@ -23,7 +23,7 @@ from legbench.recording.manifest import OWN_KEYS
 from legbench.recording.memory import MemoryRun
 from legbench.recording.reader import Recording
 from legbench.replay.comparison import Replayed, columns_of
-from legbench.replay.moved import Moved, Source
+from legbench.replay.moved import MotionSource, Moved
 from legbench.replay.observations import exact_times, require_every_row
 from legbench.replay.recorded import RecordedLeg
 from legbench.servo import ServoConfig
@@ -69,7 +69,7 @@ class Resimulation:
 def resimulate(
     recording: Recording,
     leg: RecordedLeg,
-    source: Source,
+    source: MotionSource,
     progress: Progress | None = None,
 ) -> Resimulation:
     """Move the leg of a run, or another one, as the run was moved.
@@ -134,7 +134,7 @@ def _notes(recording: Recording, moved: Moved) -> Iterator[str]:
         )
 
 
-def _opened(leg: RecordedLeg, source: Source, moved: Moved) -> OpenPlant:
+def _opened(leg: RecordedLeg, source: MotionSource, moved: Moved) -> OpenPlant:
     """Open the plant, with the leg at rest where its motors are first."""
     plant, servo, imperfections = leg.plant, leg.servo, leg.imperfections
     on_drives, motor_pos = moved.on_drives, moved.first
@@ -142,7 +142,7 @@ def _opened(leg: RecordedLeg, source: Source, moved: Moved) -> OpenPlant:
         plant = SimChoice()
     elif plant.kind == DRIVES:
         raise ConfigError("a resimulation moves no drives; use --plant sim or --plant analytic")
-    if source is Source.MOTORS:
+    if source is MotionSource.MOTORS:
         # What motors do to a command, and the noise on them, is in the measurement.
         plant = _without_limits(plant)
         servo = ServoConfig(encoder_counts=servo.encoder_counts)

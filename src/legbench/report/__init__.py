@@ -10,15 +10,15 @@ from legbench.lazily import lazy_names
 if TYPE_CHECKING:
     from legbench.report.run_figures import figures
     from legbench.report.run_kpis import Kpi, kpis
-    from legbench.report.sources import Source, read_source
+    from legbench.report.sources import CampaignSource, read_source
     from legbench.report.trends import Trend, judge_trends
-    from legbench.report.writing import Written, write_report
+    from legbench.report.writing import WrittenReport, write_report
 
 __all__ = [
+    "CampaignSource",
     "Kpi",
-    "Source",
     "Trend",
-    "Written",
+    "WrittenReport",
     "figures",
     "judge_trends",
     "kpis",
@@ -29,9 +29,9 @@ __getattr__ = lazy_names(
     __name__,
     {
         "Kpi": "legbench.report.run_kpis",
-        "Source": "legbench.report.sources",
+        "CampaignSource": "legbench.report.sources",
         "Trend": "legbench.report.trends",
-        "Written": "legbench.report.writing",
+        "WrittenReport": "legbench.report.writing",
         "figures": "legbench.report.run_figures",
         "judge_trends": "legbench.report.trends",
         "kpis": "legbench.report.run_kpis",

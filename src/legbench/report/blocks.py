@@ -50,7 +50,7 @@ class BlockPanel:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Block:
+class FigureBlock:
     """Figure of the page."""
 
     name: str
@@ -64,7 +64,7 @@ class Block:
     """Number of panels in a row where there is room."""
 
 
-def planes_block(name: str, title: str, caption: str, recording: Recorded) -> Block:
+def planes_block(name: str, title: str, caption: str, recording: Recorded) -> FigureBlock:
     """Three planes of a run as in Figs. 4 and 6."""
     run = analysed(recording)
     facts, colouring = facts_of(run.description), on_both_grounds(colouring_of(run))
@@ -96,7 +96,7 @@ def planes_block(name: str, title: str, caption: str, recording: Recorded) -> Bl
         Swatch(label="flight", colour=_css(style.unit(style.FLIGHT))),
     )
     rest = Swatch(label="the rest of the run", colour="color-mix(in srgb, currentColor 30%, #8880)")
-    return Block(
+    return FigureBlock(
         name=name,
         title=title,
         caption=caption,
@@ -106,7 +106,9 @@ def planes_block(name: str, title: str, caption: str, recording: Recorded) -> Bl
     )
 
 
-def ratings_block(name: str, title: str, caption: str, contents: Sequence[RatingPanel]) -> Block:
+def ratings_block(
+    name: str, title: str, caption: str, contents: Sequence[RatingPanel]
+) -> FigureBlock:
     """Panels of Fig. 5, with the ratings that the paper prints."""
     looks = looks_of(contents)
 
@@ -123,10 +125,10 @@ def ratings_block(name: str, title: str, caption: str, contents: Sequence[Rating
         panels.append(BlockPanel(title=content.title, svg=svg))
     printed = any(content.printed for content in contents)
     legend = _legend(looks, printed)
-    return Block(name=name, title=title, caption=caption, panels=tuple(panels), legend=legend)
+    return FigureBlock(name=name, title=title, caption=caption, panels=tuple(panels), legend=legend)
 
 
-def stills_block(name: str, title: str, caption: str, recording: Recorded) -> Block | None:
+def stills_block(name: str, title: str, caption: str, recording: Recorded) -> FigureBlock | None:
     """Stills of one jump as in Fig. 7; none where the run has no complete jump with its height."""
     stills = stills_of(recording)
     if not stills:
@@ -141,7 +143,7 @@ def stills_block(name: str, title: str, caption: str, recording: Recorded) -> Bl
         heard = f"the leg {1e3 * still.time:.0f} ms after the lower apex, in {state}"
         svg = panel_svg(f"{name}-{place}", heard, STILL_INCH, partial(draw, still))
         panels.append(BlockPanel(title=f"{1e3 * still.time:.0f} ms", svg=svg))
-    return Block(
+    return FigureBlock(
         name=name,
         title=title,
         caption=caption,
@@ -156,12 +158,12 @@ def stills_block(name: str, title: str, caption: str, recording: Recorded) -> Bl
     )
 
 
-def without_panels(name: str, title: str, why: str) -> Block:
+def without_panels(name: str, title: str, why: str) -> FigureBlock:
     """Figure that cannot be drawn, with the reason as its caption."""
-    return Block(name=name, title=title, caption=f"Not drawn: {why}.")
+    return FigureBlock(name=name, title=title, caption=f"Not drawn: {why}.")
 
 
-def relabelled(block: Block, first: str) -> Block:
+def relabelled(block: FigureBlock, first: str) -> FigureBlock:
     """Return a block whose panels are lettered from `first` on."""
     shift = ord(first) - ord("a")
     panels = tuple(

@@ -25,7 +25,7 @@ from legbench.experiment.writing import flat
 from legbench.loop import Progress
 from legbench.paper import Published
 from legbench.recording.reader import Recording, load
-from legbench.report.sources import Source
+from legbench.report.sources import CampaignSource
 
 READINGS: Final = {
     "step": ("step_to", "step_to_caption"),
@@ -57,7 +57,7 @@ class Named:
 
 
 def named_experiments(
-    source: Source, numbers: Mapping[str, Published], progress: Progress | None = None
+    source: CampaignSource, numbers: Mapping[str, Published], progress: Progress | None = None
 ) -> tuple[Named, ...]:
     """Find the step and bang-bang of Fig. 4 and the jump of Figs. 6 and 7, with their recordings.
 
@@ -88,7 +88,7 @@ def _chosen(rows: Sequence[Mapping[str, Any]], readings: Sequence[Published]) ->
 
 
 def _named(
-    source: Source, name: str, row: Mapping[str, Any] | None, progress: Progress | None
+    source: CampaignSource, name: str, row: Mapping[str, Any] | None, progress: Progress | None
 ) -> Named:
     if row is None:
         return Named(
@@ -109,7 +109,7 @@ def _named(
 
 
 def _recorded(
-    source: Source, row: Mapping[str, Any], progress: Progress | None
+    source: CampaignSource, row: Mapping[str, Any], progress: Progress | None
 ) -> tuple[Recording | None, str]:
     """Recording of a run and its origin; none with the reason."""
     kept = source.folder / RECORDS / row["experiment"]

@@ -15,7 +15,7 @@ from legbench.report.measures import (
     measure,
     published_text,
 )
-from legbench.report.sources import Source
+from legbench.report.sources import CampaignSource
 
 CAPTION_OF: Final = {"step_rating_1": "step_to_caption", "step_rating_6": "step_to_caption"}
 """Number that the caption of its figure is about as well -> number with the caption's settings."""
@@ -52,7 +52,7 @@ class NumberRow:
 
 
 def number_rows(
-    numbers: Mapping[str, Published], sources: Sequence[Source]
+    numbers: Mapping[str, Published], sources: Sequence[CampaignSource]
 ) -> tuple[NumberRow, ...]:
     """Rows of the table, in the order of the paper; a step is there in both of its readings."""
     rows = [_count_row(numbers[key], sources) for key in ("experiments", "trials")]
@@ -65,7 +65,7 @@ def number_rows(
     return tuple(rows)
 
 
-def _row(number: Published, cell: Published, sources: Sequence[Source]) -> NumberRow:
+def _row(number: Published, cell: Published, sources: Sequence[CampaignSource]) -> NumberRow:
     """Row of a number, measured with the settings of `cell`."""
     settings = ""
     if cell.z2 is not None and cell.dz2 is not None and number.setup is not SetupKind.JUMP:
@@ -96,7 +96,7 @@ def _row(number: Published, cell: Published, sources: Sequence[Source]) -> Numbe
 
 
 def _measured(
-    number: Published, cell: Published, source: Source, reference: Reference
+    number: Published, cell: Published, source: CampaignSource, reference: Reference
 ) -> Measured | None:
     at = None if cell.z2 is None or cell.dz2 is None else (cell.z2, cell.dz2)
     return measure(number, source.table, reference, at)
@@ -117,7 +117,7 @@ def _counterpart(
     )
 
 
-def _count_row(number: Published, sources: Sequence[Source]) -> NumberRow:
+def _count_row(number: Published, sources: Sequence[CampaignSource]) -> NumberRow:
     counterparts = {}
     for source in sources:
         count = _count(number, source)
@@ -143,7 +143,7 @@ def _count_row(number: Published, sources: Sequence[Source]) -> NumberRow:
     )
 
 
-def _count(number: Published, source: Source) -> int:
+def _count(number: Published, source: CampaignSource) -> int:
     """Number of sound runs, or the most of one cell with the number's setup and controller."""
     rows = rows_of(sound_runs(source.table), "run")
     if number.key == "experiments":

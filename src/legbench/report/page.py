@@ -8,12 +8,12 @@ from legbench.campaign.curves import Cell, rating_curves
 from legbench.metrics.source import Reference
 from legbench.paper import Published, published
 from legbench.report._jinja2 import render
-from legbench.report.blocks import Block
+from legbench.report.blocks import FigureBlock
 from legbench.report.judging import HIGH, SETTLED, VISIBLE
 from legbench.report.measures import JUMP_MEASURES, RATING_WITHIN, SHARE_WITHIN
 from legbench.report.named import Named
 from legbench.report.numbers import NumberRow, number_rows
-from legbench.report.sources import InvalidRun, Source, invalid_runs
+from legbench.report.sources import CampaignSource, InvalidRun, invalid_runs
 from legbench.report.trends import Trend, judge_trends
 
 TEMPLATE: Final = "report.html"
@@ -63,7 +63,7 @@ class CellRow:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Judged:
+class ReportText:
     """Everything of a report that is no figure."""
 
     statements: tuple[Statement, ...]
@@ -71,7 +71,7 @@ class Judged:
     invalid: Mapping[str, tuple[InvalidRun, ...]]
 
 
-def judge(sources: Sequence[Source], numbers: Mapping[str, Published]) -> Judged:
+def judge(sources: Sequence[CampaignSource], numbers: Mapping[str, Published]) -> ReportText:
     """Judge the paper's statements and measure its numbers in each campaign."""
     found: dict[str, list[Judgement]] = {}
     first: dict[str, Trend] = {}
@@ -80,7 +80,7 @@ def judge(sources: Sequence[Source], numbers: Mapping[str, Published]) -> Judged
         for trend, other in zip(by[Reference.EQUILIBRIUM], by[Reference.MOTOR], strict=True):
             first.setdefault(trend.key, trend)
             found.setdefault(trend.key, []).extend(_verdicts(source.name, trend, other))
-    return Judged(
+    return ReportText(
         statements=tuple(
             Statement(trend=first[key], verdicts=tuple(each)) for key, each in found.items()
         ),
@@ -99,7 +99,7 @@ def _verdicts(source: str, equilibrium: Trend, motor: Trend) -> Iterator[Judgeme
         yield Judgement(source=source, about=about, trend=trend)
 
 
-def headlines(judged: Judged, source: str) -> list[Trend]:
+def headlines(judged: ReportText, source: str) -> list[Trend]:
     """The verdict of one campaign on each statement, about the reference that suits the setup."""
     return [
         next(verdict.trend for verdict in statement.verdicts if verdict.source == source)
@@ -108,9 +108,9 @@ def headlines(judged: Judged, source: str) -> list[Trend]:
 
 
 def page_html(
-    sources: Sequence[Source],
-    judged: Judged,
-    blocks: Sequence[Block],
+    sources: Sequence[CampaignSource],
+    judged: ReportText,
+    blocks: Sequence[FigureBlock],
     named: Sequence[Named],
 ) -> str:
     """The page as one self-contained HTML text.
@@ -138,7 +138,7 @@ def page_html(
     return render(TEMPLATE, context)
 
 
-def cell_rows(source: Source) -> tuple[CellRow, ...]:
+def cell_rows(source: CampaignSource) -> tuple[CellRow, ...]:
     """Every cell with rated periods, with its first and last rating."""
     return tuple(
         CellRow(
@@ -153,7 +153,7 @@ def cell_rows(source: Source) -> tuple[CellRow, ...]:
     )
 
 
-def _machines(source: Source) -> list[tuple[str, str]]:
+def _machines(source: CampaignSource) -> list[tuple[str, str]]:
     """Provenance of a campaign, entry by entry; machines are numbered where there are several."""
     machines = source.provenance
     several = len(machines) > 1

@@ -8,7 +8,7 @@ from legbench.design.setup import SetupKind
 from legbench.metrics.source import Reference
 from legbench.paper import Published
 from legbench.report.blocks import (
-    Block,
+    FigureBlock,
     planes_block,
     ratings_block,
     relabelled,
@@ -18,7 +18,7 @@ from legbench.report.blocks import (
 from legbench.report.judging import SETUP_NAMES
 from legbench.report.measures import TRANSIENT
 from legbench.report.named import Named
-from legbench.report.sources import Source
+from legbench.report.sources import CampaignSource
 from legbench.report.trends import BANG_BANG, STEP, THREE
 from legbench.viz.print._matplotlib import Figure
 from legbench.viz.print.figures import phase_figure
@@ -43,7 +43,7 @@ ABOUT: Final = {
 
 
 def rating_panels(
-    source: Source, reference: Reference, numbers: Mapping[str, Published]
+    source: CampaignSource, reference: Reference, numbers: Mapping[str, Published]
 ) -> tuple[RatingPanel, ...]:
     """Panels (a) to (f) of Fig. 5; none where the campaign has no sound run with rated periods."""
     curves = rating_curves(source.table, reference)
@@ -81,8 +81,8 @@ def _printed(numbers: Mapping[str, Published]) -> dict[str, tuple[PrintedRating,
 
 
 def blocks_of(
-    sources: Sequence[Source], named: Sequence[Named], numbers: Mapping[str, Published]
-) -> Iterator[Block]:
+    sources: Sequence[CampaignSource], named: Sequence[Named], numbers: Mapping[str, Published]
+) -> Iterator[FigureBlock]:
     """Figures of the page in the order of the paper: 4, 5, 6 and 7."""
     by_name = {each.name: each for each in named}
     yield _planes(by_name["step"])
@@ -104,7 +104,7 @@ def blocks_of(
     yield stills if stills is not None else without_panels("fig7", title, why)
 
 
-def _planes(named: Named) -> Block:
+def _planes(named: Named) -> FigureBlock:
     name, title = f"planes-{named.name}", TITLES[named.name]
     if named.recording is None:
         return without_panels(name, title, named.origin)
@@ -113,7 +113,9 @@ def _planes(named: Named) -> Block:
     return planes_block(name, title, caption, named.recording)
 
 
-def _ratings(source: Source, reference: Reference, numbers: Mapping[str, Published]) -> Block:
+def _ratings(
+    source: CampaignSource, reference: Reference, numbers: Mapping[str, Published]
+) -> FigureBlock:
     panels = rating_panels(source, reference, numbers)
     title = f"Fig. 5, {source.name}: P^r about the {reference.value}"
     name = f"ratings-{source.name}-{reference.value}"
@@ -127,7 +129,7 @@ def _ratings(source: Source, reference: Reference, numbers: Mapping[str, Publish
 
 
 def print_figures(
-    sources: Sequence[Source], named: Sequence[Named], numbers: Mapping[str, Published]
+    sources: Sequence[CampaignSource], named: Sequence[Named], numbers: Mapping[str, Published]
 ) -> Iterator[tuple[str, Figure]]:
     """Print figures by name, each drawn when it is asked for; those without data are left out."""
     recordings = {each.name: each.recording for each in named}

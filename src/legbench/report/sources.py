@@ -23,7 +23,7 @@ BENCH: Final = "bench"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Source:
+class CampaignSource:
     """Campaign of a report: its folder, its table and what it says of itself."""
 
     name: str
@@ -59,7 +59,7 @@ class InvalidRun:
     reason: str
 
 
-def read_source(name: str, folder: Path | str) -> Source:
+def read_source(name: str, folder: Path | str) -> CampaignSource:
     """Read the campaign in a folder.
 
     Args:
@@ -73,7 +73,7 @@ def read_source(name: str, folder: Path | str) -> Source:
     """
     folder = Path(folder)
     told = _json(folder / CAMPAIGN)
-    return Source(
+    return CampaignSource(
         name=name, folder=folder, table=read_table(folder), told=told, source=_text(folder / SOURCE)
     )
 

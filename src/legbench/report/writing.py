@@ -9,9 +9,9 @@ from legbench.errors import ConfigError
 from legbench.loop import Progress
 from legbench.paper import published
 from legbench.report.named import Named, named_experiments
-from legbench.report.page import Judged, headlines, judge, page_html
+from legbench.report.page import ReportText, headlines, judge, page_html
 from legbench.report.paper_figures import blocks_of, print_figures
-from legbench.report.sources import Source
+from legbench.report.sources import CampaignSource
 from legbench.viz.print.save import save_figure
 from legbench.writing import save_whole
 
@@ -20,7 +20,7 @@ FIGURES: Final = "figures"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Written:
+class WrittenReport:
     """Report that was written."""
 
     page: Path
@@ -30,12 +30,12 @@ class Written:
 
 
 def write_report(
-    sources: Sequence[Source],
+    sources: Sequence[CampaignSource],
     out: Path | str,
     *,
     suffixes: Sequence[str] = (),
     progress: Progress | None = None,
-) -> Written:
+) -> WrittenReport:
     """Write the report of campaigns.
 
     Args:
@@ -64,11 +64,11 @@ def write_report(
     ]
     content = report_content(sources, judged, named)
     content |= {"out": str(out), "figures": [str(path) for path in figures]}
-    return Written(page=out, figures=tuple(figures), content=content)
+    return WrittenReport(page=out, figures=tuple(figures), content=content)
 
 
 def report_content(
-    sources: Sequence[Source], judged: Judged, named: Sequence[Named]
+    sources: Sequence[CampaignSource], judged: ReportText, named: Sequence[Named]
 ) -> dict[str, Any]:
     """Everything that the page says in words and numbers, as plain values."""
     return {

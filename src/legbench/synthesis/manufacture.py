@@ -19,7 +19,7 @@ SMALLEST_WEIGHT = 1e-5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Row:
+class ManufactureRow:
     """One number of the manufacture table."""
 
     part: str
@@ -34,7 +34,7 @@ class Row:
     """Remark for the workshop; empty if there is nothing to mind."""
 
 
-def manufacture_table(design: LegDesign) -> tuple[Row, ...]:
+def manufacture_table(design: LegDesign) -> tuple[ManufactureRow, ...]:
     """Every number from which the leg is built, in the units of a workshop."""
     rows = [_row("trunk", "mass", "m_t", design.trunk_mass, "kg")]
     parts = zip(reaches(design), design.segments, strict=True)
@@ -78,9 +78,11 @@ def shown(value: float, unit: str) -> str:
     return f"{number:.{digits}f} {name}"
 
 
-def _row(part: str, quantity: str, symbol: str, value: float, unit: str, note: str = "") -> Row:
+def _row(
+    part: str, quantity: str, symbol: str, value: float, unit: str, note: str = ""
+) -> ManufactureRow:
     words = shown(value, unit)
-    return Row(
+    return ManufactureRow(
         part=part,
         quantity=quantity,
         symbol=symbol,
@@ -262,6 +264,6 @@ def adjust_leg(measured: LegDesign, target: LegDesign) -> Adjusted:
     )
 
 
-def table_to_json(rows: Sequence[Row]) -> list[dict[str, Any]]:
+def table_to_json(rows: Sequence[ManufactureRow]) -> list[dict[str, Any]]:
     """The table as JSON."""
     return [asdict(row) for row in rows]

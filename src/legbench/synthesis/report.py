@@ -8,7 +8,7 @@ from legbench.design.matching import Condition
 from legbench.design.mending import Mend, mends
 from legbench.design.realisable import reaches
 from legbench.design.requirements import VARIABLES
-from legbench.synthesis.manufacture import Adjusted, Row, beyond, shown
+from legbench.synthesis.manufacture import Adjusted, ManufactureRow, beyond, shown
 from legbench.synthesis.model_check import AGREES, TILT_AGREES, ModelCheck
 from legbench.synthesis.release import KEPT
 from legbench.synthesis.solve import Solution
@@ -116,7 +116,7 @@ def solution_lines(solution: Solution) -> list[str]:
     return lines
 
 
-def table_lines(rows: Sequence[Row]) -> list[str]:
+def table_lines(rows: Sequence[ManufactureRow]) -> list[str]:
     """The manufacture table, and what a workshop has to mind."""
     lines = []
     for row in rows:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from legbench.design.toml import UNITS, Table, load_tables, units_per_si
+from legbench.design.toml import UNITS, TomlTable, load_tables, units_per_si
 from legbench.errors import DesignError
 
 FARTHEST = 3.0
@@ -71,7 +71,7 @@ def tolerances_from_mapping(content: Mapping[str, Any]) -> Tolerances:
             f"unknown entries: {', '.join(sorted(unknown))}; there are units, tolerances"
         )
     per_si = units_per_si(content.get("units", {}), {"length": UNITS["length"]}) | {"ratio": 1.0}
-    table = Table("tolerances", content.get("tolerances", {}), per_si)
+    table = TomlTable("tolerances", content.get("tolerances", {}), per_si)
     given = {
         name: table.number(name, "length" if name in ABSOLUTE else "ratio")
         for name in TOLERANCES

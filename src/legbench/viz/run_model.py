@@ -7,7 +7,7 @@ import mujoco
 from legbench.errors import ConfigError, FormatError
 from legbench.mjcf import BuildOptions, Ground, Linkage, LinkageKind, build_spec
 from legbench.recording.description import RunDescription
-from legbench.recording.tables import Table
+from legbench.recording.tables import ManifestTable
 
 SHORTEST, LONGEST = 1e-3, 100.0
 """Legs and booms between these are drawn [m]; beyond them a manifest is damaged."""
@@ -22,7 +22,7 @@ def model_of(run: RunDescription) -> mujoco.MjModel:
     Raises:
         FormatError: the run describes no leg that can be drawn.
     """
-    tables = Table(entries=run.experiment)
+    tables = ManifestTable(entries=run.experiment)
     reach = sum(run.design.lengths)
     _check_length("design, length of the leg", reach, SHORTEST, LONGEST)
     if run.setup.boom_radius is not None:
@@ -42,7 +42,7 @@ def model_of(run: RunDescription) -> mujoco.MjModel:
         raise FormatError(f"the run describes no model that can be drawn: {why}") from error
 
 
-def _linkage_of(table: Table) -> Linkage:
+def _linkage_of(table: ManifestTable) -> Linkage:
     """Read the linkage of a run; what an older one lacks has its default.
 
     Raises:

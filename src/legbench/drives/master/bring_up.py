@@ -22,7 +22,7 @@ from legbench.drives.protocol.nmt import NmtCommand, nmt_frame
 from legbench.drives.protocol.sdo import ABSENT
 from legbench.drives.setup.config import BusConfig, Identity, NodeConfig
 from legbench.drives.setup.configuration import configuration
-from legbench.drives.setup.outcome import Outcome
+from legbench.drives.setup.outcome import ObjectOutcome
 from legbench.drives.setup.quirks import ModeShown
 from legbench.interrupts import shielded
 
@@ -119,11 +119,11 @@ class BringUp:
         if failed is not None:
             raise failed
 
-    def compare(self, node: NodeConfig) -> tuple[Outcome, ...]:
+    def compare(self, node: NodeConfig) -> tuple[ObjectOutcome, ...]:
         """Compare what a drive holds with its configuration, object by object; writes nothing."""
         return read_configuration(self.sdo(node), tuple(configuration(self._bus, node)))
 
-    def differences(self, node: NodeConfig) -> list[Outcome]:
+    def differences(self, node: NodeConfig) -> list[ObjectOutcome]:
         """Objects that a drive holds otherwise, or lacks and must not; writes nothing."""
         return [
             entry
@@ -131,7 +131,7 @@ class BringUp:
             if not entry.agrees and (entry.there is not None or not entry.passes)
         ]
 
-    def refuse_differences(self) -> dict[str, tuple[Outcome, ...]]:
+    def refuse_differences(self) -> dict[str, tuple[ObjectOutcome, ...]]:
         """Raise DriveError for the first drive that differs, for a master that may not configure.
 
         Process data that is mapped otherwise would be read as what it is not. Command frames
@@ -139,7 +139,7 @@ class BringUp:
         neither does a protection that the drive lacks or holds otherwise. Returns what every drive
         holds, by the name of its node.
         """
-        found: dict[str, tuple[Outcome, ...]] = {}
+        found: dict[str, tuple[ObjectOutcome, ...]] = {}
         for node in self._bus.nodes:
             found[node.name] = self.compare(node)
             different = [
@@ -158,7 +158,7 @@ class BringUp:
                 )
         return found
 
-    def configure(self, node: NodeConfig) -> tuple[Outcome, ...]:
+    def configure(self, node: NodeConfig) -> tuple[ObjectOutcome, ...]:
         """Write the configuration and read every object back; returns what became of each.
 
         Raises:

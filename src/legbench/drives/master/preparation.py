@@ -7,13 +7,13 @@ from legbench.drives.master.bring_up import BringUp
 from legbench.drives.master.cycle import Cycle
 from legbench.drives.protocol.nmt import NmtState
 from legbench.drives.setup.config import BusConfig, NodeConfig
-from legbench.drives.setup.outcome import Outcome
+from legbench.drives.setup.outcome import ObjectOutcome
 from legbench.drives.setup.taken import check_taken
 
 
 def prepare_to_move(
     bring_up: BringUp, config: BusConfig, *, speed: float
-) -> dict[str, tuple[Outcome, ...]]:
+) -> dict[str, tuple[ObjectOutcome, ...]]:
     """Take the power from all drives, configure them, and set each target to its motor position.
 
     Args:

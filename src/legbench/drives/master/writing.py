@@ -14,7 +14,7 @@ from legbench.drives.setup.outcome import (
     CYCLE,
     CYCLE_INDEX,
     MISSING,
-    Outcome,
+    ObjectOutcome,
     cycle_count,
     judge,
 )
@@ -23,7 +23,7 @@ from legbench.drives.setup.parameters import Parameter
 
 def write_configuration(
     sdo: SdoPort, node: NodeConfig, parameters: Sequence[Parameter]
-) -> tuple[Outcome, ...]:
+) -> tuple[ObjectOutcome, ...]:
     """Write objects in order and read back the last value of each.
 
     A refusal ends nothing here: a value that is there already counts as written.
@@ -57,7 +57,7 @@ def write_configuration(
     return outcomes
 
 
-def read_configuration(sdo: SdoPort, parameters: Sequence[Parameter]) -> tuple[Outcome, ...]:
+def read_configuration(sdo: SdoPort, parameters: Sequence[Parameter]) -> tuple[ObjectOutcome, ...]:
     """Compare what a drive holds with a configuration; nothing is written.
 
     Raises:
@@ -70,7 +70,7 @@ def read_configuration(sdo: SdoPort, parameters: Sequence[Parameter]) -> tuple[O
     return judge(wanted, held, codes)
 
 
-def check_outcomes(node: NodeConfig, outcomes: Iterable[Outcome]) -> None:
+def check_outcomes(node: NodeConfig, outcomes: Iterable[ObjectOutcome]) -> None:
     """Refuse a drive that does not hold what is required; raises DriveError for the first object.
 
     Where the drive has aborted the transfer, the error is an SdoAbortError with its code.

@@ -44,7 +44,7 @@ class Need(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Row:
+class NeedRow:
     """Entry of the table: what an object is for, and what a drive without it leaves to others."""
 
     need: Need
@@ -125,63 +125,65 @@ def _brakes(wanted: int, there: int) -> bool:
 
 
 _REQUIRED, _PROTECTION, _OPTIONAL = Need.REQUIRED, Need.PROTECTION, Need.OPTIONAL
-_OFFSET = Row(need=_REQUIRED, purpose="an offset of every target, which must be 0", may_lack=True)
-_RAMP = Row(
+_OFFSET = NeedRow(
+    need=_REQUIRED, purpose="an offset of every target, which must be 0", may_lack=True
+)
+_RAMP = NeedRow(
     need=_PROTECTION,
     purpose="the ramp of a quick stop",
     instead="the deceleration that its maker has set, with which the way of a stop is not known",
     agrees=_at_least,
 )
-_SOFT = Row(
+_SOFT = NeedRow(
     need=_PROTECTION,
     purpose="the drive's own limit of its range",
     instead="motor_range of the limits file, in the master",
     agrees=_near,
 )
-_CYCLE = Row(
+_CYCLE = NeedRow(
     need=_REQUIRED,
     purpose="the time over which a drive interpolates, which must be that of SYNC",
     instead="the time that its maker has set; it must be that of SYNC",
     may_lack=True,
 )
 _LIMP = "the drive's own choice, which may be no torque at all; no stop from here asks for it"
-TABLE: Mapping[Key, Row] = {
-    (0x1005, 0): Row(
+TABLE: Mapping[Key, NeedRow] = {
+    (0x1005, 0): NeedRow(
         need=_REQUIRED,
         purpose="SYNC from the master, with identifier 80h",
         may_lack=True,
         agrees=_sync,
     ),
-    (0x1006, 0): Row(
+    (0x1006, 0): NeedRow(
         need=_PROTECTION,
         purpose="the drive's watch over SYNC",
         instead="its watch over the master's heartbeat or over its commands",
     ),
-    (0x1016, 1): Row(
+    (0x1016, 1): NeedRow(
         need=_PROTECTION,
         purpose="the drive's watch over the master's heartbeat",
         instead="the deadline of its commands (140xh:05)",
         agrees=_watched,
     ),
-    (0x1017, 0): Row(
+    (0x1017, 0): NeedRow(
         need=_PROTECTION,
         purpose="the drive's own heartbeat",
         instead="its process data, due after every SYNC",
         agrees=_time,
     ),
-    (0x1029, 1): Row(
+    (0x1029, 1): NeedRow(
         need=_OPTIONAL,
         purpose="leaving operational after a communication error",
         instead="the standard's default, which is the same",
     ),
-    (0x6007, 0): Row(
+    (0x6007, 0): NeedRow(
         need=_PROTECTION,
         purpose="a quick stop where the connection is lost",
         instead="what its maker has set: whether the drive stops then is not known",
         agrees=_stops,
         fallbacks={3: (1,)},
     ),
-    (0x605A, 0): Row(
+    (0x605A, 0): NeedRow(
         need=_REQUIRED,
         purpose="braking by quick stop, by 2 on the ramp 6085h or by 1 on 6084h of the bus file",
         instead="the standard's default, 2",
@@ -189,40 +191,40 @@ TABLE: Mapping[Key, Row] = {
         agrees=_brakes,
         fallbacks={2: (6,), 1: (5,)},
     ),
-    (0x605B, 0): Row(need=_OPTIONAL, purpose="braking at shutdown", instead=_LIMP),
-    (0x605C, 0): Row(need=_OPTIONAL, purpose="braking when disabled", instead=_LIMP),
-    (0x605D, 0): Row(
+    (0x605B, 0): NeedRow(need=_OPTIONAL, purpose="braking at shutdown", instead=_LIMP),
+    (0x605C, 0): NeedRow(need=_OPTIONAL, purpose="braking when disabled", instead=_LIMP),
+    (0x605D, 0): NeedRow(
         need=_OPTIONAL,
         purpose="braking by halt on the quick-stop ramp",
         instead=_LIMP,
         agrees=_positive,
         fallbacks={2: (1,)},
     ),
-    (0x605E, 0): Row(
+    (0x605E, 0): NeedRow(
         need=_PROTECTION,
         purpose="braking on a fault",
         instead="the drive's own choice: a motor may coast after a fault",
         agrees=_positive,
         fallbacks={2: (1,)},
     ),
-    (0x6060, 0): Row(
+    (0x6060, 0): NeedRow(
         need=_REQUIRED,
         purpose="the choice of cyclic synchronous position mode",
         instead="the mode that it is in, by 6061h",
         may_lack=True,
     ),
-    (0x6065, 0): Row(
+    (0x6065, 0): NeedRow(
         need=_PROTECTION,
         purpose="the drive's own following error window",
         instead="following_error of the limits file, in the master",
         agrees=_at_most,
     ),
-    (0x6066, 0): Row(
+    (0x6066, 0): NeedRow(
         need=_OPTIONAL,
         purpose="the delay of the following error",
         instead="the delay that its maker has set",
     ),
-    (0x6072, 0): Row(
+    (0x6072, 0): NeedRow(
         need=_PROTECTION,
         purpose="the limit of torque",
         instead="the current limit that its maker has set",
@@ -230,7 +232,7 @@ TABLE: Mapping[Key, Row] = {
     ),
     (0x607D, 1): _SOFT,
     (0x607D, 2): _SOFT,
-    (0x607E, 0): Row(need=_REQUIRED, purpose="the polarity, which must be 0", may_lack=True),
+    (0x607E, 0): NeedRow(need=_REQUIRED, purpose="the polarity, which must be 0", may_lack=True),
     (0x6084, 0): _RAMP,
     (0x6085, 0): _RAMP,
     (0x60B0, 0): _OFFSET,
@@ -240,35 +242,37 @@ TABLE: Mapping[Key, Row] = {
     (0x60C2, 2): _CYCLE,
 }
 """Every object that is written to a drive, but process data and those of the bus file alone."""
-_ASKED = Row(need=_REQUIRED, purpose="the bus file asks for it: correct it there, or leave it out")
-_MAPPING = Row(
+_ASKED = NeedRow(
+    need=_REQUIRED, purpose="the bus file asks for it: correct it there, or leave it out"
+)
+_MAPPING = NeedRow(
     need=_REQUIRED,
     purpose="process data: a drive whose mapping is fixed needs a bus file that maps the same",
 )
-DEADLINE = Row(
+DEADLINE = NeedRow(
     need=_PROTECTION,
     purpose="the deadline of its commands",
     instead="its watch over the master's heartbeat (1016h)",
     agrees=_time,
 )
-_USED = Row(need=_REQUIRED, purpose="process data, switched on", agrees=_cob)
-_SPARE_RPDO = Row(
+_USED = NeedRow(need=_REQUIRED, purpose="process data, switched on", agrees=_cob)
+_SPARE_RPDO = NeedRow(
     need=_OPTIONAL,
     purpose="switching off commands that nobody sends",
     may_lack=True,
     agrees=_off,
 )
-_SPARE_TPDO = Row(
+_SPARE_TPDO = NeedRow(
     need=_REQUIRED,
     purpose="switching off process data that nobody asked for: name it in the bus file instead",
     may_lack=True,
     agrees=_off,
 )
-_COMMAND_TYPE = Row(need=_REQUIRED, purpose="commands that act at SYNC", agrees=_latched)
-_ANSWER_TYPE = Row(need=_REQUIRED, purpose="an answer to every SYNC")
+_COMMAND_TYPE = NeedRow(need=_REQUIRED, purpose="commands that act at SYNC", agrees=_latched)
+_ANSWER_TYPE = NeedRow(need=_REQUIRED, purpose="an answer to every SYNC")
 
 
-def row_of(parameter: Parameter) -> Row:
+def row_of(parameter: Parameter) -> NeedRow:
     """Return the entry of the table for an object, process data and a bus file's own included."""
     index, sub = parameter.key
     known = TABLE.get(parameter.key)

@@ -6,7 +6,7 @@ from fractions import Fraction
 
 from legbench.drives.protocol.objects import Key, name_of
 from legbench.drives.protocol.sdo import ABSENT, MEANINGS, Abort
-from legbench.drives.setup.needs import Need, Row, row_of
+from legbench.drives.setup.needs import Need, NeedRow, row_of
 from legbench.drives.setup.parameters import PDO_OBJECTS, Parameter
 
 MISSING = (Abort.NO_OBJECT, Abort.NO_SUB_INDEX)
@@ -18,7 +18,7 @@ CYCLE, CYCLE_INDEX = (0x60C2, 1), (0x60C2, 2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Outcome:
+class ObjectOutcome:
     """Outcome of one object of the configuration on one drive."""
 
     parameter: Parameter
@@ -30,7 +30,7 @@ class Outcome:
     """Abort code with which the drive refused the object; none if it took it."""
 
     @property
-    def row(self) -> Row:
+    def row(self) -> NeedRow:
         """Entry of the table of needs."""
         return row_of(self.parameter)
 
@@ -103,7 +103,7 @@ def judge(
     parameters: Iterable[Parameter],
     held: Mapping[Key, int],
     codes: Mapping[Key, int],
-) -> tuple[Outcome, ...]:
+) -> tuple[ObjectOutcome, ...]:
     """Return what became of every object, the last value of each, in writing order.
 
     Args:
@@ -116,7 +116,7 @@ def judge(
     same_cycle = _period(held) is not None and _period(held) == _period(
         {key: parameter.value for key, parameter in wanted.items()}
     )
-    outcomes: list[Outcome] = []
+    outcomes: list[ObjectOutcome] = []
     for key, parameter in wanted.items():
         there, code = held.get(key), codes.get(key)
         if there is not None:
@@ -125,7 +125,7 @@ def judge(
         else:
             # An object that is write-only was taken, and nobody can say more.
             agrees = code is None or code == Abort.WRITE_ONLY
-        outcomes.append(Outcome(parameter=parameter, there=there, agrees=agrees, code=code))
+        outcomes.append(ObjectOutcome(parameter=parameter, there=there, agrees=agrees, code=code))
     return tuple(outcomes)
 
 
@@ -151,7 +151,7 @@ def cycle_count(value: int, index: int, there: int) -> int | None:
     return int(count) if count.denominator == 1 and 1 <= count <= 255 else None
 
 
-def held_by(outcomes: Iterable[Outcome]) -> dict[Key, int]:
+def held_by(outcomes: Iterable[ObjectOutcome]) -> dict[Key, int]:
     """Return what a drive holds of its configuration, by index and sub-index.
 
     An object that was taken and cannot be read counts as taken; a missing one is left out.

@@ -8,12 +8,12 @@ from legbench.drives.protocol.objects import Key, name_of
 from legbench.drives.setup.config import BusConfig
 from legbench.drives.setup.configuration import quick_stop_ramp
 from legbench.drives.setup.master_watch import check_master_watch
-from legbench.drives.setup.needs import DEADLINE, RPDOS, TABLE, Need, Row
-from legbench.drives.setup.outcome import Outcome, held_by
+from legbench.drives.setup.needs import DEADLINE, RPDOS, TABLE, Need, NeedRow
+from legbench.drives.setup.outcome import ObjectOutcome, held_by
 from legbench.errors import ConfigError
 from legbench.limits.upper_ends import QUICK_STOP_RAMP
 
-Outcomes = Mapping[str, Sequence[Outcome]]
+Outcomes = Mapping[str, Sequence[ObjectOutcome]]
 """Name of a node -> what became of each object of its configuration."""
 HEARTBEAT = (0x1017, 0)
 RAMPS = ((0x6085, 0), (0x6084, 0))
@@ -66,7 +66,7 @@ def _lacking(outcomes: Outcomes) -> str:
     )
 
 
-def _deadline(entry: Outcome) -> bool:
+def _deadline(entry: ObjectOutcome) -> bool:
     index, sub = entry.parameter.key
     return index >> 9 == 0x1400 >> 9 and sub == 5
 
@@ -87,7 +87,7 @@ def unprotected(outcomes: Outcomes) -> tuple[str, ...]:
     )
 
 
-def not_given(written: Collection[Key]) -> Iterator[tuple[Key, Row]]:
+def not_given(written: Collection[Key]) -> Iterator[tuple[Key, NeedRow]]:
     """Yield the protections that a bus file gives no value for, with their entries of the table.
 
     Args:
@@ -103,6 +103,6 @@ def not_given(written: Collection[Key]) -> Iterator[tuple[Key, Row]]:
         yield FIRST_DEADLINE, DEADLINE
 
 
-def tells_heartbeat(outcomes: Sequence[Outcome]) -> bool:
+def tells_heartbeat(outcomes: Sequence[ObjectOutcome]) -> bool:
     """Whether a drive produces its heartbeat (1017h) often enough to be watched by it."""
     return all(entry.agrees for entry in outcomes if entry.parameter.key == HEARTBEAT)

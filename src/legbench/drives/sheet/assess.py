@@ -10,7 +10,7 @@ from legbench.drives.protocol.pdo import Mapped
 from legbench.drives.setup.config import BusConfig, NodeConfig, PdoConfig
 from legbench.drives.setup.master_watch import Means, means_of
 from legbench.drives.setup.needs import MAPPINGS, Need
-from legbench.drives.setup.outcome import Outcome, held_by
+from legbench.drives.setup.outcome import ObjectOutcome, held_by
 from legbench.drives.setup.taken import not_given
 from legbench.drives.sheet.data_sheet import DataSheet
 from legbench.drives.sheet.predict import predict
@@ -61,7 +61,7 @@ class Assessment:
     """What is not protected, and what takes its place, a line each."""
     means: tuple[Means, ...]
     """Ways in which the drive notices that its master is gone."""
-    outcomes: tuple[Outcome, ...]
+    outcomes: tuple[ObjectOutcome, ...]
 
 
 def assess(
@@ -101,11 +101,11 @@ def short_name(kind: DataType) -> str:
     return next(name for name, known in SHORT_NAMES.items() if known is kind)
 
 
-def _is_mapping(entry: Outcome) -> bool:
+def _is_mapping(entry: ObjectOutcome) -> bool:
     return any(entry.parameter.index in mapping for mapping in MAPPINGS)
 
 
-def _finding(entry: Outcome) -> Finding:
+def _finding(entry: ObjectOutcome) -> Finding:
     state = State.LACKS if entry.missing else State.HAS if entry.code is None else State.FIXED
     return Finding(
         object=entry.name,
@@ -115,7 +115,7 @@ def _finding(entry: Outcome) -> Finding:
     )
 
 
-def _nothing_lost(entry: Outcome) -> str:
+def _nothing_lost(entry: ObjectOutcome) -> str:
     return "may be missing, nothing is lost" if entry.missing and entry.passes else ""
 
 
@@ -165,7 +165,9 @@ def _reads(sheet: DataSheet) -> Iterator[Finding]:
         )
 
 
-def _problems(sheet: DataSheet, node: NodeConfig, outcomes: Iterable[Outcome]) -> Iterator[str]:
+def _problems(
+    sheet: DataSheet, node: NodeConfig, outcomes: Iterable[ObjectOutcome]
+) -> Iterator[str]:
     """Yield reasons for which the drive cannot be used, each with its object and the way out."""
     device = sheet.default((0x1000, 0), node.node_id)
     if device is not None and device & 0xFFFF != PROFILE_402:

@@ -10,11 +10,11 @@ from legbench.drives.protocol.sdo import Abort
 from legbench.drives.setup.config import BusConfig, NodeConfig, Parameter
 from legbench.drives.setup.configuration import configuration
 from legbench.drives.setup.needs import MAPPINGS, RPDOS, TPDOS, row_of
-from legbench.drives.setup.outcome import CYCLE, CYCLE_INDEX, Outcome, cycle_count, judge
+from legbench.drives.setup.outcome import CYCLE, CYCLE_INDEX, ObjectOutcome, cycle_count, judge
 from legbench.drives.sheet.data_sheet import DataSheet
 
 
-def predict(sheet: DataSheet, bus: BusConfig, node: NodeConfig) -> tuple[Outcome, ...]:
+def predict(sheet: DataSheet, bus: BusConfig, node: NodeConfig) -> tuple[ObjectOutcome, ...]:
     """Return what becomes of every object of a node's configuration on the drive of a data sheet.
 
     An object that is fixed and whose value the data sheet does not tell is given the benefit of the

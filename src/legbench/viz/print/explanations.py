@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from legbench.explain.explanation import Explanation
-from legbench.explain.fitting import Fit
+from legbench.explain.fitting import CauseFit
 from legbench.viz.print._matplotlib import Figure, styled
 from legbench.viz.print.modes import DPI, GREY
 from legbench.viz.print.save import save_figure
@@ -49,7 +49,7 @@ def plot_explanation(found: Explanation, path: Path) -> Path:
         return save_figure(figure, path, DPI)
 
 
-def _shapes(axes: Any, found: Explanation, fits: list[Fit]) -> None:
+def _shapes(axes: Any, found: Explanation, fits: list[CauseFit]) -> None:
     """Draw target, perfect leg and fits."""
     target = found.target
     periods = np.arange(1, len(target.shape) + 1)
@@ -80,7 +80,7 @@ def _line(axes: Any, ratings: Any, place: int, label: str | None) -> None:
     axes.plot(periods, ratings, color=colour, marker=mark, ms=4, lw=1.1, label=label)
 
 
-def _label(fit: Fit) -> str:
+def _label(fit: CauseFit) -> str:
     return ", ".join(
         f"{cause.name} {cause.shown(size)}"
         for cause, size in zip(fit.causes, fit.sizes, strict=True)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from legbench.modes.basin import Fate, Question
+from legbench.modes.basin import BasinTask, Fate
 from legbench.modes.hop_family import HopFamily, Member
 from legbench.modes.settings import Setting
 from legbench.signals import Floats, Ints
@@ -55,7 +55,7 @@ def plot_return(heights: Floats, fixed: Floats, title: str, path: Path) -> None:
         save_figure(figure, path, DPI)
 
 
-def plot_basin(question: Question, fates: Ints, path: Path) -> None:
+def plot_basin(question: BasinTask, fates: Ints, path: Path) -> None:
     """The grid of starts, coloured by where they lead."""
     with styled():
         figure = Figure(figsize=(7.4, 4.4), layout="constrained")

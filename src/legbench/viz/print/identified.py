@@ -6,9 +6,9 @@ from typing import Final
 import numpy as np
 
 from legbench.identify.adequacy import ROWS
-from legbench.identify.outcome import Estimate, Outcome
-from legbench.identify.staged import Question
-from legbench.identify.trial import Trial
+from legbench.identify.outcome import Estimate, Identification
+from legbench.identify.staged import IdentificationTask
+from legbench.identify.trial import MeasuredRun
 from legbench.signals import Floats
 from legbench.viz.print._matplotlib import Axes, Figure, styled
 
@@ -16,7 +16,7 @@ COLOURS: Final = ("#1f5fa8", "#c8622d")
 """Colours of q1 and q2."""
 
 
-def identified_figure(question: Question, outcome: Outcome) -> Figure:
+def identified_figure(question: IdentificationTask, outcome: Identification) -> Figure:
     """Draw estimates against the design, and residuals by run and joint.
 
     Residuals are means over `ROWS` rows, which noise hardly moves; bands are what noise and counts
@@ -53,7 +53,7 @@ def _intervals(axes: Axes, estimates: Sequence[Estimate]) -> None:
     axes.set_ylabel("against the design [%]")
 
 
-def _residuals(axes: Axes, trial: Trial, residuals: Floats, outcome: Outcome) -> None:
+def _residuals(axes: Axes, trial: MeasuredRun, residuals: Floats, outcome: Identification) -> None:
     count = len(residuals) // ROWS
     times = trial.time[: count * ROWS].reshape(count, ROWS).mean(axis=1)
     known = [each for each in outcome.residuals if each.run == trial.name]
