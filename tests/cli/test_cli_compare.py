@@ -76,7 +76,7 @@ def test_json_and_figure(runs: Runs, tmp_path: Path, capsys: pytest.CaptureFixtu
     [
         (["--align", "touchdown"], 1, "has 0 events of kind touchdown"),
         (["--span", "0"], 2, "--span is 0 s; it must be more than 0 s"),
-        (["--figure", "both.bmp"], 1, "a figure cannot be written as 'both.bmp'"),
+        (["--figure", "both.bmp"], 2, "a figure cannot be written as 'both.bmp'"),
     ],
 )
 def test_what_cannot_be_compared(

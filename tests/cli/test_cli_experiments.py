@@ -186,7 +186,7 @@ def test_a_file_that_makes_no_sense_is_refused(
     assert old in FILE
     file.write_text(FILE.replace(old, new), encoding="utf-8")
     done = called(capfd, "run", file, "--out", tmp_path / "runs", "--json")
-    assert (done.status, done.out, done.err.count("\n")) == (2 if new == "bang" else 1, "", 1)
+    assert (done.status, done.out, done.err.count("\n")) == (2, "", 1)
     for word in words:
         assert word in done.err
     assert not (tmp_path / "runs").exists()
@@ -236,15 +236,15 @@ def test_a_design_inside_an_experiment_is_as_strict(
             "no controller 'walk'; there are jump, bang-bang, position-jump, chirp, or a class",
         ),
         (("jump", "--plant", "horse"), 2, "no plant 'horse'; there are sim, analytic, can"),
-        (("nowhere.toml",), 1, "nowhere.toml: no such experiment file"),
+        (("nowhere.toml",), 2, "nowhere.toml: no such experiment file"),
         (("--again", "nowhere"), 1, "nowhere is no run folder: it has no run.json"),
         (("jump", "--again", "nowhere"), 2, "--again runs its own experiment; leave 'jump' out"),
-        (("jump", "--set", "seed"), 1, "--set seed: write dotted.key=value"),
-        (("jump", "--set", "seed=[1"), 1, "--set seed: '[1' is no value"),
-        (("jump", "--set", "seed.x.y=1"), 1, "seed: is {'x': {'y': 1}}; it must be a whole number"),
-        (("jump", "--set", "seed=-1"), 1, "seed is -1; it must be 0 to"),
-        (("jump", "--channel", "can0"), 1, "channel: settings of plant can; plant sim has none"),
-        ((f"{GUESTS / 'impostors.py'}:NoBuild",), 1, "is no controller: it lacks build(targets)"),
+        (("jump", "--set", "seed"), 2, "--set seed: write dotted.key=value"),
+        (("jump", "--set", "seed=[1"), 2, "--set seed: '[1' is no value"),
+        (("jump", "--set", "seed.x.y=1"), 2, "seed: is {'x': {'y': 1}}; it must be a whole number"),
+        (("jump", "--set", "seed=-1"), 2, "seed is -1; it must be 0 to"),
+        (("jump", "--channel", "can0"), 2, "channel: settings of plant can; plant sim has none"),
+        ((f"{GUESTS / 'impostors.py'}:NoBuild",), 2, "is no controller: it lacks build(targets)"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else None,
 )

@@ -18,7 +18,7 @@ from legbench.shipped import shipped_root
 
 def refused(capsys: pytest.CaptureFixture[str], *words: str) -> str:
     """The one line that a command is refused with."""
-    assert main(list(words)) == 1
+    assert main(list(words)) == 2
     told = capsys.readouterr()
     assert told.out == ""
     assert told.err.count("\n") == 1

@@ -80,7 +80,7 @@ def test_a_link_that_is_not_known_has_no_limits_and_the_other_one_keeps_its_own(
 
 def test_readings_of_another_number_of_links_are_refused() -> None:
     for links in ((-0.5,), (-0.5, 0.5, 0.5)):
-        with pytest.raises(ValueError, match="zip"):
+        with pytest.raises(ValueError, match="values to unpack"):
             seen(started(LIMITS), joint_pos=links)
 
 

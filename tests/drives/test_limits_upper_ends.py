@@ -25,6 +25,7 @@ ENDS = {
     "following_cycles": (50.0, 5000.0, "cycles"),
     "servo_bandwidth": (1000.0, 10_000.0, "Hz"),
     "joint_speed": (200.0, 1000.0, "rad/s"),
+    "link_error": (0.1, 6.3, "rad"),
     "standing": (0.2, 6.3, "rad"),
     "sway": (0.5, 6.3, "rad"),
     "temperature": (120.0, 200.0, "deg C"),

@@ -210,6 +210,7 @@ def test_the_command_writes_numbers_experiment_and_figures(
     shown = capfd.readouterr()
     assert "effects one at a time: 3 legs" in shown.err
     content = json.loads(shown.out)
+    assert content.pop("out") == str(tmp_path / "x")
     assert content == json.loads((tmp_path / "x" / "explain.json").read_text())
     best = content["judged"][0]
     assert best["causes"][0]["cause"] == "link-zero-polar"

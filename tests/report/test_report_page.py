@@ -209,7 +209,7 @@ def test_a_table_alone_is_reported_and_invalid_runs_are_flagged(
 def test_a_folder_without_a_table_is_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["report", str(tmp_path)]) == 1
+    assert main(["report", str(tmp_path)]) == 2
     told = capsys.readouterr()
     assert told.out == ""
     assert told.err.startswith(f"legbench: {tmp_path / 'table.parquet'} is not there")

@@ -204,7 +204,7 @@ def test_the_command_lists_and_chooses(runs: Path, capsys: pytest.CaptureFixture
     assert told["runs"] == [{"run": "deep/er/c"}, {"run": "b"}, {"run": "a"}]
     assert main(["runs", str(runs)]) == 0
     assert capsys.readouterr().out.startswith("run        setup  controller  z2 [rad]")
-    assert main(["runs", str(runs), "--sort", "speed"]) == 1
+    assert main(["runs", str(runs), "--sort", "speed"]) == 2
     assert "no run has a figure or setting 'speed'" in capsys.readouterr().err
 
 
