@@ -44,6 +44,7 @@ class Wires:
         self.server = made.enter_context(ChannelsServer(self.networks, paths, self._clock))
         self.ports = [made.enter_context(UnixBus(str(path))) for path in paths]
         self.master = SplitBus(self.ports, self.config)
+        made.callback(self.master.shutdown)
 
     def _clock(self) -> int:
         self.now_ns += MS // 10
