@@ -111,8 +111,8 @@ import time, os
 began = time.perf_counter(), time.process_time()
 import pickle, sys
 trials, design = pickle.load(open(sys.argv[1], "rb"))
-from legbench.identify import Question, identify
-outcome = identify(Question(design=design, trials=trials))
+from legbench.identify import IdentificationTask, identify
+outcome = identify(IdentificationTask(design=design, trials=trials))
 now = time.perf_counter(), time.process_time()
 print(f"k, d of three runs, everything imported and compiled anew: {now[0] - began[0]:.2f} s, "
       f"{now[1] - began[1]:.2f} s of CPU, {outcome.evaluations} evaluations, "
@@ -133,11 +133,11 @@ def cold(trials: tuple[MeasuredRun, ...], folder: Path) -> None:
 PEER = """
 import pickle, resource, sys
 trials, design = pickle.load(open(sys.argv[1], "rb"))
-from legbench.identify import Question
+from legbench.identify import IdentificationTask
 from legbench.identify.peer import ask_peer
 limit = int(resource.getrusage(resource.RUSAGE_SELF).ru_utime + float(sys.argv[2])) + 1
 resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
-answer = ask_peer(Question(design=design, trials=trials))
+answer = ask_peer(IdentificationTask(design=design, trials=trials))
 pickle.dump(answer, open(sys.argv[1] + ".answer", "wb"))
 """
 
