@@ -42,7 +42,7 @@ def test_no_fault_survives(trial: FaultTrial, tmp_path: Path) -> None:
         assert 0 < result.cycles <= WITHIN
 
 
-@pytest.mark.long  # Its viewer is a real process, which a busy machine may end before it is stopped.
+@pytest.mark.long  # Its viewer is a real process, which may end early on a busy machine.
 def test_a_viewer_that_hangs_changes_neither_the_loop_nor_the_recording(tmp_path: Path) -> None:
     design = load_design(ROOT / "models" / "optimal.toml")
     stopped, views = [], []
