@@ -1,6 +1,7 @@
 """Try every fault in mid-jump on the emulated leg; the table of docs/drives.md on stdout."""
 
 import tempfile
+import time
 from pathlib import Path
 
 from legbench.commissioning.fault_table import TRIALS
@@ -9,6 +10,8 @@ from legbench.design import load_design
 from legbench.viz.live.launch import LiveView, start_live
 
 ROOT = Path(__file__).parents[1]
+PATIENCE = 30.0
+"""Time that a view may take to begin [s]."""
 EXIT = {"complete": 0, "interrupted": 0, "fault": 1}
 
 
@@ -26,8 +29,11 @@ def row(result: Result) -> str:
 
 
 def view(run: Path) -> LiveView:
-    """A live view that needs no screen."""
-    return start_live(run, save=run / "live.rrd")
+    """A live view that needs no screen and has begun; the run's own time stands meanwhile."""
+    started, end = start_live(run, save=run / "live.rrd"), time.monotonic() + PATIENCE
+    while not (run / "live.rrd").exists() and time.monotonic() < end:
+        time.sleep(0.02)
+    return started
 
 
 def main() -> None:

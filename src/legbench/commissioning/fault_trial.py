@@ -19,6 +19,7 @@ from legbench.drives.protocol.cia402 import DriveState
 from legbench.drives.setup.bus_file import load_bus, load_limits
 from legbench.errors import ConfigError
 from legbench.experiment import Experiment, make_controller, start_of, targets_of
+from legbench.experiment.manifest import manifest_of
 from legbench.interrupts import StopFlag
 from legbench.loop import Outcome, run
 from legbench.plant.can import CanPlant
@@ -98,15 +99,13 @@ def try_fault(
         raise ConfigError(f"the trial '{trial.name}' needs a viewer to freeze: give start_view")
     config, limits = load_bus(bus_file), load_limits(bus_file.parent / LIMITS_NAME)
     choice = CanChoice(bus=bus_file, interface=EMULATED, faults=trial.faults, end=End.STOP)
-    chosen = Experiment(design=design, controller=JumpConfig())
+    chosen = Experiment(design=design, controller=JumpConfig(), plant=choice)
     start = start_of(chosen)
     leg = Leg(design=design, options=chosen.options, start=start, servo=chosen.servo)
     opened = open_plant(choice, leg)
     network = _network(opened)
-    with (
-        opened.plant,
-        RunWriter.create(out, {"plant": "can"} | opened.facts, name="trial") as writer,
-    ):
+    manifest = manifest_of(chosen, start, None, opened.plant.period, opened.facts, out)
+    with opened.plant, RunWriter.create(out, manifest, name="trial") as writer:
         opened.start_log(writer)
         outcome = _viewed(trial, opened, chosen, writer, start_view)
         strike_ns = network.now_ns if trial.gone or trial.interrupted else STRIKE_NS
