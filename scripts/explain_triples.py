@@ -23,7 +23,7 @@ from legbench.explain.causes import CAUSES, Cause, combined
 from legbench.explain.consistency import checks_of, only_counted, predict
 from legbench.explain.engine import rate_many
 from legbench.explain.fitting import DIFFERENCE, CauseFit, leg_of, rate
-from legbench.explain.jumping import JumpFit, hop_of
+from legbench.explain.jumping import PredictedHop, hops_of
 from legbench.explain.least_squares import refine
 from legbench.explain.targets import READING, Target, step_experiment, step_target
 from legbench.imperfections import Imperfections
@@ -145,7 +145,7 @@ def fitted(design: LegDesign, target: Target) -> list[CauseFit]:
     return [fits[place] for place in order]
 
 
-def lowest(hop: JumpFit) -> float:
+def lowest(hop: PredictedHop) -> float:
     """Distance of a jump from the bounds of its stances and flights, the worse of both [-]."""
     return float(np.nan_to_num(min(hop.stance - 0.99, hop.flight - 0.97), nan=-1.0))
 
@@ -154,7 +154,7 @@ def flights() -> int:
     """Print the worst stance and flight of a jump of legs that are small ways from perfect."""
     design = load_design(MODELS / "prototype.toml")
     groups = [([CAUSES[name] for name in sizes], list(sizes.values())) for sizes in SMALL]
-    hops = hop_of(design, [combined(*group) for group in groups])
+    hops = hops_of(design, [combined(*group) for group in groups])
     for (causes, sizes), hop in zip(groups, hops, strict=True):
         named = zip(causes, sizes, strict=True)
         words = " and ".join(f"{cause.words} ({cause.shown(size)})" for cause, size in named)
@@ -177,7 +177,7 @@ def main() -> int:
     jumping = within[:JUMPING]
     if not jumping:
         return 0
-    hops = hop_of(design, [fit.imperfections for fit in jumping])
+    hops = hops_of(design, [fit.imperfections for fit in jumping])
     ranked = sorted(zip(jumping, hops, strict=True), key=lambda pair: -lowest(pair[1]))
     for fit, hop in ranked[:JUDGED]:
         print(f"stance {hop.stance:.3f} flight {hop.flight:.3f}  {fit.words}")

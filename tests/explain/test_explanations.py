@@ -27,7 +27,7 @@ from legbench.explain.content import explanation_content
 from legbench.explain.engine import Watch
 from legbench.explain.explanation import Explanation, JudgedFit, Scope, explain
 from legbench.explain.fitting import CauseFit
-from legbench.explain.jumping import JumpFit, hop_of
+from legbench.explain.jumping import PredictedHop, hops_of
 from legbench.explain.motor_end import MotorEnd
 from legbench.explain.screening import ScreeningMethod, screen
 from legbench.explain.targets import Target, step_target
@@ -39,7 +39,7 @@ MODELS = Path(__file__).parents[2] / "models"
 PROTOTYPE = load_design(MODELS / "prototype.toml")
 NUMBERS = published()
 QUICK = Target(name="quick", z2=1.0, dz2=0.3, shape=(0.98, 0.9, 0.82), setup=SetupKind.HFTS)
-HOP = JumpFit(
+HOP = PredictedHop(
     stance=0.995,
     flight=0.96,
     foot_clearance=0.034,
@@ -122,7 +122,7 @@ def test_predictions_are_of_every_setup(monkeypatch: pytest.MonkeyPatch) -> None
 
 @pytest.mark.long
 def test_a_spring_mismatch_costs_the_hop_its_rating() -> None:
-    perfect, apart = hop_of(PROTOTYPE, [PERFECT, Imperfections(stiffness_error=(-0.04, 0.04))])
+    perfect, apart = hops_of(PROTOTYPE, [PERFECT, Imperfections(stiffness_error=(-0.04, 0.04))])
     assert perfect.cause is None
     assert perfect.stance > 0.99
     assert perfect.flight > 0.97 > apart.flight

@@ -40,8 +40,8 @@ __getattr__ = lazy_names(
     {
         "CAUSES": "legbench.explain.causes",
         "Cause": "legbench.explain.causes",
-        "Explanation": "legbench.explain.explanation",
         "CauseFit": "legbench.explain.fitting",
+        "Explanation": "legbench.explain.explanation",
         "Shapes": "legbench.explain.rating",
         "Target": "legbench.explain.targets",
         "causes_named": "legbench.explain.causes",

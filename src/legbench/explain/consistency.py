@@ -15,7 +15,7 @@ from legbench.design import LegDesign
 from legbench.design.setup import Setup, SetupKind
 from legbench.experiment import Experiment
 from legbench.explain.engine import NOBODY, Watch, rate_many
-from legbench.explain.jumping import JumpFit
+from legbench.explain.jumping import PredictedHop
 from legbench.explain.targets import READING, Target, step_experiment
 from legbench.imperfections import Imperfections
 from legbench.paper import Published
@@ -116,7 +116,7 @@ def only_counted(ratings: Floats, counted: Ints) -> Floats:
 
 
 def checks_of(
-    predicted: Predicted, leg: int, hop: JumpFit | None, numbers: Mapping[str, Published]
+    predicted: Predicted, leg: int, hop: PredictedHop | None, numbers: Mapping[str, Published]
 ) -> tuple[StatementCheck, ...]:
     """Statements of the paper on one of the legs; without a hop, none on the jump."""
     level, wanted = float(predicted.bang_bang[leg]), numbers["bang_bang_rating"].value

@@ -18,7 +18,7 @@ from legbench.explain.fitting import (
     fit_singles,
     perfect_fit,
 )
-from legbench.explain.jumping import JumpFit, hop_of
+from legbench.explain.jumping import PredictedHop, hops_of
 from legbench.explain.motor_end import MotorEnd, count_ends, motor_ends
 from legbench.explain.screening import Screened, ScreeningMethod, count_screened, screen
 from legbench.explain.sensitivity import Sensitivity, count_sensitivities, sensitivities
@@ -39,7 +39,7 @@ class JudgedFit:
     fit: CauseFit
     checks: tuple[StatementCheck, ...]
     """Statements of the paper; empty if there was no time for them."""
-    hop: JumpFit | None
+    hop: PredictedHop | None
     """Jump of this leg; none if it was not simulated."""
 
     @property
@@ -77,7 +77,7 @@ class Explanation:
     @property
     def best(self) -> JudgedFit | None:
         """Fit that agrees best: it reaches the target if one does, then most statements hold, then
-        its sizes are the most plausible.
+        its sizes are the most plausible, then its misfit is the smallest.
         """
         return self.judged[0] if self.judged else None
 
@@ -242,10 +242,10 @@ def _judge(
     legs = [PERFECT, *(fit.imperfections for fit in fits)]
     watch.begin("the other setups", count_predictions(len(legs)))
     predicted = predict(design, target, numbers, legs, watch)
-    hops: list[JumpFit | None] = [None] * len(legs)
+    hops: list[PredictedHop | None] = [None] * len(legs)
     if scope.jump and not watch.stopped():
         watch.begin("the jump", len(legs))
-        hops = [*hop_of(design, legs)]
+        hops = [*hops_of(design, legs)]
         watch.advance(len(legs))
     known = not watch.stopped()
     judged = [

@@ -41,10 +41,10 @@ def move_held(experiment: Experiment, imperfections: Sequence[Imperfections]) ->
     after = servo.follow(stepped.motor_pos)
     rows = round(experiment.duration / PERIOD) - first
     try:
-        lanes = _lanes(experiment, imperfections)
-        lanes.start(np.concatenate([rest, np.zeros_like(rest)], axis=1))
-        path = lanes.path(np.arange(rows, dtype=np.float64) * PERIOD, servo.shaft(after))
-        outside = lanes.outside
+        batch = _batch(experiment, imperfections)
+        batch.start(np.concatenate([rest, np.zeros_like(rest)], axis=1))
+        path = batch.path(np.arange(rows, dtype=np.float64) * PERIOD, servo.shaft(after))
+        outside = batch.outside
     except PlantFault:
         # One leg of them runs away: the arrays, which keep legs apart, tell which.
         path, outside = np.zeros((count, rows, 4)), np.ones(count, dtype=np.bool_)
@@ -71,7 +71,7 @@ def _command_after(
     return controller.step(seen)
 
 
-def _lanes(experiment: Experiment, imperfections: Sequence[Imperfections]) -> LegBatch:
+def _batch(experiment: Experiment, imperfections: Sequence[Imperfections]) -> LegBatch:
     kind = experiment.setup.kind
     gravity = 0.0 if kind is SetupKind.HFTS else GRAVITY
     models = [

@@ -19,8 +19,8 @@ DURATION = 4.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class JumpFit:
-    """Figures of the hop of one leg; NaN where there is none."""
+class PredictedHop:
+    """Figures of the simulated hop of one leg; NaN where there is none."""
 
     stance: float
     """Lowest P^r of a complete stance of the limit cycle [-]."""
@@ -48,17 +48,17 @@ def jump_experiment(design: LegDesign, imperfections: Imperfections) -> Experime
     )
 
 
-def hop_of(
+def hops_of(
     design: LegDesign,
     legs: Sequence[Imperfections],
     progress: Callable[[int, int], None] | None = None,
-) -> list[JumpFit]:
+) -> list[PredictedHop]:
     """Simulate the hop of each leg and measure it."""
     experiments = [jump_experiment(design, leg) for leg in legs]
     return [measure_hop(run) for run in run_batch(experiments, progress=progress)]
 
 
-def measure_hop(run: Recording) -> JumpFit:
+def measure_hop(run: Recording) -> PredictedHop:
     """Figures of a hopping run."""
     analysis = Analysis(run)
     figures, ratings = analysis.jump_figures, analysis.ratings.chosen
@@ -66,7 +66,7 @@ def measure_hop(run: Recording) -> JumpFit:
     cause = analysis.description.cause
     if cause is None and figures.count <= begin:
         cause = "the leg does not hop"
-    return JumpFit(
+    return PredictedHop(
         stance=_lowest(ratings.stance[begin:]),
         flight=_lowest(ratings.flight[begin:]),
         foot_clearance=figures.foot_clearance,

@@ -28,8 +28,8 @@ __all__ = [
 __getattr__ = lazy_names(
     __name__,
     {
-        "Kpi": "legbench.report.run_kpis",
         "CampaignSource": "legbench.report.sources",
+        "Kpi": "legbench.report.run_kpis",
         "Trend": "legbench.report.trends",
         "WrittenReport": "legbench.report.writing",
         "figures": "legbench.report.run_figures",
