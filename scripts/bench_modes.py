@@ -204,7 +204,7 @@ def basin(points: int) -> tuple[float, float]:
     start = Apex(height=0.27, speed=0.0, z1=0.0, z2=0.6, dz1=0.0, dz2=0.0)
     centre = fixed_point(leg, law, settle(leg, law, start, 60)[-1]).apex
     height = centre.height
-    question = BasinTask(
+    task = BasinTask(
         design=design,
         jump=JumpConfig(),
         motor=(0.0, 0.0),
@@ -215,7 +215,7 @@ def basin(points: int) -> tuple[float, float]:
     )
     with tempfile.TemporaryDirectory() as folder:
         began, busy = time.perf_counter(), sum(os.times()[:4])
-        map_basin(question, Path(folder) / "basin.jsonl", workers=2)
+        map_basin(task, Path(folder) / "basin.jsonl", workers=2)
         return time.perf_counter() - began, sum(os.times()[:4]) - busy
 
 

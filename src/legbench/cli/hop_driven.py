@@ -173,7 +173,7 @@ def _basin(flags: "HopArguments", design: LegDesign, cycle: HopCycle, out: Path)
         middle = getattr(cycle.apexes[0], name, 0.0)
         return GridAxis(name=name, low=middle - span, high=middle + span, count=flags.basin)
 
-    question = BasinTask(
+    task = BasinTask(
         design=design,
         jump=flags.jump,
         motor=(0.0, 0.0),
@@ -183,8 +183,8 @@ def _basin(flags: "HopArguments", design: LegDesign, cycle: HopCycle, out: Path)
         up=axis(flags.up, flags.up_span),
     )
     rows = out / "basin.jsonl"
-    fates = map_basin(question, rows, workers=flags.workers, progress=timed_progress())
-    plot_basin(question, fates, out / "basin.png")
+    fates = map_basin(task, rows, workers=flags.workers, progress=timed_progress())
+    plot_basin(task, fates, out / "basin.png")
     note(f"wrote {rows} and {out / 'basin.png'}")
     return fates
 

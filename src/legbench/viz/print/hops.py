@@ -55,22 +55,22 @@ def plot_return(heights: Floats, fixed: Floats, title: str, path: Path) -> None:
         save_figure(figure, path, DPI)
 
 
-def plot_basin(question: BasinTask, fates: Ints, path: Path) -> None:
+def plot_basin(task: BasinTask, fates: Ints, path: Path) -> None:
     """The grid of starts, coloured by where they lead."""
     with styled():
         figure = Figure(figsize=(7.4, 4.4), layout="constrained")
         axes = figure.subplots()
         colours = ListedColormap([colour for colour, _ in FATES.values()])
         axes.pcolormesh(
-            question.across.values(),
-            question.up.values(),
+            task.across.values(),
+            task.up.values(),
             fates,
             cmap=colours,
             norm=BoundaryNorm(np.arange(-0.5, len(FATES)), len(FATES)),
             rasterized=True,
         )
-        centre = question.centre
-        at = (getattr(centre, question.across.name), getattr(centre, question.up.name))
+        centre = task.centre
+        at = (getattr(centre, task.across.name), getattr(centre, task.up.name))
         axes.plot(*at, "k+", ms=10)
         handles = [Line2D([], [], marker="+", ls="", color="k", ms=10, label="periodic hop")]
         for value in np.unique(fates).tolist():
@@ -80,11 +80,9 @@ def plot_basin(question: BasinTask, fates: Ints, path: Path) -> None:
         units = {"height": "m", "speed": "m/s", "dz1": "rad/s", "dz2": "rad/s"}
         labels = [
             f"{name} at the apex [{units.get(name, 'rad')}]"
-            for name in (question.across.name, question.up.name)
+            for name in (task.across.name, task.up.name)
         ]
-        axes.set(
-            xlabel=labels[0], ylabel=labels[1], title=f"{question.design.name}: where a hop leads"
-        )
+        axes.set(xlabel=labels[0], ylabel=labels[1], title=f"{task.design.name}: where a hop leads")
         save_figure(figure, path, DPI)
 
 
