@@ -30,7 +30,7 @@ from legbench.design.setup import Setup, SetupKind
 from legbench.errors import PlantFault
 from legbench.experiment import Experiment, run_batch
 from legbench.identify import IdentificationTask, identify, parse_free
-from legbench.identify.base import FittedLeg
+from legbench.identify.base import LegParameters
 from legbench.identify.fitting import fit
 from legbench.identify.prediction import Guess, nothing_moved
 from legbench.identify.problem import Problem
@@ -72,7 +72,7 @@ def steps() -> tuple[MeasuredRun, ...]:
 
 def against_cma(trials: tuple[MeasuredRun, ...], name: str) -> None:
     """Compare evaluations and processor time with pycma's."""
-    leg = FittedLeg.of(OFF)
+    leg = LegParameters.of(OFF)
     problem = Problem(trials, leg.reach, FREED[name])
     start = Guess(values=leg.values, starts=nothing_moved(trials))
     problem.misfit(start)  # compiled

@@ -19,7 +19,7 @@ from legbench.control import PositionJumpConfig
 from legbench.design import LegDesign, load_design
 from legbench.design.setup import Setup, SetupKind
 from legbench.experiment import Experiment, run_batch
-from legbench.identify.base import FittedLeg, mended
+from legbench.identify.base import LegParameters, mended
 from legbench.identify.candidates import trial_of_candidate
 from legbench.identify.estimates import estimates_of
 from legbench.identify.fitting import fit
@@ -106,12 +106,12 @@ def synthetic(
         links=(PRECISION, PRECISION),
         motors=(PRECISION, PRECISION),
     )
-    question = IdentificationTask(design=truth, trials=(like,))
+    task = IdentificationTask(design=truth, trials=(like,))
     bare = [
-        replace(trial_of_candidate(each.setup.kind, each, question), name=each.setup.kind)
+        replace(trial_of_candidate(each.setup.kind, each, task), name=each.setup.kind)
         for each in steps(truth, random, duration)
     ]
-    leg = FittedLeg.of(truth)
+    leg = LegParameters.of(truth)
     guess = Guess(values=leg.values, starts=nothing_moved(bare))
     links = Predictor(bare, leg.reach, friction=False).predict(guess)
     return [
@@ -121,7 +121,7 @@ def synthetic(
 
 
 def learned(
-    trials: list[MeasuredRun], start: FittedLeg, names: tuple[str, ...]
+    trials: list[MeasuredRun], start: LegParameters, names: tuple[str, ...]
 ) -> tuple[tuple[Estimate, ...], float]:
     """Estimates from one start, and the mean square of the residuals."""
     problem = Problem(trials, start.reach, Freedom(names=names))
@@ -134,7 +134,9 @@ def learned(
     )
 
 
-def held(truth: FittedLeg, names: tuple[str, ...], random: np.random.Generator) -> FittedLeg:
+def held(
+    truth: LegParameters, names: tuple[str, ...], random: np.random.Generator
+) -> LegParameters:
     """Start whose free parameters are 30 % off, up or down; the others are the truth."""
     values = truth.values.copy()
     for name in names:
@@ -149,7 +151,7 @@ def coverage(repeats: int, duration: float) -> None:
         worst, inside = dict.fromkeys(USUAL, 0.0), dict.fromkeys(USUAL, 0)
         for _ in range(repeats):
             truth = shaken(PROTOTYPE, random, 0.1)
-            leg = FittedLeg.of(truth)
+            leg = LegParameters.of(truth)
             trials = synthetic(truth, random, duration, motors=motors)
             found, _ = learned(trials, held(leg, USUAL, random), USUAL)
             count_in(found, leg, worst, inside)
@@ -158,7 +160,7 @@ def coverage(repeats: int, duration: float) -> None:
 
 
 def count_in(
-    found: tuple[Estimate, ...], leg: FittedLeg, worst: dict[str, float], inside: dict[str, int]
+    found: tuple[Estimate, ...], leg: LegParameters, worst: dict[str, float], inside: dict[str, int]
 ) -> None:
     """Note errors of estimates, and whether their intervals cover the truth."""
     for each in found:
@@ -182,7 +184,7 @@ def from_bars(repeats: int, duration: float) -> None:
         [each for _ in range(sets) for each in steps(truth, random, duration)]
     )
     bare = [replace(trial_of(each), name=str(place)) for place, each in enumerate(recordings)]
-    leg = FittedLeg.of(truth, bars=bars_of(recordings[0]))
+    leg = LegParameters.of(truth, bars=bars_of(recordings[0]))
     inside, worst = dict.fromkeys(USUAL, 0), dict.fromkeys(USUAL, 0.0)
     for repeat in range(repeats):
         place = 3 * (repeat % sets)
@@ -198,7 +200,7 @@ def errors(repeats: int, duration: float) -> None:
     Motors are not rounded here, which would scatter by itself; that error is reported apart.
     """
     random = np.random.default_rng(3)
-    leg = FittedLeg.of(PROTOTYPE)
+    leg = LegParameters.of(PROTOTYPE)
     bare = synthetic(PROTOTYPE, random, duration, motors=False)
     clean = Predictor(bare, leg.reach, friction=False).predict(
         Guess(values=leg.values, starts=nothing_moved(bare))
@@ -222,7 +224,7 @@ def errors(repeats: int, duration: float) -> None:
 def starts(repeats: int, duration: float) -> None:
     """Convergence from 0.4 to 3 times the truth, mixed; k and d, and all nine."""
     random = np.random.default_rng(4)
-    leg = FittedLeg.of(PROTOTYPE)
+    leg = LegParameters.of(PROTOTYPE)
     trials = synthetic(PROTOTYPE, random, duration, motors=False)
     for names in (USUAL, NINE):
         problem = Problem(trials, leg.reach, Freedom(names=names))

@@ -17,8 +17,8 @@ from legbench.control import ControllerSettings, JumpConfig, PositionJumpConfig
 from legbench.design import load_design
 from legbench.design.setup import Setup, SetupKind
 from legbench.experiment import Experiment
-from legbench.identify import identify, parse_free, question_of, repeat, written_back
-from legbench.identify.base import FittedLeg
+from legbench.identify import identify, parse_free, repeat, task_of, written_back
+from legbench.identify.base import LegParameters
 from legbench.identify.parameters import INDEX
 from legbench.identify.plan import ranked
 from legbench.identify.trial import FIXED, bars_of
@@ -57,9 +57,9 @@ def driven(controller: ControllerSettings, kind: SetupKind, duration: float) -> 
 def twin() -> bool:
     """Identify nine parameters from three steps, and predict a hop; whether all is within."""
     runs = [driven(STEP, SetupKind(kind), 3.0) for kind in FIXED]
-    question = question_of(runs, free=parse_free(["nine"]))
-    outcome = identify(question)
-    truth = FittedLeg.of(HIDDEN.leg_of(PROTOTYPE), bars=bars_of(runs[0])).values
+    task = task_of(runs, free=parse_free(["nine"]))
+    outcome = identify(task)
+    truth = LegParameters.of(HIDDEN.leg_of(PROTOTYPE), bars=bars_of(runs[0])).values
     met = outcome.trusted
     print(f"trusted: {outcome.trusted}", *outcome.reasons)
     for each in outcome.estimates:
@@ -68,7 +68,7 @@ def twin() -> bool:
         bound = "" if within is None else f", bound {within:.3%}"
         print(f"{each.name} is off by {off:+.4%}{bound}")
     hop = repeat(
-        driven(JumpConfig(), SetupKind.JUMP, 4.0), written_back(PROTOTYPE, outcome, question.bars)
+        driven(JumpConfig(), SetupKind.JUMP, 4.0), written_back(PROTOTYPE, outcome, task.bars)
     )
     print(hop.text, *hop.misses)
     return met and hop.good
@@ -77,7 +77,7 @@ def twin() -> bool:
 def plan() -> bool:
     """Rank the next run after three steps; whether the best shrinks the coupling's error."""
     runs = [driven(STEP, SetupKind(kind), 3.0) for kind in FIXED]
-    best = ranked(question_of(runs, free=parse_free(["nine"])), None, sharpen="B")[0]
+    best = ranked(task_of(runs, free=parse_free(["nine"])), None, sharpen="B")[0]
     print(f"{best.name} shrinks the error of B by {best.shrinks['B']:.1f}, bound {SHRINKS:g}")
     return best.shrinks["B"] >= SHRINKS
 

@@ -18,7 +18,7 @@ from legbench.design.statics import GRAVITY
 from legbench.design.toml import design_from_mapping
 from legbench.errors import ConfigError
 from legbench.identify.back_to_design import design_text, written_back
-from legbench.identify.base import FittedLeg, equation_parameters, mended
+from legbench.identify.base import LegParameters, equation_parameters, mended
 from legbench.identify.outcome import Estimate, Identification
 from legbench.identify.parameters import GROUPS, INDEX, PARAMETERS
 from legbench.identify.repeated import flaws_of
@@ -35,7 +35,7 @@ def test_the_equations_parameters_are_those_of_the_model(
     gravity = 0.0 if kind is SetupKind.HFTS else GRAVITY
     regime = Regime.PINNED if kind is SetupKind.FFS else Regime.HANGING
     model = LegModel.of(optimal, gravity=gravity, bars=bars)
-    leg = FittedLeg.of(optimal, bars=bars)
+    leg = LegParameters.of(optimal, bars=bars)
     found, _ = equation_parameters(leg.values, leg.reach, kind)
     wanted = parameters_of(model, regime, (0.0, 0.0))[:MOTOR]
     assert found[:MOTOR] == pytest.approx(wanted, rel=1e-12, abs=1e-15)
@@ -43,7 +43,7 @@ def test_the_equations_parameters_are_those_of_the_model(
 
 @pytest.mark.parametrize("kind", [SetupKind.HFTS, SetupKind.VFTS, SetupKind.FFS])
 def test_their_derivatives_are_those_of_finite_differences(kind: SetupKind) -> None:
-    leg = FittedLeg.of(PROTOTYPE)
+    leg = LegParameters.of(PROTOTYPE)
     values = leg.values.copy()
     values[INDEX["time_base"]], values[INDEX["f1"]] = 1.02, 0.003
     _, slope = equation_parameters(values, leg.reach, kind)
@@ -76,12 +76,12 @@ def outcome_of(values: Floats, names: tuple[str, ...]) -> Identification:
 
 @pytest.mark.parametrize("bars", [None, BARS])
 def test_the_leg_that_is_written_has_what_was_identified(bars: Bars | None) -> None:
-    values = FittedLeg.of(PROTOTYPE, bars=bars).values.copy()
+    values = LegParameters.of(PROTOTYPE, bars=bars).values.copy()
     names = GROUPS["nine"]
     for place, name in enumerate(names):
         values[INDEX[name]] *= 1.0 + 0.01 * (-1) ** place
     found = written_back(PROTOTYPE, outcome_of(values, names), bars)
-    assert FittedLeg.of(found, bars=bars).values == pytest.approx(values, rel=1e-12, abs=1e-15)
+    assert LegParameters.of(found, bars=bars).values == pytest.approx(values, rel=1e-12, abs=1e-15)
     assert found.lengths == PROTOTYPE.lengths
     assert found.total_mass == pytest.approx(PROTOTYPE.total_mass, rel=1e-12)
 
@@ -100,7 +100,7 @@ def relative(one: LegDesign) -> Floats:
 
 def test_no_other_leg_with_these_combinations_is_nearer_to_the_design() -> None:
     """Legs that differ from the one found by what no recording shows are all farther away."""
-    values = FittedLeg.of(PROTOTYPE).values.copy()
+    values = LegParameters.of(PROTOTYPE).values.copy()
     values[INDEX["s1"]] *= 1.03
     found = written_back(PROTOTYPE, outcome_of(values, ("s1",)))
     nearest = np.linalg.norm(relative(found))
@@ -114,14 +114,14 @@ def test_no_other_leg_with_these_combinations_is_nearer_to_the_design() -> None:
             foot=replace(found.foot, inertia=found.foot.inertia * (1 + 0.1 * random.normal())),
         )
         other = written_back(shaken, outcome_of(values, ("s1",)))
-        assert FittedLeg.of(other).values[:5] == pytest.approx(values[:5], rel=1e-12)
+        assert LegParameters.of(other).values[:5] == pytest.approx(values[:5], rel=1e-12)
         assert np.linalg.norm(relative(other)) > nearest
 
 
 def test_springs_alone_leave_the_masses_as_designed_and_the_file_says_where_they_come_from() -> (
     None
 ):
-    values = FittedLeg.of(PROTOTYPE).values.copy()
+    values = LegParameters.of(PROTOTYPE).values.copy()
     values[INDEX["k1"]] = 2.4
     outcome = outcome_of(values, ("k1",))
     found = written_back(PROTOTYPE, outcome)
@@ -136,7 +136,7 @@ def test_springs_alone_leave_the_masses_as_designed_and_the_file_says_where_they
 
 
 def test_a_leg_that_cannot_be_is_refused() -> None:
-    values = FittedLeg.of(PROTOTYPE).values.copy()
+    values = LegParameters.of(PROTOTYPE).values.copy()
     values[INDEX["J1"]] *= 0.2
     with pytest.raises(ConfigError, match="no leg near design 'prototype'"):
         written_back(PROTOTYPE, outcome_of(values, ("J1",)))
@@ -150,12 +150,14 @@ def test_a_leg_is_the_design_with_its_flaws() -> None:
         thigh=replace(PROTOTYPE.thigh, com=0.012, inertia=4.9e-4),
     )
     again = flaws_of(built, PROTOTYPE).leg_of(PROTOTYPE)
-    assert FittedLeg.of(again).values == pytest.approx(FittedLeg.of(built).values, rel=1e-12)
+    assert LegParameters.of(again).values == pytest.approx(
+        LegParameters.of(built).values, rel=1e-12
+    )
     with pytest.raises(ConfigError, match="lengths are"):
         flaws_of(replace(PROTOTYPE, thigh=replace(PROTOTYPE.thigh, length=0.065),
                          shank=replace(PROTOTYPE.shank, length=0.134)), PROTOTYPE)  # fmt: skip
 
 
 def test_parameters_that_some_leg_has_are_left_as_they_are() -> None:
-    leg = FittedLeg.of(PROTOTYPE)
+    leg = LegParameters.of(PROTOTYPE)
     assert np.array_equal(mended(leg.values, leg.reach), leg.values)

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from twins import OFF, PROTOTYPE, experiments, frozen, late, question, stretched, trials
+from twins import OFF, PROTOTYPE, experiments, frozen, late, stretched, task, trials
 
 from legbench.analytic.terms import Bars
 from legbench.control import ChirpConfig
@@ -39,7 +39,7 @@ Harm = Callable[[MeasuredRun], MeasuredRun]
 def test_encoders_that_are_wired_wrongly_or_stand_still_are_named_before_any_fit(
     steps: tuple[MeasuredRun, ...], harm: Harm, what: str, words: str
 ) -> None:
-    outcome = identify(question([*steps[:2], harm(steps[2])]))
+    outcome = identify(task([*steps[:2], harm(steps[2])]))
     assert not outcome.trusted
     assert outcome.estimates == ()
     assert any(what in each.what and words in each.text for each in outcome.findings)
@@ -56,7 +56,7 @@ def test_encoders_that_are_wired_wrongly_or_stand_still_are_named_before_any_fit
 def test_a_delay_and_a_stretched_time_are_told_apart(
     steps: tuple[MeasuredRun, ...], harm: Harm, name: str, value: float
 ) -> None:
-    outcome = identify(question([harm(each) for each in steps]))
+    outcome = identify(task([harm(each) for each in steps]))
     assert not outcome.trusted
     best = outcome.alternatives[0]
     assert best.name == name
@@ -72,13 +72,13 @@ def test_a_fixed_inertia_that_is_five_percent_wrong_is_named(
 ) -> None:
     right = getattr(OFF, segment)
     wrong = replace(OFF, **{segment: replace(right, inertia=1.05 * right.inertia)})
-    outcome = identify(question(steps, wrong))
+    outcome = identify(task(steps, wrong))
     assert not outcome.trusted
     assert name in [each.name for each in named(outcome.alternatives)]
 
 
 def test_bars_that_were_left_out_are_not_accepted(steps_of_bars: tuple[MeasuredRun, ...]) -> None:
-    outcome = identify(question(steps_of_bars))
+    outcome = identify(task(steps_of_bars))
     assert not outcome.trusted
     assert any("residuals hang together" in each for each in outcome.reasons)
     best = outcome.alternatives[0]
@@ -89,7 +89,7 @@ def test_bars_that_were_left_out_are_not_accepted(steps_of_bars: tuple[MeasuredR
 
 
 def test_bars_that_are_not_there_are_named(steps: tuple[MeasuredRun, ...]) -> None:
-    outcome = identify(question(steps, bars=Bars(density=fitted_bar_density(PROTOTYPE))))
+    outcome = identify(task(steps, bars=Bars(density=fitted_bar_density(PROTOTYPE))))
     assert outcome.alternatives[0].text.startswith("bars without mass explain ")
     assert outcome.alternatives[0].share > 0.9
 
@@ -101,10 +101,10 @@ def test_a_held_out_run_judges_the_fit(steps: tuple[MeasuredRun, ...]) -> None:
             kinds=(SetupKind.FFS,), controller=ChirpConfig(delay=0.05, sweep=0.4), duration=0.5
         )
     )
-    good = identify(question(steps, held_out=chirp))
+    good = identify(task(steps, held_out=chirp))
     assert good.trusted, good.reasons
     wrong = tuple(late(each, 5) for each in chirp)
-    bad = identify(question(steps, held_out=wrong))
+    bad = identify(task(steps, held_out=wrong))
     assert [each for each in bad.reasons if "held-out run is not predicted" in each]
 
 

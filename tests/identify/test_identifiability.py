@@ -1,7 +1,7 @@
 """What runs cannot show is refused, with the direction that they do not show in words."""
 
 import pytest
-from twins import PROTOTYPE, question
+from twins import PROTOTYPE, task
 
 from legbench.errors import ConfigError
 from legbench.identify import UnidentifiableError, identify, parse_free
@@ -13,7 +13,7 @@ from legbench.identify.trial import MeasuredRun
 def test_nine_parameters_are_seen_by_three_setups_and_a_known_mass(
     steps: tuple[MeasuredRun, ...],
 ) -> None:
-    outcome = identify(question(steps, PROTOTYPE, free=parse_free(["nine"])))
+    outcome = identify(task(steps, PROTOTYPE, free=parse_free(["nine"])))
     assert outcome.gate is not None
     assert outcome.gate.open
     assert not outcome.gate.weak
@@ -34,7 +34,7 @@ def test_nine_parameters_are_seen_by_three_setups_and_a_known_mass(
 def test_what_cannot_be_seen_is_refused_in_words(
     steps: tuple[MeasuredRun, ...], setups: list[int], free: list[str], words: str
 ) -> None:
-    asked = question([steps[each] for each in setups], PROTOTYPE, free=parse_free(free))
+    asked = task([steps[each] for each in setups], PROTOTYPE, free=parse_free(free))
     with pytest.raises(UnidentifiableError, match=words):
         identify(asked)
 
@@ -44,7 +44,7 @@ def test_zero_errors_on_both_sides_of_the_springs_are_marked_weak(
     steps: tuple[MeasuredRun, ...],
 ) -> None:
     free = parse_free(["springs", "dampers", "link_zero", "motor_zero"])
-    outcome = identify(question(steps, PROTOTYPE, free=free))
+    outcome = identify(task(steps, PROTOTYPE, free=free))
     assert not outcome.trusted
     assert any("link_zero1 and motor_zero1 (correlation -0.99" in each for each in outcome.alike)
     assert any(reason.startswith("weak:") for reason in outcome.reasons)

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from twins import OFF, PROTOTYPE, experiments, question, trials
+from twins import OFF, PROTOTYPE, experiments, task, trials
 
 from legbench.analytic.terms import Bars
 from legbench.design.setup import SetupKind
 from legbench.identify import identify, parse_free
-from legbench.identify.base import FittedLeg, can_be, mended
+from legbench.identify.base import LegParameters, can_be, mended
 from legbench.identify.fitting import fit
 from legbench.identify.parameters import GROUPS, INDEX, Freedom
 from legbench.identify.prediction import Guess, nothing_moved
@@ -21,9 +21,9 @@ from legbench.mjcf.fitting import fitted_bar_density
 def test_springs_and_dampers_that_are_thirty_percent_off_are_found(
     steps: tuple[MeasuredRun, ...],
 ) -> None:
-    outcome = identify(question(steps))
+    outcome = identify(task(steps))
     assert outcome.trusted, outcome.reasons
-    truth = FittedLeg.of(PROTOTYPE)
+    truth = LegParameters.of(PROTOTYPE)
     for each in outcome.estimates:
         true = truth.values[INDEX[each.name]]
         assert each.low <= true <= each.high
@@ -40,9 +40,9 @@ def test_nine_parameters_of_a_leg_that_was_built_otherwise_are_found() -> None:
     }
     chosen = experiments(**flaws)
     built = chosen[0].imperfections.leg_of(PROTOTYPE)
-    outcome = identify(question(trials(chosen), PROTOTYPE, free=parse_free(["nine"])))
+    outcome = identify(task(trials(chosen), PROTOTYPE, free=parse_free(["nine"])))
     assert outcome.trusted, outcome.reasons
-    truth = FittedLeg.of(built)
+    truth = LegParameters.of(built)
     for each in outcome.estimates:
         true = truth.values[INDEX[each.name]]
         assert abs(each.value - true) < 4.0 * each.error
@@ -54,10 +54,10 @@ def test_a_leg_with_bars_is_found_by_equations_with_bars(
     steps_of_bars: tuple[MeasuredRun, ...],
 ) -> None:
     bars = Bars(density=fitted_bar_density(PROTOTYPE))
-    outcome = identify(question(steps_of_bars, bars=bars))
+    outcome = identify(task(steps_of_bars, bars=bars))
     assert outcome.trusted, outcome.reasons
     for each in outcome.estimates:
-        true = FittedLeg.of(PROTOTYPE).values[INDEX[each.name]]
+        true = LegParameters.of(PROTOTYPE).values[INDEX[each.name]]
         assert abs(each.value - true) < 4.0 * each.error
 
 
@@ -76,7 +76,7 @@ def test_a_run_that_begins_in_motion_is_fitted_from_its_first_row_on(
         )
         for each in steps
     )
-    outcome = identify(question(cut))
+    outcome = identify(task(cut))
     assert outcome.trusted, outcome.reasons
     assert outcome.estimate("k1").value == pytest.approx(2.3, rel=5e-4)
 
@@ -87,7 +87,7 @@ def test_fits_converge_from_far_away(
 ) -> None:
     """Starts of 0.4 to 3 times the truth, mixed, mended where no leg has such inertias."""
     random = np.random.default_rng(5)
-    truth = FittedLeg.of(PROTOTYPE)
+    truth = LegParameters.of(PROTOTYPE)
     problem = Problem(steps, truth.reach, Freedom(names=names))
     bottom = problem.misfit(Guess(values=truth.values, starts=nothing_moved(steps))).cost
     for _ in range(3):
@@ -104,7 +104,7 @@ def test_fits_converge_from_far_away(
 
 def test_predicted_errors_are_those_that_noise_makes(steps: tuple[MeasuredRun, ...]) -> None:
     """Estimates of many noises scatter as the Jacobian says, within the chance of 25 draws."""
-    truth = FittedLeg.of(PROTOTYPE)
+    truth = LegParameters.of(PROTOTYPE)
     names = ("k1", "k2", "d1", "d2")
     guess = Guess(values=truth.values, starts=nothing_moved(steps))
     problem = Problem(steps, truth.reach, Freedom(names=names))
@@ -130,9 +130,7 @@ def test_predicted_errors_are_those_that_noise_makes(steps: tuple[MeasuredRun, .
 @pytest.mark.long
 def test_friction_is_found_where_there_is_some() -> None:
     chosen = experiments(kinds=(SetupKind.VFTS, SetupKind.FFS), coulomb_friction=(0.004, 0.003))
-    outcome = identify(
-        question(trials(chosen), free=parse_free(["springs", "dampers", "friction"]))
-    )
+    outcome = identify(task(trials(chosen), free=parse_free(["springs", "dampers", "friction"])))
     assert outcome.estimate("f1").value == pytest.approx(0.004, rel=0.1)
     assert outcome.estimate("f2").value == pytest.approx(0.003, rel=0.1)
     assert OFF.stiffness != PROTOTYPE.stiffness

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from twins import PROTOTYPE, experiments, question
+from twins import PROTOTYPE, experiments, task
 
 from legbench.control import ChirpConfig, PositionJumpConfig
 from legbench.control.chirp import ChirpCoordinate
@@ -27,7 +27,7 @@ def candidate(controller: PositionJumpConfig | ChirpConfig, duration: float = 3.
 
 
 def nine(steps: tuple[MeasuredRun, ...]) -> IdentificationTask:
-    return question(steps, PROTOTYPE, free=parse_free(["nine"]))
+    return task(steps, PROTOTYPE, free=parse_free(["nine"]))
 
 
 def test_a_chirp_shrinks_the_error_of_the_coupling_and_another_step_hardly_does(
@@ -51,7 +51,7 @@ def test_predicted_errors_are_those_of_the_fit_after_the_run(
     """Planning a run like the third after the first two predicts the errors of all three."""
     three = identify(nine(steps))
     like = replace(experiments()[2], duration=0.6)
-    two = question(steps[:2], PROTOTYPE, free=parse_free(["nine"]))
+    two = task(steps[:2], PROTOTYPE, free=parse_free(["nine"]))
     (plan,) = ranked(two, three, among=[("ffs", like)])
     for each in three.estimates:
         # Before, all nine scale together; white errors of positive parameters are shares.

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from twins import PROTOTYPE
 
-from legbench.identify.base import FittedLeg, mended
+from legbench.identify.base import LegParameters, mended
 from legbench.identify.fitting import fit
 from legbench.identify.parameters import GROUPS, INDEX, Freedom
 from legbench.identify.prediction import Guess, nothing_moved
@@ -15,7 +15,7 @@ from legbench.identify.regression import regressed
 from legbench.identify.staged import fits_from
 from legbench.identify.trial import MeasuredRun
 
-TRUTH = FittedLeg.of(PROTOTYPE)
+TRUTH = LegParameters.of(PROTOTYPE)
 NINE = GROUPS["nine"]
 PLACES = [INDEX[name] for name in NINE]
 

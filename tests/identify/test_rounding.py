@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from twins import OFF, PROTOTYPE, question
+from twins import OFF, PROTOTYPE, task
 
 from legbench.identify import identify
-from legbench.identify.base import FittedLeg
+from legbench.identify.base import LegParameters
 from legbench.identify.noise import Precision
 from legbench.identify.outcome import Identification
 from legbench.identify.parameters import INDEX, Freedom
@@ -41,14 +41,14 @@ def standing(trial: MeasuredRun, motors: Floats) -> MeasuredRun:
 @pytest.fixture(scope="module")
 def outcome(steps: tuple[MeasuredRun, ...]) -> Identification:
     """What is learned from steps whose motors are shown in coarse counts."""
-    return identify(question([coarse(each) for each in steps]))
+    return identify(task([coarse(each) for each in steps]))
 
 
 def test_stiffness_does_not_suffer_from_coarse_counts_of_the_motors(
     outcome: Identification,
 ) -> None:
     assert outcome.trusted, outcome.reasons
-    truth = FittedLeg.of(PROTOTYPE)
+    truth = LegParameters.of(PROTOTYPE)
     for name in ("k1", "k2"):
         estimate, true = outcome.estimate(name), truth.values[INDEX[name]]
         assert estimate.low <= true <= estimate.high
@@ -75,9 +75,11 @@ def test_derivatives_by_hidden_angles_are_those_of_finite_differences(
     steps: tuple[MeasuredRun, ...], delay: float
 ) -> None:
     problem = Problem(
-        [coarse(each) for each in steps], FittedLeg.of(OFF).reach, Freedom(names=("k1",))
+        [coarse(each) for each in steps], LegParameters.of(OFF).reach, Freedom(names=("k1",))
     )
-    guess = Guess(values=FittedLeg.of(OFF).values, starts=nothing_moved(steps)).at("delay", delay)
+    guess = Guess(values=LegParameters.of(OFF).values, starts=nothing_moved(steps)).at(
+        "delay", delay
+    )
     misfit = problem.misfit(guess)
     _, slopes = misfit.whole()
     for column in range(len(problem.names), slopes.shape[1]):

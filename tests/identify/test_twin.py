@@ -16,8 +16,8 @@ from legbench.design.setup import Setup, SetupKind
 from legbench.design.toml import load_design
 from legbench.errors import ConfigError
 from legbench.experiment import Experiment
-from legbench.identify import design_text, identify, parse_free, question_of, repeat, written_back
-from legbench.identify.base import FittedLeg
+from legbench.identify import design_text, identify, parse_free, repeat, task_of, written_back
+from legbench.identify.base import LegParameters
 from legbench.identify.parameters import INDEX
 from legbench.identify.trial import bars_of
 from legbench.imperfections import Imperfections
@@ -52,14 +52,14 @@ def test_a_twin_behind_emulated_drives_is_identified_and_its_hop_predicted(
 ) -> None:
     step = PositionJumpConfig(z2=1.0, dz2=0.3, delay=0.05)
     runs = [driven(step, SetupKind.VFTS, 0.7), driven(step, SetupKind.FFS, 0.7)]
-    question = question_of(runs, free=parse_free(["nine"]), starts=1)
-    outcome = identify(question)
+    task = task_of(runs, free=parse_free(["nine"]), starts=1)
+    outcome = identify(task)
     assert outcome.trusted, outcome.reasons
-    truth = FittedLeg.of(HIDDEN.leg_of(PROTOTYPE), bars=bars_of(runs[0])).values
+    truth = LegParameters.of(HIDDEN.leg_of(PROTOTYPE), bars=bars_of(runs[0])).values
     for each in outcome.estimates:
         share = {"k": 5e-4, "d": 2e-3, "s": 2e-3}.get(each.name[0], 5e-3)
         assert each.value == pytest.approx(truth[INDEX[each.name]], rel=share)
-    design = written_back(PROTOTYPE, outcome, question.bars)
+    design = written_back(PROTOTYPE, outcome, task.bars)
     (tmp_path / "identified.toml").write_text(design_text(design, outcome))
     identified = load_design(tmp_path / "identified.toml")
     recorded = driven(JumpConfig(), SetupKind.JUMP, 2.6)
@@ -77,7 +77,7 @@ def test_an_answer_that_a_drive_owes_is_no_reading() -> None:
         columns[name][row] = columns[name][row - 1]
     lost = replace(run, columns=columns)
     free = parse_free(["springs", "dampers"])
-    asked = [question_of([each], free=free, starts=1) for each in (run, lost)]
+    asked = [task_of([each], free=free, starts=1) for each in (run, lost)]
     whole, lossy = (each.trials[0] for each in asked)
     assert set(lossy.left_out) == {*whole.left_out, row}
     np.testing.assert_allclose(lossy.joint_pos[row], whole.joint_pos[row], atol=3e-4)

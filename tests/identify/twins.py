@@ -61,10 +61,8 @@ def trials(chosen: Sequence[Experiment]) -> tuple[MeasuredRun, ...]:
     )
 
 
-def question(
-    runs: Sequence[MeasuredRun], design: LegDesign = OFF, **more: Any
-) -> IdentificationTask:
-    """Question to some runs that starts once, from a leg that is 30 % off."""
+def task(runs: Sequence[MeasuredRun], design: LegDesign = OFF, **more: Any) -> IdentificationTask:
+    """Task with some runs that starts once, from a leg that is 30 % off."""
     return IdentificationTask(design=design, trials=tuple(runs), starts=1, **more)
 
 

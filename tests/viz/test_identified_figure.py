@@ -4,7 +4,7 @@ import pytest
 from legbench.design import LegDesign
 from legbench.design.setup import SetupKind
 from legbench.identify.adequacy import ROWS, residuals_of
-from legbench.identify.base import FittedLeg
+from legbench.identify.base import LegParameters
 from legbench.identify.candidates import PERIOD
 from legbench.identify.noise import Precision
 from legbench.identify.outcome import Estimate, Identification
@@ -34,7 +34,7 @@ def test_intervals_and_residuals_are_drawn_as_they_are(prototype: LegDesign) -> 
         links=(fine, fine),
         motors=(fine, fine),
     )
-    leg = FittedLeg.of(prototype)
+    leg = LegParameters.of(prototype)
     problem = Problem([trial], leg.reach, Freedom(names=("k1",)))
     misfit = problem.misfit(Guess(values=leg.values, starts=nothing_moved([trial])))
     k1 = Estimate(

@@ -63,7 +63,7 @@ class IdentifyArguments:
 def main(arguments: list[str]) -> int:
     """Run `legbench identify`."""
     flags = parse(IdentifyArguments, "identify", arguments)
-    from legbench.identify import parse_free, question_of, read_runs
+    from legbench.identify import parse_free, read_runs, task_of
     from legbench.identify.asking import check_same_leg
 
     free = parse_free([word for word in flags.free.split(",") if word], start=not flags.at_rest)
@@ -72,7 +72,7 @@ def main(arguments: list[str]) -> int:
     held_out = [*(read_runs([path])[0] for path in flags.held_out)]
     for other in held_out:
         check_same_leg(runs[0], other)
-    question = question_of(
+    task = task_of(
         runs,
         free=free,
         design=None if flags.design is None else load_design(flags.design),
@@ -81,35 +81,33 @@ def main(arguments: list[str]) -> int:
         noise=noise,
         starts=flags.starts,
     )
-    _check(flags, question)
+    _check(flags, task)
     with ExitStack() as folders:
         for path in filter(None, (flags.out, flags.plan, flags.figure)):
             folders.enter_context(results_in(path.parent))
-        return _answer(flags, question, held_out)
+        return _answer(flags, task, held_out)
 
 
-def _answer(
-    flags: IdentifyArguments, question: "IdentificationTask", held_out: list[Recording]
-) -> int:
+def _answer(flags: IdentifyArguments, task: "IdentificationTask", held_out: list[Recording]) -> int:
     """Identify, print and write what was asked for; returns the exit status."""
     from legbench.identify import UnidentifiableError, identify
     from legbench.identify.words import content_of, lines_of
 
     try:
-        outcome = identify(question, say=note)
+        outcome = identify(task, say=note)
     except UnidentifiableError as error:
         if flags.plan is None:
             raise
         # What these runs cannot show is what the next one is planned for.
         lines, content = [f"refused           {error}"], {"refused": str(error)}
-        _plan(flags.plan, flags, question, None, lines, content)
+        _plan(flags.plan, flags, task, None, lines, content)
         _show(flags, lines, content)
         return 1
     lines, content = lines_of(outcome), content_of(outcome)
     good = outcome.trusted
     if outcome.estimates:
-        good &= _hops(held_out, question, outcome, lines, content)
-        _extras(flags, question, outcome, lines, content)
+        good &= _hops(held_out, task, outcome, lines, content)
+        _extras(flags, task, outcome, lines, content)
     _show(flags, lines, content)
     return 0 if good else 1
 
@@ -129,13 +127,13 @@ def _noise(flags: IdentifyArguments) -> float | None:
     return math.radians(flags.noise_deg)
 
 
-def _check(flags: IdentifyArguments, question: "IdentificationTask") -> None:
+def _check(flags: IdentifyArguments, task: "IdentificationTask") -> None:
     """Refuse what would only be found after the fit."""
     if flags.sharpen is not None and flags.plan is None:
         raise ConfigError("--sharpen says what a plan is for; give --plan, the file to write")
-    if flags.sharpen is not None and flags.sharpen not in question.free.names:
+    if flags.sharpen is not None and flags.sharpen not in task.free.names:
         raise ConfigError(
-            f"--sharpen is {flags.sharpen}; it must be free: {', '.join(question.free.names)}"
+            f"--sharpen is {flags.sharpen}; it must be free: {', '.join(task.free.names)}"
         )
     if flags.figure is not None:
         from legbench.viz.print.save import check_suffix
@@ -145,7 +143,7 @@ def _check(flags: IdentifyArguments, question: "IdentificationTask") -> None:
 
 def _hops(
     held_out: list[Recording],
-    question: "IdentificationTask",
+    task: "IdentificationTask",
     outcome: "Identification",
     lines: list[str],
     content: dict[str, Any],
@@ -156,7 +154,7 @@ def _hops(
     hops = [each for each in held_out if each.description.jumps]
     if not hops:
         return True
-    leg = written_back(question.design, outcome, question.bars)
+    leg = written_back(task.design, outcome, task.bars)
     repeated = [repeat(each, leg) for each in hops]
     lines += ["", *(f"held-out hop      {each.text}" for each in repeated)]
     lines += [
@@ -173,7 +171,7 @@ def _hops(
 
 def _extras(
     flags: IdentifyArguments,
-    question: "IdentificationTask",
+    task: "IdentificationTask",
     outcome: "Identification",
     lines: list[str],
     content: dict[str, Any],
@@ -183,29 +181,29 @@ def _extras(
         from legbench.identify.peer import ask_peer
 
         note("asking mujoco.sysid")
-        answer = ask_peer(question)
+        answer = ask_peer(task)
         lines += ["", *answer.lines(outcome)]
         content["peer"] = asdict(answer)
     if flags.plan is not None:
-        _plan(flags.plan, flags, question, outcome, lines, content)
+        _plan(flags.plan, flags, task, outcome, lines, content)
     if flags.out is not None:
         from legbench.identify import design_text, written_back
         from legbench.writing import save_whole
 
-        leg = written_back(question.design, outcome, question.bars)
+        leg = written_back(task.design, outcome, task.bars)
         save_whole(flags.out, design_text(leg, outcome))
         note(f"wrote {flags.out}")
     if flags.figure is not None:
         from legbench.viz.print.identified import identified_figure
         from legbench.viz.print.save import save_figure
 
-        note(f"wrote {save_figure(identified_figure(question, outcome), flags.figure)}")
+        note(f"wrote {save_figure(identified_figure(task, outcome), flags.figure)}")
 
 
 def _plan(
     path: Path,
     flags: IdentifyArguments,
-    question: "IdentificationTask",
+    task: "IdentificationTask",
     outcome: "Identification | None",
     lines: list[str],
     content: dict[str, Any],
@@ -215,9 +213,9 @@ def _plan(
     from legbench.identify.plan import best_of, plan_lines, ranked
     from legbench.plants import limits_for
 
-    limits = None if flags.limits is None else limits_for(flags.limits, question.design)
+    limits = None if flags.limits is None else limits_for(flags.limits, task.design)
     note("predicting experiments")
-    plans = ranked(question, outcome, sharpen=flags.sharpen)
+    plans = ranked(task, outcome, sharpen=flags.sharpen)
     best = best_of(plans, limits, say=note)
     save_experiment(best.experiment, path)
     lines += ["", *plan_lines(plans), f"next run          {best.name}"]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from legbench.lazily import lazy_names
 
 if TYPE_CHECKING:
-    from legbench.identify.asking import question_of, read_runs
+    from legbench.identify.asking import read_runs, task_of
     from legbench.identify.back_to_design import design_text, written_back
     from legbench.identify.gate import UnidentifiableError
     from legbench.identify.outcome import Estimate, Identification
@@ -26,9 +26,9 @@ __all__ = [
     "design_text",
     "identify",
     "parse_free",
-    "question_of",
     "read_runs",
     "repeat",
+    "task_of",
     "written_back",
 ]
 __getattr__ = lazy_names(
@@ -43,9 +43,9 @@ __getattr__ = lazy_names(
         "design_text": "legbench.identify.back_to_design",
         "identify": "legbench.identify.staged",
         "parse_free": "legbench.identify.parameters",
-        "question_of": "legbench.identify.asking",
         "read_runs": "legbench.identify.asking",
         "repeat": "legbench.identify.repeated",
+        "task_of": "legbench.identify.asking",
         "written_back": "legbench.identify.back_to_design",
     },
 )

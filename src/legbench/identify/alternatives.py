@@ -6,7 +6,7 @@ from typing import Final
 
 from legbench.errors import PlantFault
 from legbench.identify.adequacy import SIGNIFICANT, Score
-from legbench.identify.base import FittedLeg
+from legbench.identify.base import LegParameters
 from legbench.identify.fitting import fit
 from legbench.identify.parameters import INDEX, PARAMETERS
 from legbench.identify.problem import Misfit, Problem
@@ -27,7 +27,7 @@ class OtherBars:
     """Mass per length of the bars of the fit [kg/m]; zero: they weigh nothing."""
     density: float
     """Mass per length that is tried instead [kg/m]."""
-    leg: FittedLeg
+    leg: LegParameters
     """Leg with such bars."""
 
 

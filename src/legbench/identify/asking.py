@@ -1,4 +1,4 @@
-"""Question to runs in folders: they are read, and must be of one leg."""
+"""Task of identifying the leg of runs in folders: they are read, and must be of one leg."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -53,7 +53,7 @@ def _differing(one: LegDesign, two: LegDesign) -> str:
     return f", which differs in {', '.join(n for n in names if getattr(one, n) != getattr(two, n))}"
 
 
-def question_of(
+def task_of(
     runs: Sequence[Recording],
     *,
     free: Freedom,
@@ -63,13 +63,13 @@ def question_of(
     noise: float | None = None,
     starts: int = 3,
 ) -> IdentificationTask:
-    """Make the question to some runs.
+    """Make the task of identifying a leg from some runs.
 
     Args:
         runs: recordings in fixed setups, all of one leg.
         free: what is to be learned.
         design: leg to start from; none: the one that the runs name.
-        held_out: runs that are predicted, not fitted; hops are left to `predict_run`.
+        held_out: runs that are predicted, not fitted; hops are left to `repeat`.
         mass: mass of the whole leg as weighed [kg].
         noise: standard deviation of the link encoders [rad]; none: it is measured.
         starts: number of starts of the fit.

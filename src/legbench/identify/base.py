@@ -31,8 +31,8 @@ radian a second of a swinging leg, wide enough for a smooth integrator."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FittedLeg:
-    """What a fit keeps of a leg: its lever, and the parameters that it starts from."""
+class LegParameters:
+    """Leg as a fit sees it: its lever, and its parameters."""
 
     reach: float
     """Distance of the foot tip along either direction, l1 + l3 = l2 [m]."""
@@ -42,7 +42,7 @@ class FittedLeg:
     @classmethod
     def of(
         cls, design: LegDesign, *, bars: Bars | None = None, mass: float | None = None
-    ) -> "FittedLeg":
+    ) -> "LegParameters":
         """Collect the parameters of a design, of its bars, and of the mass that was weighed.
 
         Args:

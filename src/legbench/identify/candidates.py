@@ -28,9 +28,9 @@ DURATION: Final = 3.0
 """Length of a candidate [s]."""
 
 
-def candidates(question: IdentificationTask) -> Iterator[tuple[str, Experiment]]:
+def candidates(task: IdentificationTask) -> Iterator[tuple[str, Experiment]]:
     """Experiments by a name that says setup and motion."""
-    bars = question.bars
+    bars = task.bars
     linkage = (
         Linkage(kind=LinkageKind.REDUCED)
         if bars is None
@@ -41,7 +41,7 @@ def candidates(question: IdentificationTask) -> Iterator[tuple[str, Experiment]]
             yield (
                 f"{kind} {name}",
                 Experiment(
-                    design=question.design,
+                    design=task.design,
                     controller=controller,
                     setup=Setup(kind=SetupKind(kind)),
                     linkage=linkage,
@@ -62,9 +62,7 @@ def _motions() -> Iterator[tuple[str, ControllerSettings]]:
         yield f"chirp in {coordinate} 1 to 12 Hz", ChirpConfig(coordinate=coordinate)
 
 
-def trial_of_candidate(
-    name: str, experiment: Experiment, question: IdentificationTask
-) -> MeasuredRun:
+def trial_of_candidate(name: str, experiment: Experiment, task: IdentificationTask) -> MeasuredRun:
     """Run of a candidate as far as a prediction needs it: when the motors would be where.
 
     Motions that are the same whatever the leg does are asked of their controller; others are
@@ -73,7 +71,7 @@ def trial_of_candidate(
     Raises:
         ConfigError: the leg refuses the settings.
     """
-    like = question.trials[0]
+    like = task.trials[0]
     if isinstance(experiment.controller, BangBangConfig):
         return replace(trial_of(run(experiment)), links=like.links, motors=like.motors)
     controller = make_controller(experiment.controller, targets_of(experiment))

@@ -20,6 +20,7 @@ from legbench.identify._sysid import load_sysid
 from legbench.identify.outcome import Identification
 from legbench.identify.staged import IdentificationTask
 from legbench.identify.trial import MeasuredRun
+from legbench.metrics.changes import rows_before_change
 from legbench.mjcf import BuildOptions, Linkage, LinkageKind, build_spec, rest_qpos
 from legbench.plant.start import PERIOD
 from legbench.signals import Floats
@@ -50,31 +51,31 @@ class PeerAnswer:
         return [f"mujoco.sysid, {self.seconds:.1f} s", *rows]
 
 
-def ask_peer(question: IdentificationTask) -> PeerAnswer:
+def ask_peer(task: IdentificationTask) -> PeerAnswer:
     """Fit the same runs with `mujoco.sysid`.
 
     Raises:
         MissingExtraError: it is not installed.
         ConfigError: something other than stiffness and damping is free, or a run begins in motion.
     """
-    other = [name for name in question.free.names if name not in FREED]
+    other = [name for name in task.free.names if name not in FREED]
     if other:
         raise ConfigError(f"the peer frees {', '.join(FREED)} alone, not {', '.join(other)}")
-    if any(trial.moving for trial in question.trials):
+    if any(trial.moving for trial in task.trials):
         raise ConfigError("the peer needs runs that begin at rest")
     sysid = load_sysid()
     parameters = sysid.ParameterDict()
-    for name in question.free.names:
-        parameters.add(_parameter(sysid, name, question.design))
-    sequences = [_sequence(sysid, trial, question) for trial in question.trials]
+    for name in task.free.names:
+        parameters.add(_parameter(sysid, name, task.design))
+    sequences = [_sequence(sysid, trial, task) for trial in task.trials]
     residual = sysid.build_residual_fn(
         models_sequences=sequences,
-        modify_residual=_residual_of(question.bars is not None),
+        modify_residual=_residual_of(task.bars is not None),
     )
     before = time.perf_counter()
     with redirect_stdout(sys.stderr):  # what it says of its progress is no result
         found, _ = sysid.optimize(parameters, residual, verbose=False)
-    values = {name: float(found[name].value[0]) for name in question.free.names}
+    values = {name: float(found[name].value[0]) for name in task.free.names}
     return PeerAnswer(values=values, seconds=time.perf_counter() - before)
 
 
@@ -111,16 +112,16 @@ def _damps(joint: int) -> Callable[[mujoco.MjSpec, Any], None]:
     return write
 
 
-def _sequence(sysid: Any, trial: MeasuredRun, question: IdentificationTask) -> Any:
+def _sequence(sysid: Any, trial: MeasuredRun, task: IdentificationTask) -> Any:
     """Model and measurement of one run, with the motors at every step of the model."""
-    bars = question.bars
+    bars = task.bars
     linkage = (
         Linkage(kind=LinkageKind.REDUCED)
         if bars is None
         else Linkage(bar_density=bars.density, crank_length=bars.crank_length)
     )
     options = BuildOptions(setup=Setup(kind=trial.setup), linkage=linkage)
-    spec = build_spec(question.design, options)
+    spec = build_spec(task.design, options)
     for sensor in list(spec.sensors):
         spec.delete(sensor)
     for joint in ("1", "2"):
@@ -136,21 +137,16 @@ def _sequence(sysid: Any, trial: MeasuredRun, question: IdentificationTask) -> A
     held = np.concatenate([trial.motor_pos[1:], trial.motor_pos[-1:]])
     motors = np.repeat(held, parts, axis=0)
     times = model.opt.timestep * np.arange(len(motors))
-    first = trial.joint_pos[: _still(trial)].mean(axis=0)
+    still = max(1, int(rows_before_change(trial.motor_pos)))
+    first = trial.joint_pos[:still].mean(axis=0)
     return sysid.ModelSequences(
         trial.name,
         spec,
         trial.name,
-        sysid.create_initial_state(model, rest_qpos(model, question.design, first)),
+        sysid.create_initial_state(model, rest_qpos(model, task.design, first)),
         sysid.TimeSeries.from_control_names(times, motors, model),
         sysid.TimeSeries.from_names(trial.time, trial.joint_pos, model),
     )
-
-
-def _still(trial: MeasuredRun) -> int:
-    """Number of rows before the motors move."""
-    moved = np.flatnonzero(np.any(trial.motor_pos != trial.motor_pos[0], axis=1))
-    return int(moved[0]) if len(moved) and moved[0] > 0 else 1
 
 
 def _residual_of(bars: bool) -> Callable[..., Any]:

@@ -48,7 +48,7 @@ class PlannedExperiment:
 
 
 def ranked(
-    question: IdentificationTask,
+    task: IdentificationTask,
     outcome: Identification | None,
     *,
     sharpen: str | None = None,
@@ -57,7 +57,7 @@ def ranked(
     """Rank candidates, the best first.
 
     Args:
-        question: the runs so far, and what is free.
+        task: the runs so far, and what is free.
         outcome: what was learned from them; none: nothing, and the design is believed.
         sharpen: the parameter whose error matters; none: all that are free.
         among: candidates with their names; none: all of `candidates`.
@@ -65,19 +65,19 @@ def ranked(
     Raises:
         ConfigError: no candidate can be predicted.
     """
-    names, values = question.free.names, question.leg.values
+    names, values = task.free.names, task.leg.values
     if outcome is not None and outcome.values is not None:
         values = outcome.values
     now = sum(
-        (_information(question, trial, values) for trial in question.trials),
+        (_information(task, trial, values) for trial in task.trials),
         np.zeros((len(names), len(names))),
     )
     before = _errors(now)
     found = []
-    for name, experiment in candidates(question) if among is None else among:
+    for name, experiment in candidates(task) if among is None else among:
         try:
-            trial = trial_of_candidate(name, experiment, question)
-            after = _errors(now + _information(question, trial, values))
+            trial = trial_of_candidate(name, experiment, task)
+            after = _errors(now + _information(task, trial, values))
         except (ConfigError, PlantFault):
             continue  # a leg that refuses it or cannot do it is not asked to
         logarithms = np.log(after)
@@ -129,12 +129,12 @@ def plan_lines(plans: Sequence[PlannedExperiment]) -> list[str]:
     return [head, *rows]
 
 
-def _information(question: IdentificationTask, trial: MeasuredRun, values: Floats) -> Floats:
+def _information(task: IdentificationTask, trial: MeasuredRun, values: Floats) -> Floats:
     """Normal matrix (m, m) of one run, what is free in its first row being eliminated."""
-    problem = Problem([trial], question.leg.reach, question.free)
+    problem = Problem([trial], task.leg.reach, task.free)
     guess = Guess(values=values, starts=nothing_moved([trial]))
     matrix, _ = problem.misfit(guess).normal()
-    own = len(question.free.names)
+    own = len(task.free.names)
     mixed, rest = matrix[:own, own:], matrix[own:, own:]
     if not len(rest):
         return matrix

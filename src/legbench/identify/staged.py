@@ -18,7 +18,7 @@ from legbench.design import LegDesign
 from legbench.errors import ConfigError, PlantFault
 from legbench.identify.adequacy import residuals_of, scores_of
 from legbench.identify.alternatives import OtherBars, explain
-from legbench.identify.base import FittedLeg, mended
+from legbench.identify.base import LegParameters, mended
 from legbench.identify.checks import DataFinding, check_data
 from legbench.identify.estimates import estimates_of
 from legbench.identify.fitting import LeastSquaresFit, fit
@@ -73,9 +73,9 @@ class IdentificationTask:
             raise ConfigError(f"mass is {self.mass:g} kg; it must be positive and finite")
 
     @property
-    def leg(self) -> FittedLeg:
+    def leg(self) -> LegParameters:
         """Leg that the fit starts from."""
-        return FittedLeg.of(self.design, bars=self.bars, mass=self.mass)
+        return LegParameters.of(self.design, bars=self.bars, mass=self.mass)
 
     @property
     def other_bars(self) -> OtherBars | None:
@@ -85,11 +85,11 @@ class IdentificationTask:
             bars = None if held else Bars(density=fitted_bar_density(self.design))
         except ConfigError:
             return None
-        leg = FittedLeg.of(self.design, bars=bars, mass=self.mass)
+        leg = LegParameters.of(self.design, bars=bars, mass=self.mass)
         return OtherBars(held=held, density=0.0 if bars is None else bars.density, leg=leg)
 
 
-def identify(question: IdentificationTask, say: Say = lambda _: None) -> Identification:
+def identify(task: IdentificationTask, say: Say = lambda _: None) -> Identification:
     """Learn the parameters of a leg from runs.
 
     Raises:
@@ -97,42 +97,42 @@ def identify(question: IdentificationTask, say: Say = lambda _: None) -> Identif
             unseen, and what to add.
         PlantFault: the design cannot be predicted at all.
     """
-    leg, trials = question.leg, question.trials
+    leg, trials = task.leg, task.trials
     runs = tuple(trial.name for trial in trials)
     left_out = tuple(len(trial.left_out) for trial in trials)
     say("checking the data")
-    findings = _findings(question, leg)
+    findings = _findings(task, leg)
     if any(finding.hopeless for finding in findings):
         reasons = tuple(f"{each.run}: {each.text}" for each in findings)
         return Identification(
             runs=runs, left_out=left_out, findings=tuple(findings), reasons=reasons
         )
-    problem = Problem(trials, leg.reach, question.free)
+    problem = Problem(trials, leg.reach, task.free)
     guess = Guess(values=leg.values, starts=nothing_moved(trials))
     gate = look(problem.misfit(guess), problem.names)
     check_gate(gate, {trial.setup for trial in trials})
     say("fitting")
-    fits = fits_from(problem, guess, question.starts, question.seed)
+    fits = fits_from(problem, guess, task.starts, task.seed)
     best = min(fits, key=lambda each: each.misfit.cost)
     agreeing = [each for each in fits if each.misfit.cost <= best.misfit.cost * (1.0 + SAME)]
     outcome = Identification(
         runs=runs,
         left_out=left_out,
         findings=tuple(findings),
-        starts=question.starts,
+        starts=task.starts,
         agreeing=len(agreeing),
         evaluations=sum(each.evaluations for each in fits),
         converged=best.converged,
     )
     say("judging")
-    return _judged(question, problem, best.misfit, outcome)
+    return _judged(task, problem, best.misfit, outcome)
 
 
 def _judged(
-    question: IdentificationTask, problem: Problem, misfit: Misfit, begun: Identification
+    task: IdentificationTask, problem: Problem, misfit: Misfit, begun: Identification
 ) -> Identification:
     """Add to an outcome what is known once the fit has ended."""
-    trials, names = question.trials, question.free.names
+    trials, names = task.trials, task.free.names
     gate = look(misfit, problem.names)
     check_gate(gate, {trial.setup for trial in trials})
     spread = spread_of(misfit, trials)
@@ -142,26 +142,26 @@ def _judged(
     outcome = replace(
         begun,
         gate=gate,
-        estimates=estimates_of(names, question.leg.values, values, spread),
+        estimates=estimates_of(names, task.leg.values, values, spread),
         correlation=correlation,
         alike=tuple(pairs_alike(correlation, names, ALIKE)),
         values=values,
         misfit=misfit,
         residuals=tuple(residuals_of(misfit, trials)),
         scores=tuple(scores),
-        alternatives=tuple(explain(problem, misfit, scores, question.other_bars)),
-        held_out=tuple(hold_out(each, misfit.guess, problem.reach) for each in question.held_out),
+        alternatives=tuple(explain(problem, misfit, scores, task.other_bars)),
+        held_out=tuple(hold_out(each, misfit.guess, problem.reach) for each in task.held_out),
     )
     return replace(outcome, reasons=tuple(reasons_against(outcome)))
 
 
-def _findings(question: IdentificationTask, leg: FittedLeg) -> list[DataFinding]:
-    limits = question.design.limits
-    found = [each for trial in question.trials for each in check_data(trial, limits)]
+def _findings(task: IdentificationTask, leg: LegParameters) -> list[DataFinding]:
+    limits = task.design.limits
+    found = [each for trial in task.trials for each in check_data(trial, limits)]
     if any(finding.hopeless for finding in found):
         return found
-    guess = Guess(values=leg.values, starts=nothing_moved(question.trials))
-    wrong = check_wiring(question.trials, guess, leg.reach)
+    guess = Guess(values=leg.values, starts=nothing_moved(task.trials))
+    wrong = check_wiring(task.trials, guess, leg.reach)
     # Angles of encoders that are wired otherwise say nothing about stops.
     rewired = {each.run for each in wrong}
     return [each for each in found if each.run not in rewired or each.what != "stop"] + wrong

@@ -16,18 +16,18 @@ COLOURS: Final = ("#1f5fa8", "#c8622d")
 """Colours of q1 and q2."""
 
 
-def identified_figure(question: IdentificationTask, outcome: Identification) -> Figure:
+def identified_figure(task: IdentificationTask, outcome: Identification) -> Figure:
     """Draw estimates against the design, and residuals by run and joint.
 
     Residuals are means over `ROWS` rows, which noise hardly moves; bands are what noise and counts
     explain of them.
     """
-    misfit, trials = outcome.misfit, question.trials
+    misfit, trials = outcome.misfit, task.trials
     runs = 0 if misfit is None else len(trials)
     with styled():
         figure = Figure(figsize=(8.0, 2.6 + 1.3 * runs), layout="constrained")
         verdict = "trusted" if outcome.trusted else "not to be trusted"
-        figure.suptitle(f"{question.design.name}: {verdict}")
+        figure.suptitle(f"{task.design.name}: {verdict}")
         axes = np.atleast_1d(
             figure.subplots(runs + 1, 1, height_ratios=[2.0, *([1.0] * runs)])
         ).tolist()
