@@ -65,3 +65,12 @@ def test_the_time_left_follows_the_pace_since_the_first_report(
     for done in (2, 6, 8):
         tell(done, 12)
     assert told == [(2, 12, None), (6, 12, 3.0), (8, 12, 2.0)]
+
+
+def test_each_of_several_works_has_a_pace_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two families of modes, say, are followed one after the other with one line."""
+    now = iter((0.0, 100.0, 101.0, 103.0))
+    monkeypatch.setattr(output.time, "monotonic", lambda: next(now))
+    left_after = output.pace()
+    left = [left_after(done, 10) for done in (1, 9, 1, 5)]
+    assert left == [None, 12.5, None, 2.5]

@@ -1,12 +1,19 @@
 """`legbench explain`: which imperfections of a leg reproduce the ratings that were measured."""
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, final
 
-from legbench.cli.output import note, print_json, progress, report_error, results_in, write_json
+from legbench.cli.output import (
+    note,
+    pace,
+    print_json,
+    progress,
+    report_error,
+    results_in,
+    write_json,
+)
 from legbench.cli.parse import parse
 from legbench.design import load_design
 
@@ -114,7 +121,7 @@ class StageProgress:
 
     def __init__(self, stopped: Callable[[], bool]) -> None:
         self._stopped = stopped
-        self._done, self._total, self._began = 0, 1, time.monotonic()
+        self._done, self._total, self._left_after = 0, 1, pace()
 
     def watch(self) -> "Watch":
         """Return what a long computation is given."""
@@ -128,10 +135,9 @@ class StageProgress:
             progress(self._total, self._total)
         if not self._stopped():
             note(f"{stage}: {legs} legs")
-        self._done, self._total, self._began = 0, max(legs, 1), time.monotonic()
+        self._done, self._total, self._left_after = 0, max(legs, 1), pace()
+        self._left_after(0, self._total)
 
     def _advance(self, legs: int) -> None:
         self._done = min(self._done + legs, self._total)
-        taken = time.monotonic() - self._began
-        left = taken * (self._total - self._done) / self._done if self._done else None
-        progress(self._done, self._total, left)
+        progress(self._done, self._total, self._left_after(self._done, self._total))

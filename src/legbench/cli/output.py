@@ -1,6 +1,7 @@
 """Output of the commands: results on stdout, everything else on stderr."""
 
 import errno
+import math
 import os
 import select
 import sys
@@ -137,15 +138,19 @@ def timed_progress() -> Callable[[int, int], None]:
 
 
 def pace() -> Callable[[int, int], float | None]:
-    """Return what tells the time left [s] by the pace since it was first asked; none at first."""
-    first: list[tuple[float, int]] = []
+    """Return what tells the time left [s] by the pace since it was first asked; none at first.
+
+    Less done than before begins another work, with a pace of its own.
+    """
+    began, first, last = 0.0, 0, math.inf
 
     def left_after(done: int, total: int) -> float | None:
+        nonlocal began, first, last
         now = time.monotonic()
-        begin, before = first[0] if first else (now, done)
-        if not first:
-            first.append((now, done))
-        return (now - begin) * (total - done) / (done - before) if done > before else None
+        if done < last:
+            began, first = now, done
+        last = done
+        return (now - began) * (total - done) / (done - first) if done > first else None
 
     return left_after
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from tyro.conf import Positional
 
-from legbench.cli.output import note, print_json, progress, results_in
+from legbench.cli.output import note, print_json, results_in, timed_progress
 from legbench.cli.parse import parse
 from legbench.errors import ConfigError
 
@@ -43,7 +43,7 @@ def main(arguments: list[str]) -> int:
     if out.suffix.lower() not in (".html", ".htm"):
         raise ConfigError(f"--out is {out}; the page is a .html file (figures: --figures png)")
     with results_in(out.parent):
-        written = write_report(sources, out, suffixes=flags.figures, progress=progress)
+        written = write_report(sources, out, suffixes=flags.figures, progress=timed_progress())
     if flags.json:
         print_json(written.content)
         return 0
