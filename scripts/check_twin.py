@@ -12,46 +12,22 @@ import sys
 import time
 from pathlib import Path
 
-import legbench
-from legbench.control import ControllerSettings, JumpConfig, PositionJumpConfig
-from legbench.design import load_design
-from legbench.design.setup import Setup, SetupKind
-from legbench.experiment import Experiment
+from legbench.control import JumpConfig, PositionJumpConfig
+from legbench.design.setup import SetupKind
 from legbench.identify import identify, parse_free, repeat, task_of, written_back
 from legbench.identify.base import LegParameters
 from legbench.identify.parameters import INDEX
 from legbench.identify.plan import ranked
 from legbench.identify.trial import FIXED, bars_of
-from legbench.imperfections import Imperfections
-from legbench.plants import EMULATED, CanChoice
 
-ROOT = Path(__file__).parents[1]
-PROTOTYPE = load_design(ROOT / "models" / "prototype.toml")
-HIDDEN = Imperfections(
-    stiffness_error=(0.05, -0.03),
-    damping_error=(0.2, -0.1),
-    com_error=(0.003, 0.0, -0.002),
-    inertia_error=(0.05, -0.04, 0.02),
-)
+sys.path.append(str(Path(__file__).parents[1] / "tests" / "identify"))
+from twins import HIDDEN, PROTOTYPE, driven
+
 WITHIN = {"k": 2e-4, "d": 1e-3, "s": 5e-4}
 """Largest shares by which stiffness, damping and first moments may be off [-]."""
 SHRINKS = 8.0
 """Least factor by which the best run shrinks the error of the coupling [-]."""
 STEP = PositionJumpConfig(z2=1.0, dz2=0.3)
-
-
-def driven(controller: ControllerSettings, kind: SetupKind, duration: float) -> legbench.Recording:
-    """Run of the hidden leg behind emulated drives."""
-    return legbench.run(
-        Experiment(
-            design=PROTOTYPE,
-            controller=controller,
-            setup=Setup(kind=kind),
-            plant=CanChoice(bus=ROOT / "hardware" / "leg.toml", interface=EMULATED),
-            imperfections=HIDDEN,
-            duration=duration,
-        )
-    )
 
 
 def twin() -> bool:

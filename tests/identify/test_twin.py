@@ -8,42 +8,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from twins import PROTOTYPE
+from twins import HIDDEN, PROTOTYPE, driven
 
-import legbench
 from legbench.control import JumpConfig, PositionJumpConfig
-from legbench.design.setup import Setup, SetupKind
+from legbench.design.setup import SetupKind
 from legbench.design.toml import load_design
 from legbench.errors import ConfigError
-from legbench.experiment import Experiment
 from legbench.identify import design_text, identify, parse_free, repeat, task_of, written_back
 from legbench.identify.base import LegParameters
 from legbench.identify.parameters import INDEX
 from legbench.identify.trial import bars_of
-from legbench.imperfections import Imperfections
-from legbench.plants import EMULATED, CanChoice
-
-HIDDEN = Imperfections(
-    stiffness_error=(0.05, -0.03),
-    damping_error=(0.2, -0.1),
-    com_error=(0.003, 0.0, -0.002),
-    inertia_error=(0.05, -0.04, 0.02),
-)
-ROOT = Path(__file__).parents[2]
-
-
-def driven(controller: PositionJumpConfig | JumpConfig, kind: SetupKind,
-           duration: float) -> legbench.Recording:  # fmt: skip
-    return legbench.run(
-        Experiment(
-            design=PROTOTYPE,
-            controller=controller,
-            setup=Setup(kind=kind),
-            plant=CanChoice(bus=ROOT / "hardware" / "leg.toml", interface=EMULATED),
-            imperfections=HIDDEN,
-            duration=duration,
-        )
-    )
 
 
 @pytest.mark.long

@@ -12,14 +12,25 @@ from legbench.control import ControllerSettings, PositionJumpConfig
 from legbench.design import LegDesign, load_design
 from legbench.design.setup import Setup, SetupKind
 from legbench.experiment import Experiment, run_batch
+from legbench.experiment.run import run
 from legbench.identify.staged import IdentificationTask
 from legbench.identify.trial import FIXED, MeasuredRun, trial_of
 from legbench.imperfections import Imperfections
 from legbench.mjcf.options import Linkage, LinkageKind
+from legbench.plants import EMULATED, CanChoice
+from legbench.recording.reader import Recording
 from legbench.servo import ServoConfig
 from legbench.signals import Floats
 
-PROTOTYPE = load_design(Path(__file__).parents[2] / "models" / "prototype.toml")
+ROOT = Path(__file__).parents[2]
+PROTOTYPE = load_design(ROOT / "models" / "prototype.toml")
+HIDDEN = Imperfections(
+    stiffness_error=(0.05, -0.03),
+    damping_error=(0.2, -0.1),
+    com_error=(0.003, 0.0, -0.002),
+    inertia_error=(0.05, -0.04, 0.02),
+)
+"""What makes a twin of the prototype, which is driven over CAN, another leg."""
 NOISE = math.radians(0.05)
 REDUCED = Linkage(kind=LinkageKind.REDUCED)
 STEP = PositionJumpConfig(z2=1.0, dz2=0.3, delay=0.06)
@@ -58,6 +69,20 @@ def trials(chosen: Sequence[Experiment]) -> tuple[MeasuredRun, ...]:
     return tuple(
         replace(trial_of(recording), name=str(each.setup.kind))
         for recording, each in zip(recordings, chosen, strict=True)
+    )
+
+
+def driven(controller: ControllerSettings, kind: SetupKind, duration: float) -> Recording:
+    """Run of the twin behind emulated drives."""
+    return run(
+        Experiment(
+            design=PROTOTYPE,
+            controller=controller,
+            setup=Setup(kind=kind),
+            plant=CanChoice(bus=ROOT / "hardware" / "leg.toml", interface=EMULATED),
+            imperfections=HIDDEN,
+            duration=duration,
+        )
     )
 
 
