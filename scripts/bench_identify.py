@@ -34,7 +34,7 @@ from legbench.identify.base import LegParameters
 from legbench.identify.fitting import fit
 from legbench.identify.prediction import Guess, nothing_moved
 from legbench.identify.problem import Problem
-from legbench.identify.trial import FIXED, MeasuredRun, trial_of
+from legbench.identify.trial import FIXED, FitTrial, trial_of
 from legbench.imperfections import Imperfections
 from legbench.mjcf.options import Linkage, LinkageKind
 
@@ -50,7 +50,7 @@ FREED = {
 }
 
 
-def steps() -> tuple[MeasuredRun, ...]:
+def steps() -> tuple[FitTrial, ...]:
     """Three steps of 3 s, with noise on the link encoders."""
     noise = float(np.radians(0.1))
     runs = run_batch(
@@ -70,7 +70,7 @@ def steps() -> tuple[MeasuredRun, ...]:
     return tuple(replace(trial_of(each), name=str(place)) for place, each in enumerate(runs))
 
 
-def against_cma(trials: tuple[MeasuredRun, ...], name: str) -> None:
+def against_cma(trials: tuple[FitTrial, ...], name: str) -> None:
     """Compare evaluations and processor time with pycma's."""
     leg = LegParameters.of(OFF)
     problem = Problem(trials, leg.reach, FREED[name])
@@ -120,7 +120,7 @@ print(f"k, d of three runs, everything imported and compiled anew: {now[0] - beg
 """
 
 
-def cold(trials: tuple[MeasuredRun, ...], folder: Path) -> None:
+def cold(trials: tuple[FitTrial, ...], folder: Path) -> None:
     """Identify k and d in a new process whose store of compiled integrators is empty."""
     path = folder / "trials.pickle"
     path.write_bytes(pickle.dumps((trials, OFF)))
@@ -142,7 +142,7 @@ pickle.dump(answer, open(sys.argv[1] + ".answer", "wb"))
 """
 
 
-def against_sysid(trials: tuple[MeasuredRun, ...], name: str, folder: Path) -> None:
+def against_sysid(trials: tuple[FitTrial, ...], name: str, folder: Path) -> None:
     """Compare the whole of an identification with the search of `mujoco.sysid` alone."""
     identify(IdentificationTask(design=OFF, trials=trials))  # compiled
     before = time.process_time()
@@ -174,7 +174,7 @@ def cpu_of_children() -> float:
     return usage.ru_utime + usage.ru_stime
 
 
-def shortened(trials: tuple[MeasuredRun, ...], duration: float) -> tuple[MeasuredRun, ...]:
+def shortened(trials: tuple[FitTrial, ...], duration: float) -> tuple[FitTrial, ...]:
     """First part of runs [s]."""
     rows = round(duration / trials[0].period)
     return tuple(

@@ -30,7 +30,7 @@ from legbench.identify.prediction import Guess, Predictor, nothing_moved
 from legbench.identify.problem import Problem
 from legbench.identify.spread import spread_of
 from legbench.identify.staged import IdentificationTask, fits_from
-from legbench.identify.trial import FIXED, MeasuredRun, bars_of, trial_of
+from legbench.identify.trial import FIXED, FitTrial, bars_of, trial_of
 from legbench.recording.reader import Recording
 from legbench.signals import Floats
 
@@ -79,7 +79,7 @@ def rounded(values: Floats) -> Floats:
     return np.round(values / COUNT) * COUNT
 
 
-def noisy(trial: MeasuredRun, random: np.random.Generator, *, motors: bool = True) -> MeasuredRun:
+def noisy(trial: FitTrial, random: np.random.Generator, *, motors: bool = True) -> FitTrial:
     """Run as encoders of 0.1 deg of noise and 16 384 counts show it, on motors, too, or not."""
     shown = trial.joint_pos + NOISE * random.standard_normal(trial.joint_pos.shape)
     return replace(
@@ -93,9 +93,9 @@ def noisy(trial: MeasuredRun, random: np.random.Generator, *, motors: bool = Tru
 
 def synthetic(
     truth: LegDesign, random: np.random.Generator, duration: float, *, motors: bool = True
-) -> list[MeasuredRun]:
+) -> list[FitTrial]:
     """Runs of a leg as its equations predict them, with noise."""
-    like = MeasuredRun(
+    like = FitTrial(
         name="",
         setup=SetupKind.FFS,
         time=np.array([0.0, 1.0]),
@@ -121,7 +121,7 @@ def synthetic(
 
 
 def learned(
-    trials: list[MeasuredRun], start: LegParameters, names: tuple[str, ...]
+    trials: list[FitTrial], start: LegParameters, names: tuple[str, ...]
 ) -> tuple[tuple[Estimate, ...], float]:
     """Estimates from one start, and the mean square of the residuals."""
     problem = Problem(trials, start.reach, Freedom(names=names))

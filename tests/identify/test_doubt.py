@@ -13,10 +13,10 @@ from legbench.design.setup import SetupKind
 from legbench.identify import identify
 from legbench.identify.alternatives import named
 from legbench.identify.checks import check_data
-from legbench.identify.trial import MeasuredRun
+from legbench.identify.trial import FitTrial
 from legbench.mjcf.fitting import fitted_bar_density
 
-Harm = Callable[[MeasuredRun], MeasuredRun]
+Harm = Callable[[FitTrial], FitTrial]
 
 
 @pytest.mark.parametrize(
@@ -37,7 +37,7 @@ Harm = Callable[[MeasuredRun], MeasuredRun]
     ],
 )
 def test_encoders_that_are_wired_wrongly_or_stand_still_are_named_before_any_fit(
-    steps: tuple[MeasuredRun, ...], harm: Harm, what: str, words: str
+    steps: tuple[FitTrial, ...], harm: Harm, what: str, words: str
 ) -> None:
     outcome = identify(task([*steps[:2], harm(steps[2])]))
     assert not outcome.trusted
@@ -54,7 +54,7 @@ def test_encoders_that_are_wired_wrongly_or_stand_still_are_named_before_any_fit
     ],
 )
 def test_a_delay_and_a_stretched_time_are_told_apart(
-    steps: tuple[MeasuredRun, ...], harm: Harm, name: str, value: float
+    steps: tuple[FitTrial, ...], harm: Harm, name: str, value: float
 ) -> None:
     outcome = identify(task([harm(each) for each in steps]))
     assert not outcome.trusted
@@ -68,7 +68,7 @@ def test_a_delay_and_a_stretched_time_are_told_apart(
 @pytest.mark.long
 @pytest.mark.parametrize(("segment", "name"), [("thigh", "J1"), ("shank", "J2")])
 def test_a_fixed_inertia_that_is_five_percent_wrong_is_named(
-    steps: tuple[MeasuredRun, ...], segment: str, name: str
+    steps: tuple[FitTrial, ...], segment: str, name: str
 ) -> None:
     right = getattr(OFF, segment)
     wrong = replace(OFF, **{segment: replace(right, inertia=1.05 * right.inertia)})
@@ -77,7 +77,7 @@ def test_a_fixed_inertia_that_is_five_percent_wrong_is_named(
     assert name in [each.name for each in named(outcome.alternatives)]
 
 
-def test_bars_that_were_left_out_are_not_accepted(steps_of_bars: tuple[MeasuredRun, ...]) -> None:
+def test_bars_that_were_left_out_are_not_accepted(steps_of_bars: tuple[FitTrial, ...]) -> None:
     outcome = identify(task(steps_of_bars))
     assert not outcome.trusted
     assert any("residuals hang together" in each for each in outcome.reasons)
@@ -88,14 +88,14 @@ def test_bars_that_were_left_out_are_not_accepted(steps_of_bars: tuple[MeasuredR
     assert any(f"wrong: bars of {best.value:.3g} kg/m explain" in each for each in outcome.reasons)
 
 
-def test_bars_that_are_not_there_are_named(steps: tuple[MeasuredRun, ...]) -> None:
+def test_bars_that_are_not_there_are_named(steps: tuple[FitTrial, ...]) -> None:
     outcome = identify(task(steps, bars=Bars(density=fitted_bar_density(PROTOTYPE))))
     assert outcome.alternatives[0].text.startswith("bars without mass explain ")
     assert outcome.alternatives[0].share > 0.9
 
 
 @pytest.mark.long
-def test_a_held_out_run_judges_the_fit(steps: tuple[MeasuredRun, ...]) -> None:
+def test_a_held_out_run_judges_the_fit(steps: tuple[FitTrial, ...]) -> None:
     chirp = trials(
         experiments(
             kinds=(SetupKind.FFS,), controller=ChirpConfig(delay=0.05, sweep=0.4), duration=0.5
@@ -109,7 +109,7 @@ def test_a_held_out_run_judges_the_fit(steps: tuple[MeasuredRun, ...]) -> None:
 
 
 def test_time_that_is_stretched_in_the_rows_or_has_gaps_is_named(
-    steps: tuple[MeasuredRun, ...],
+    steps: tuple[FitTrial, ...],
 ) -> None:
     slow = replace(steps[0], time=1.01 * steps[0].time)
     (found,) = check_data(slow, OFF.limits)
@@ -129,7 +129,7 @@ def test_time_that_is_stretched_in_the_rows_or_has_gaps_is_named(
 
 
 def test_a_joint_at_its_stop_and_a_motor_that_does_not_follow_are_named(
-    steps: tuple[MeasuredRun, ...],
+    steps: tuple[FitTrial, ...],
 ) -> None:
     limits = replace(OFF.limits, knee=(0.3, 1.7))
     (found,) = check_data(steps[0], limits)
@@ -146,5 +146,5 @@ def test_a_joint_at_its_stop_and_a_motor_that_does_not_follow_are_named(
 
 
 @pytest.mark.parametrize("setup", [0, 2])
-def test_clean_data_raise_no_finding(steps: tuple[MeasuredRun, ...], setup: int) -> None:
+def test_clean_data_raise_no_finding(steps: tuple[FitTrial, ...], setup: int) -> None:
     assert check_data(steps[setup], OFF.limits) == []

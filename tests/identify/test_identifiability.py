@@ -6,12 +6,12 @@ from twins import PROTOTYPE, task
 from legbench.errors import ConfigError
 from legbench.identify import UnidentifiableError, identify, parse_free
 from legbench.identify.parameters import NINE
-from legbench.identify.trial import MeasuredRun
+from legbench.identify.trial import FitTrial
 
 
 @pytest.mark.long
 def test_nine_parameters_are_seen_by_three_setups_and_a_known_mass(
-    steps: tuple[MeasuredRun, ...],
+    steps: tuple[FitTrial, ...],
 ) -> None:
     outcome = identify(task(steps, PROTOTYPE, free=parse_free(["nine"])))
     assert outcome.gate is not None
@@ -32,7 +32,7 @@ def test_nine_parameters_are_seen_by_three_setups_and_a_known_mass(
     ],
 )
 def test_what_cannot_be_seen_is_refused_in_words(
-    steps: tuple[MeasuredRun, ...], setups: list[int], free: list[str], words: str
+    steps: tuple[FitTrial, ...], setups: list[int], free: list[str], words: str
 ) -> None:
     asked = task([steps[each] for each in setups], PROTOTYPE, free=parse_free(free))
     with pytest.raises(UnidentifiableError, match=words):
@@ -41,7 +41,7 @@ def test_what_cannot_be_seen_is_refused_in_words(
 
 @pytest.mark.long
 def test_zero_errors_on_both_sides_of_the_springs_are_marked_weak(
-    steps: tuple[MeasuredRun, ...],
+    steps: tuple[FitTrial, ...],
 ) -> None:
     free = parse_free(["springs", "dampers", "link_zero", "motor_zero"])
     outcome = identify(task(steps, PROTOTYPE, free=free))

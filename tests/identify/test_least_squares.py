@@ -14,12 +14,12 @@ from legbench.identify.fitting import fit
 from legbench.identify.parameters import GROUPS, INDEX, Freedom
 from legbench.identify.prediction import Guess, nothing_moved
 from legbench.identify.problem import Problem
-from legbench.identify.trial import MeasuredRun
+from legbench.identify.trial import FitTrial
 from legbench.mjcf.fitting import fitted_bar_density
 
 
 def test_springs_and_dampers_that_are_thirty_percent_off_are_found(
-    steps: tuple[MeasuredRun, ...],
+    steps: tuple[FitTrial, ...],
 ) -> None:
     outcome = identify(task(steps))
     assert outcome.trusted, outcome.reasons
@@ -51,7 +51,7 @@ def test_nine_parameters_of_a_leg_that_was_built_otherwise_are_found() -> None:
 
 @pytest.mark.long
 def test_a_leg_with_bars_is_found_by_equations_with_bars(
-    steps_of_bars: tuple[MeasuredRun, ...],
+    steps_of_bars: tuple[FitTrial, ...],
 ) -> None:
     bars = Bars(density=fitted_bar_density(PROTOTYPE))
     outcome = identify(task(steps_of_bars, bars=bars))
@@ -63,7 +63,7 @@ def test_a_leg_with_bars_is_found_by_equations_with_bars(
 
 @pytest.mark.long
 def test_a_run_that_begins_in_motion_is_fitted_from_its_first_row_on(
-    steps: tuple[MeasuredRun, ...],
+    steps: tuple[FitTrial, ...],
 ) -> None:
     cut = tuple(
         replace(
@@ -82,9 +82,7 @@ def test_a_run_that_begins_in_motion_is_fitted_from_its_first_row_on(
 
 
 @pytest.mark.parametrize("names", [("k1", "k2", "d1", "d2"), GROUPS["nine"]])
-def test_fits_converge_from_far_away(
-    steps: tuple[MeasuredRun, ...], names: tuple[str, ...]
-) -> None:
+def test_fits_converge_from_far_away(steps: tuple[FitTrial, ...], names: tuple[str, ...]) -> None:
     """Starts of 0.4 to 3 times the truth, mixed, mended where no leg has such inertias."""
     random = np.random.default_rng(5)
     truth = LegParameters.of(PROTOTYPE)
@@ -102,7 +100,7 @@ def test_fits_converge_from_far_away(
         assert found.misfit.cost <= bottom
 
 
-def test_predicted_errors_are_those_that_noise_makes(steps: tuple[MeasuredRun, ...]) -> None:
+def test_predicted_errors_are_those_that_noise_makes(steps: tuple[FitTrial, ...]) -> None:
     """Estimates of many noises scatter as the Jacobian says, within the chance of 25 draws."""
     truth = LegParameters.of(PROTOTYPE)
     names = ("k1", "k2", "d1", "d2")

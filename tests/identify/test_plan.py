@@ -13,7 +13,7 @@ from legbench.experiment import Experiment
 from legbench.identify import identify, parse_free
 from legbench.identify.plan import best_of, plan_lines, ranked
 from legbench.identify.staged import IdentificationTask
-from legbench.identify.trial import MeasuredRun
+from legbench.identify.trial import FitTrial
 from legbench.imperfections import Imperfections
 from legbench.limits.safety import SafetyLimits
 
@@ -26,12 +26,12 @@ def candidate(controller: PositionJumpConfig | ChirpConfig, duration: float = 3.
     return replace(made, imperfections=Imperfections())
 
 
-def nine(steps: tuple[MeasuredRun, ...]) -> IdentificationTask:
+def nine(steps: tuple[FitTrial, ...]) -> IdentificationTask:
     return task(steps, PROTOTYPE, free=parse_free(["nine"]))
 
 
 def test_a_chirp_shrinks_the_error_of_the_coupling_and_another_step_hardly_does(
-    steps: tuple[MeasuredRun, ...],
+    steps: tuple[FitTrial, ...],
 ) -> None:
     among = [("step", candidate(STEP)), ("chirp", candidate(CHIRP))]
     first, second = ranked(nine(steps), None, sharpen="B", among=among)
@@ -46,7 +46,7 @@ def test_a_chirp_shrinks_the_error_of_the_coupling_and_another_step_hardly_does(
 
 @pytest.mark.long
 def test_predicted_errors_are_those_of_the_fit_after_the_run(
-    steps: tuple[MeasuredRun, ...],
+    steps: tuple[FitTrial, ...],
 ) -> None:
     """Planning a run like the third after the first two predicts the errors of all three."""
     three = identify(nine(steps))
@@ -60,7 +60,7 @@ def test_predicted_errors_are_those_of_the_fit_after_the_run(
         assert plan.errors[each.name] == pytest.approx(error, rel=0.15)
 
 
-def test_a_run_beyond_the_safety_limits_is_passed_over(steps: tuple[MeasuredRun, ...]) -> None:
+def test_a_run_beyond_the_safety_limits_is_passed_over(steps: tuple[FitTrial, ...]) -> None:
     short = ChirpConfig(coordinate=ChirpCoordinate.Q1, sweep=0.3, delay=0.05)
     calm = replace(short, amplitude=0.003)
     among = [("wild", candidate(short, 0.4)), ("calm", candidate(calm, 0.4))]

@@ -13,14 +13,14 @@ from legbench.identify.prediction import Guess, nothing_moved
 from legbench.identify.problem import Problem
 from legbench.identify.regression import regressed
 from legbench.identify.staged import fits_from
-from legbench.identify.trial import MeasuredRun
+from legbench.identify.trial import FitTrial
 
 TRUTH = LegParameters.of(PROTOTYPE)
 NINE = GROUPS["nine"]
 PLACES = [INDEX[name] for name in NINE]
 
 
-def far(steps: tuple[MeasuredRun, ...], seed: int) -> Guess:
+def far(steps: tuple[FitTrial, ...], seed: int) -> Guess:
     """Guess whose nine parameters are 0.4 to 3 times the truth, mended to be those of a leg."""
     values = TRUTH.values.copy()
     random = np.random.default_rng(seed)
@@ -28,7 +28,7 @@ def far(steps: tuple[MeasuredRun, ...], seed: int) -> Guess:
     return Guess(values=mended(values, TRUTH.reach), starts=nothing_moved(steps))
 
 
-def test_nine_parameters_come_near_the_truth_from_any_start(steps: tuple[MeasuredRun, ...]) -> None:
+def test_nine_parameters_come_near_the_truth_from_any_start(steps: tuple[FitTrial, ...]) -> None:
     first, second = (
         regressed(steps, far(steps, seed), Freedom(names=NINE), TRUTH.reach) for seed in (1, 2)
     )
@@ -41,7 +41,7 @@ def test_nine_parameters_come_near_the_truth_from_any_start(steps: tuple[Measure
     assert [share["k1"], share["k2"]] == pytest.approx([1.0, 1.0], abs=3e-3)
 
 
-def test_what_is_not_free_stays_as_it_is(steps: tuple[MeasuredRun, ...]) -> None:
+def test_what_is_not_free_stays_as_it_is(steps: tuple[FitTrial, ...]) -> None:
     start = far(steps, 1).at("J1", 2.0e-3)
     found = regressed(steps, start, Freedom(names=("d1", "f1", "delay")), TRUTH.reach)
     assert found is not None
@@ -50,7 +50,7 @@ def test_what_is_not_free_stays_as_it_is(steps: tuple[MeasuredRun, ...]) -> None
 
 
 def test_no_regression_without_a_linear_parameter_or_with_short_runs(
-    steps: tuple[MeasuredRun, ...],
+    steps: tuple[FitTrial, ...],
 ) -> None:
     start = far(steps, 1)
     assert regressed(steps, start, Freedom(names=("delay",)), TRUTH.reach) is None
@@ -67,7 +67,7 @@ def test_no_regression_without_a_linear_parameter_or_with_short_runs(
 
 
 def test_a_start_from_which_a_fit_is_lost_is_mended_by_the_next(
-    steps: tuple[MeasuredRun, ...],
+    steps: tuple[FitTrial, ...],
 ) -> None:
     problem, start = Problem(steps, TRUTH.reach, Freedom(names=NINE)), far(steps, 11)
     bottom = problem.misfit(Guess(values=TRUTH.values, starts=nothing_moved(steps))).cost

@@ -14,13 +14,13 @@ from legbench.identify.parameters import INDEX, Freedom
 from legbench.identify.prediction import Guess, nothing_moved
 from legbench.identify.problem import Problem
 from legbench.identify.rounding import MOST_STANDS, stretches_of
-from legbench.identify.trial import MeasuredRun
+from legbench.identify.trial import FitTrial
 from legbench.signals import Floats
 
 COUNT = 2.0 * np.pi / 2048
 
 
-def coarse(trial: MeasuredRun) -> MeasuredRun:
+def coarse(trial: FitTrial) -> FitTrial:
     """Run whose motors are shown in coarse counts."""
     precision = Precision(sigma=COUNT / np.sqrt(12.0), count=COUNT)
     return replace(
@@ -30,7 +30,7 @@ def coarse(trial: MeasuredRun) -> MeasuredRun:
     )
 
 
-def standing(trial: MeasuredRun, motors: Floats) -> MeasuredRun:
+def standing(trial: FitTrial, motors: Floats) -> FitTrial:
     """Run of as many rows as its motor positions (n, 2), whose links stand still."""
     rows = np.arange(len(motors), dtype=np.float64)
     return replace(
@@ -39,7 +39,7 @@ def standing(trial: MeasuredRun, motors: Floats) -> MeasuredRun:
 
 
 @pytest.fixture(scope="module")
-def outcome(steps: tuple[MeasuredRun, ...]) -> Identification:
+def outcome(steps: tuple[FitTrial, ...]) -> Identification:
     """What is learned from steps whose motors are shown in coarse counts."""
     return identify(task([coarse(each) for each in steps]))
 
@@ -56,7 +56,7 @@ def test_stiffness_does_not_suffer_from_coarse_counts_of_the_motors(
 
 
 def test_hidden_angles_that_are_found_are_those_that_rounding_hid(
-    steps: tuple[MeasuredRun, ...], outcome: Identification
+    steps: tuple[FitTrial, ...], outcome: Identification
 ) -> None:
     assert outcome.misfit is not None
     found, place = outcome.misfit.guess.hidden, 0
@@ -72,7 +72,7 @@ def test_hidden_angles_that_are_found_are_those_that_rounding_hid(
 
 @pytest.mark.parametrize("delay", [0.0, 2e-3])
 def test_derivatives_by_hidden_angles_are_those_of_finite_differences(
-    steps: tuple[MeasuredRun, ...], delay: float
+    steps: tuple[FitTrial, ...], delay: float
 ) -> None:
     problem = Problem(
         [coarse(each) for each in steps], LegParameters.of(OFF).reach, Freedom(names=("k1",))
@@ -93,7 +93,7 @@ def test_derivatives_by_hidden_angles_are_those_of_finite_differences(
 
 
 def test_each_stand_has_an_angle_of_its_own_and_motion_has_one(
-    steps: tuple[MeasuredRun, ...],
+    steps: tuple[FitTrial, ...],
 ) -> None:
     ramp = np.linspace(0.0, 0.99, 100)
     motors = np.concatenate([np.zeros(60), ramp, np.full(70, 1.0), ramp, np.full(20, 2.0)])
@@ -111,6 +111,6 @@ def test_each_stand_has_an_angle_of_its_own_and_motion_has_one(
     assert len(both) == 2 * (MOST_STANDS + 1)
 
 
-def test_a_motor_without_counts_hides_nothing(steps: tuple[MeasuredRun, ...]) -> None:
+def test_a_motor_without_counts_hides_nothing(steps: tuple[FitTrial, ...]) -> None:
     fine = replace(steps[0], motors=(Precision(sigma=1e-4, count=0.0),) * 2)
     assert stretches_of(fine) == ()

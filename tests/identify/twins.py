@@ -14,7 +14,7 @@ from legbench.design.setup import Setup, SetupKind
 from legbench.experiment import Experiment, run_batch
 from legbench.experiment.run import run
 from legbench.identify.staged import IdentificationTask
-from legbench.identify.trial import FIXED, MeasuredRun, trial_of
+from legbench.identify.trial import FIXED, FitTrial, trial_of
 from legbench.imperfections import Imperfections
 from legbench.mjcf.options import Linkage, LinkageKind
 from legbench.plants import EMULATED, CanChoice
@@ -63,7 +63,7 @@ def experiments(
     ]
 
 
-def trials(chosen: Sequence[Experiment]) -> tuple[MeasuredRun, ...]:
+def trials(chosen: Sequence[Experiment]) -> tuple[FitTrial, ...]:
     """Runs of experiments, each by the name of its setup."""
     recordings = run_batch(chosen, threads=1)
     return tuple(
@@ -86,12 +86,12 @@ def driven(controller: ControllerSettings, kind: SetupKind, duration: float) -> 
     )
 
 
-def task(runs: Sequence[MeasuredRun], design: LegDesign = OFF, **more: Any) -> IdentificationTask:
+def task(runs: Sequence[FitTrial], design: LegDesign = OFF, **more: Any) -> IdentificationTask:
     """Task with some runs that starts once, from a leg that is 30 % off."""
     return IdentificationTask(design=design, trials=tuple(runs), starts=1, **more)
 
 
-def stretched(trial: MeasuredRun, factor: float) -> MeasuredRun:
+def stretched(trial: FitTrial, factor: float) -> FitTrial:
     """Run whose clock goes slow by a factor: what happened, sampled at stretched times."""
     wanted = trial.time * factor
     joint_pos = np.stack([np.interp(wanted, trial.time, q) for q in trial.joint_pos.T], axis=1)
@@ -104,13 +104,13 @@ def stretched(trial: MeasuredRun, factor: float) -> MeasuredRun:
     )
 
 
-def late(trial: MeasuredRun, cycles: int) -> MeasuredRun:
+def late(trial: FitTrial, cycles: int) -> FitTrial:
     """Run whose link encoders answer some cycles late."""
     first = np.repeat(trial.joint_pos[:1], cycles, axis=0)
     return trial.with_links(np.concatenate([first, trial.joint_pos[:-cycles]]))
 
 
-def frozen(trial: MeasuredRun, joint: int, row: int) -> MeasuredRun:
+def frozen(trial: FitTrial, joint: int, row: int) -> FitTrial:
     """Run one of whose link encoders stands still from a row on."""
     links: Floats = trial.joint_pos.copy()
     links[row:, joint] = links[row, joint]

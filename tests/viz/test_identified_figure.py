@@ -12,7 +12,7 @@ from legbench.identify.parameters import Freedom
 from legbench.identify.prediction import Guess, nothing_moved
 from legbench.identify.problem import Problem
 from legbench.identify.staged import IdentificationTask
-from legbench.identify.trial import MeasuredRun
+from legbench.identify.trial import FitTrial
 
 pytest.importorskip("matplotlib")
 from legbench.viz.print.identified import identified_figure
@@ -23,7 +23,7 @@ def test_intervals_and_residuals_are_drawn_as_they_are(prototype: LegDesign) -> 
     motors = np.tile([-0.7, 0.7], (rows, 1))
     fine = Precision(sigma=1e-3, count=0.0)
     shown = motors + 1e-3 * np.random.default_rng(0).standard_normal(motors.shape)
-    trial = MeasuredRun(
+    trial = FitTrial(
         name="run",
         setup=SetupKind.HFTS,
         time=PERIOD * np.arange(rows, dtype=np.float64),

@@ -19,7 +19,7 @@ from legbench.identify.noise import FLOOR
 from legbench.identify.parameters import INDEX, PARAMETERS, moved
 from legbench.identify.prediction import Guess, Predictor
 from legbench.identify.problem import Misfit, Problem, all_slopes
-from legbench.identify.trial import MeasuredRun
+from legbench.identify.trial import FitTrial
 from legbench.signals import Floats
 
 ROWS: Final = 20
@@ -66,7 +66,7 @@ class Score:
     """Fall of the sum of squares, against what coloured noise makes of it [-]."""
 
 
-def residuals_of(misfit: Misfit, trials: Sequence[MeasuredRun]) -> list[Residual]:
+def residuals_of(misfit: Misfit, trials: Sequence[FitTrial]) -> list[Residual]:
     """Residuals of a fit by run and joint."""
     found = []
     for trial, residuals in zip(trials, misfit.residuals, strict=True):
@@ -93,7 +93,7 @@ def _of_means(residuals: Floats) -> tuple[float, float]:
     return float(np.mean(means**2)), (1.0 + RARE * math.sqrt(2.0 / count)) / ROWS
 
 
-def _explained(trial: MeasuredRun, joint: int) -> float:
+def _explained(trial: FitTrial, joint: int) -> float:
     """Coloured residual that the counts of link and motor encoders explain [rad].
 
     Motors that stand have been fitted; one that creeps is up to half a count beside what its
@@ -141,7 +141,7 @@ def _other_slopes(problem: Problem, guess: Guess, names: Sequence[str]) -> Float
     )
 
 
-def _excess(misfit: Misfit, trials: Sequence[MeasuredRun]) -> float:
+def _excess(misfit: Misfit, trials: Sequence[FitTrial]) -> float:
     """Factor by which coloured noise raises the variance of a score [-].
 
     It is measured from the residuals, and bounded by what the counts of the encoders can make.

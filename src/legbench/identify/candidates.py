@@ -19,7 +19,7 @@ from legbench.experiment.data import Experiment
 from legbench.experiment.run import run
 from legbench.experiment.start import targets_of
 from legbench.identify.staged import IdentificationTask
-from legbench.identify.trial import FIXED, MeasuredRun, trial_of
+from legbench.identify.trial import FIXED, FitTrial, trial_of
 from legbench.mjcf.options import Linkage, LinkageKind
 from legbench.plant.start import PERIOD
 from legbench.signals import Observation
@@ -62,7 +62,7 @@ def _motions() -> Iterator[tuple[str, ControllerSettings]]:
         yield f"chirp in {coordinate} 1 to 12 Hz", ChirpConfig(coordinate=coordinate)
 
 
-def trial_of_candidate(name: str, experiment: Experiment, task: IdentificationTask) -> MeasuredRun:
+def trial_of_candidate(name: str, experiment: Experiment, task: IdentificationTask) -> FitTrial:
     """Run of a candidate as far as a prediction needs it: when the motors would be where.
 
     Motions that are the same whatever the leg does are asked of their controller; others are
@@ -78,7 +78,7 @@ def trial_of_candidate(name: str, experiment: Experiment, task: IdentificationTa
     rows = round(experiment.duration / PERIOD)
     asked = [controller.step(_moment(row * PERIOD)).motor_pos for row in range(rows)]
     motors = np.array([controller.start_motor_pos, *asked[:-1]])
-    return MeasuredRun(
+    return FitTrial(
         name=name,
         setup=experiment.setup.kind,
         time=PERIOD * np.arange(rows, dtype=np.float64),

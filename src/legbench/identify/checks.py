@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from legbench.design.leg import Limits
-from legbench.identify.trial import MeasuredRun
+from legbench.identify.trial import FitTrial
 from legbench.signals import Bools, Floats, Ints
 
 RATE_ERROR: Final = 1e-3
@@ -38,7 +38,7 @@ class DataFinding:
     """Whether nothing can be learned from the run before it is mended."""
 
 
-def check_data(trial: MeasuredRun, limits: Limits) -> list[DataFinding]:
+def check_data(trial: FitTrial, limits: Limits) -> list[DataFinding]:
     """Find what is wrong with the data of one run by itself."""
     found = [*_rate(trial), *_stops(trial, limits), *_frozen_links(trial), *_frozen_motors(trial)]
     return [
@@ -47,7 +47,7 @@ def check_data(trial: MeasuredRun, limits: Limits) -> list[DataFinding]:
     ]
 
 
-def _rate(trial: MeasuredRun) -> list[tuple[str, str]]:
+def _rate(trial: FitTrial) -> list[tuple[str, str]]:
     gaps = np.diff(trial.time)
     found = []
     wide = gaps > GAP * trial.period
@@ -75,7 +75,7 @@ def _rate(trial: MeasuredRun) -> list[tuple[str, str]]:
     return found
 
 
-def _stops(trial: MeasuredRun, limits: Limits) -> list[tuple[str, str]]:
+def _stops(trial: FitTrial, limits: Limits) -> list[tuple[str, str]]:
     """Joints that touch their stops, which the equations of a fit do not have."""
     found = []
     q1, q2 = trial.joint_pos.T
@@ -93,7 +93,7 @@ def _stops(trial: MeasuredRun, limits: Limits) -> list[tuple[str, str]]:
     return found
 
 
-def _frozen_links(trial: MeasuredRun) -> list[tuple[str, str]]:
+def _frozen_links(trial: FitTrial) -> list[tuple[str, str]]:
     found = []
     for joint in (0, 1):
         other = trial.joint_pos[:, 1 - joint]
@@ -110,7 +110,7 @@ def _frozen_links(trial: MeasuredRun) -> list[tuple[str, str]]:
     return found
 
 
-def _frozen_motors(trial: MeasuredRun) -> list[tuple[str, str]]:
+def _frozen_motors(trial: FitTrial) -> list[tuple[str, str]]:
     found = []
     for joint in (0, 1):
         command = trial.applied_pos[:, joint]
@@ -129,7 +129,7 @@ def _frozen_motors(trial: MeasuredRun) -> list[tuple[str, str]]:
 
 
 def _frozen(
-    trial: MeasuredRun, values: Floats, other: Floats, sigma: float
+    trial: FitTrial, values: Floats, other: Floats, sigma: float
 ) -> tuple[float, float, float] | None:
     """Longest stretch of one value during which another signal swings: begin, end, swing."""
     begins, ends = stretches(np.diff(values) == 0.0)

@@ -11,7 +11,7 @@ from legbench.identify.fitting import fit
 from legbench.identify.parameters import INDEX, Freedom
 from legbench.identify.prediction import Guess, nothing_moved
 from legbench.identify.problem import Problem
-from legbench.identify.trial import MeasuredRun
+from legbench.identify.trial import FitTrial
 
 DRIFT: Final = 2.0
 """Factor by which a held-out run may exceed what counts and equations explain [-]: its motion also
@@ -43,7 +43,7 @@ class HeldOut:
         return f"{self.run}: {', '.join(parts)} (noise {noise} rad)"
 
 
-def hold_out(trial: MeasuredRun, guess: Guess, reach: float) -> HeldOut:
+def hold_out(trial: FitTrial, guess: Guess, reach: float) -> HeldOut:
     """Predict a run from fitted parameters; its first posture alone is its own."""
     rubs = any(guess.values[INDEX[name]] for name in ("f1", "f2"))
     problem = Problem([trial], reach, Freedom(names=()), friction=rubs)

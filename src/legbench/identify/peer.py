@@ -19,7 +19,7 @@ from legbench.errors import ConfigError
 from legbench.identify._sysid import load_sysid
 from legbench.identify.outcome import Identification
 from legbench.identify.staged import IdentificationTask
-from legbench.identify.trial import MeasuredRun
+from legbench.identify.trial import FitTrial
 from legbench.metrics.changes import rows_before_change
 from legbench.mjcf import BuildOptions, Linkage, LinkageKind, build_spec, rest_qpos
 from legbench.plant.start import PERIOD
@@ -112,7 +112,7 @@ def _damps(joint: int) -> Callable[[mujoco.MjSpec, Any], None]:
     return write
 
 
-def _sequence(sysid: Any, trial: MeasuredRun, task: IdentificationTask) -> Any:
+def _sequence(sysid: Any, trial: FitTrial, task: IdentificationTask) -> Any:
     """Model and measurement of one run, with the motors at every step of the model."""
     bars = task.bars
     linkage = (

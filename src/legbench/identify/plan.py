@@ -20,7 +20,7 @@ from legbench.identify.parameters import PARAMETERS
 from legbench.identify.prediction import Guess, nothing_moved
 from legbench.identify.problem import Problem
 from legbench.identify.staged import IdentificationTask
-from legbench.identify.trial import MeasuredRun
+from legbench.identify.trial import FitTrial
 from legbench.limits.safety import SafetyLimits
 from legbench.plants import SimChoice
 from legbench.signals import Floats
@@ -129,7 +129,7 @@ def plan_lines(plans: Sequence[PlannedExperiment]) -> list[str]:
     return [head, *rows]
 
 
-def _information(task: IdentificationTask, trial: MeasuredRun, values: Floats) -> Floats:
+def _information(task: IdentificationTask, trial: FitTrial, values: Floats) -> Floats:
     """Normal matrix (m, m) of one run, what is free in its first row being eliminated."""
     problem = Problem([trial], task.leg.reach, task.free)
     guess = Guess(values=values, starts=nothing_moved([trial]))

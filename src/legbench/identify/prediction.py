@@ -13,7 +13,7 @@ from legbench.errors import PlantFault
 from legbench.identify.base import can_be, equation_parameters
 from legbench.identify.parameters import INDEX
 from legbench.identify.rounding import Stretch, by_stretch, stretches_of
-from legbench.identify.trial import MeasuredRun
+from legbench.identify.trial import FitTrial
 from legbench.signals import Floats
 
 SHARES: Final = np.linspace(0.1, 1.0, 10)
@@ -58,7 +58,7 @@ class Prediction:
 class Predictor:
     """Predictions for some runs of one leg."""
 
-    def __init__(self, trials: Sequence[MeasuredRun], reach: float, *, friction: bool) -> None:
+    def __init__(self, trials: Sequence[FitTrial], reach: float, *, friction: bool) -> None:
         self.trials, self.reach = tuple(trials), reach
         self.stretches = tuple(stretches_of(trial) for trial in self.trials)
         self._legs = SensitiveLegs(friction=friction)
@@ -91,7 +91,7 @@ class Predictor:
         return found
 
 
-def rows_within(trial: MeasuredRun, horizon: float | None) -> int:
+def rows_within(trial: FitTrial, horizon: float | None) -> int:
     """Number of rows up to a time after the first motion of the motors [s]."""
     if horizon is None:
         return len(trial.time)
@@ -105,7 +105,7 @@ def rows_within(trial: MeasuredRun, horizon: float | None) -> int:
 class _Run:
     """A run, and where its motors are believed to have been."""
 
-    trial: MeasuredRun
+    trial: FitTrial
     motors: Floats
     """Positions of the motors, but for their zeros (n, 2) [rad]."""
     stretches: tuple[Stretch, ...]
@@ -217,6 +217,6 @@ def _late(
     return tuple(found)
 
 
-def nothing_moved(trials: Sequence[MeasuredRun]) -> Floats:
+def nothing_moved(trials: Sequence[FitTrial]) -> Floats:
     """Starts (r, 4) of runs that begin at rest."""
     return np.zeros((len(trials), STATES))

@@ -9,7 +9,7 @@ import numpy as np
 from legbench.analytic.sensitivity import STATES
 from legbench.identify.parameters import INDEX, PARAMETERS, Freedom, moved, steps_of
 from legbench.identify.prediction import Guess, Prediction, Predictor
-from legbench.identify.trial import MeasuredRun
+from legbench.identify.trial import FitTrial
 from legbench.signals import Floats
 
 START_SCALE = np.array([1e-2, 1e-2, 1e-1, 1e-1])
@@ -79,7 +79,7 @@ class Problem:
 
     def __init__(
         self,
-        trials: Sequence[MeasuredRun],
+        trials: Sequence[FitTrial],
         reach: float,
         freedom: Freedom,
         *,
@@ -130,7 +130,7 @@ class Problem:
             cost=cost,
         )
 
-    def _slope(self, place: int, trial: MeasuredRun, each: Prediction, guess: Guess) -> Floats:
+    def _slope(self, place: int, trial: FitTrial, each: Prediction, guess: Guess) -> Floats:
         """Derivative of one run's prediction by the fit's steps (n, 2, m) [-]."""
         own = all_slopes(each, trial, guess.values)
         chosen = own[:, :, [INDEX[name] for name in self.freedom.names]]
@@ -161,13 +161,13 @@ class Problem:
         return guess.hidden if len(guess.hidden) else np.zeros(count)
 
 
-def all_slopes(each: Prediction, trial: MeasuredRun, values: Floats) -> Floats:
+def all_slopes(each: Prediction, trial: FitTrial, values: Floats) -> Floats:
     """Derivatives of one run's prediction by steps of every parameter (n, 2, p) [-]."""
     scales = np.array([steps_of(name, float(values[INDEX[name]])) for name in PARAMETERS])
     return without_rows(each.by_values * scales / trial.sigma[:, np.newaxis], trial)
 
 
-def without_rows(values: Floats, trial: MeasuredRun) -> Floats:
+def without_rows(values: Floats, trial: FitTrial) -> Floats:
     """Values of the first rows of a run (n, ...), with zeros where no drive has answered."""
     values[trial.left_out[trial.left_out < len(values)]] = 0.0
     return values

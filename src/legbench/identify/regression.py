@@ -23,7 +23,7 @@ from legbench.analytic.parameters import (
 from legbench.identify.base import FRICTION_WIDTH, equation_parameters, mended
 from legbench.identify.parameters import INDEX, NINE, PARAMETERS, Freedom
 from legbench.identify.prediction import Guess
-from legbench.identify.trial import MeasuredRun
+from legbench.identify.trial import FitTrial
 from legbench.signals import Floats
 
 WIDTH: Final = 1e-2
@@ -40,7 +40,7 @@ LINEAR: Final = (*(each.name for each in NINE), "f1", "f2")
 
 
 def regressed(
-    trials: Sequence[MeasuredRun], guess: Guess, free: Freedom, reach: float
+    trials: Sequence[FitTrial], guess: Guess, free: Freedom, reach: float
 ) -> Guess | None:
     """Guess whose free linear parameters are those of a regression, mended to be a leg's.
 
@@ -73,7 +73,7 @@ def regressed(
 
 
 def _rows(
-    trial: MeasuredRun, guess: Guess, names: Sequence[str], reach: float
+    trial: FitTrial, guess: Guess, names: Sequence[str], reach: float
 ) -> tuple[Floats, Floats] | None:
     """Torques of one run by its free parameters (m, p), and those that the guess leaves (m,)."""
     q, v, a, motors = _smoothed(trial)
@@ -102,7 +102,7 @@ def _torques(q: Floats, v: Floats, a: Floats, motors: Floats) -> Floats:
     return found
 
 
-def _smoothed(trial: MeasuredRun) -> tuple[Floats, Floats, Floats, Floats]:
+def _smoothed(trial: FitTrial) -> tuple[Floats, Floats, Floats, Floats]:
     """Angles, rates, accelerations and motor positions of the rows but those at the ends (m, 2)."""
     step = float(trial.time[-1] - trial.time[0]) / (len(trial.time) - 1)
     half = int(np.ceil(REACH * WIDTH / step))

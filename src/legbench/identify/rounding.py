@@ -16,7 +16,7 @@ import numpy as np
 
 from legbench.analytic.parameters import MOTOR
 from legbench.analytic.sensitivity import STATES, Path
-from legbench.identify.trial import SETTLED_ROWS, MeasuredRun
+from legbench.identify.trial import SETTLED_ROWS, FitTrial
 from legbench.signals import Bools, Floats
 
 MOST_STANDS: Final = 8
@@ -45,7 +45,7 @@ class Stretch:
         return tuple(changes.tolist())
 
 
-def stretches_of(trial: MeasuredRun) -> tuple[Stretch, ...]:
+def stretches_of(trial: FitTrial) -> tuple[Stretch, ...]:
     """Unknown errors of a run's motors; none of a motor whose encoder has no counts."""
     found = []
     for joint, motor in enumerate(trial.motors):

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from legbench.identify.problem import Misfit
-from legbench.identify.trial import MeasuredRun
+from legbench.identify.trial import FitTrial
 from legbench.signals import Floats
 
 BLOCK: Final = 0.25
@@ -43,7 +43,7 @@ class Spread:
         return np.maximum(self.white, self.block)
 
 
-def spread_of(misfit: Misfit, trials: Sequence[MeasuredRun]) -> Spread:
+def spread_of(misfit: Misfit, trials: Sequence[FitTrial]) -> Spread:
     """Errors of the parameters at the end of a fit."""
     matrix, _ = misfit.normal()
     own = len(matrix) - len(misfit.prior)
@@ -73,7 +73,7 @@ def _inverse(matrix: Floats) -> Floats:
     return np.linalg.inv(matrix / np.outer(size, size)) / np.outer(size, size)
 
 
-def _scores(residuals: Floats, slopes: Floats, trial: MeasuredRun) -> Floats:
+def _scores(residuals: Floats, slopes: Floats, trial: FitTrial) -> Floats:
     """Score of each block of one run (b, m)."""
     rows = slopes * residuals[:, :, np.newaxis]
     width = max(1, round(BLOCK / trial.period))

@@ -30,7 +30,7 @@ from legbench.identify.prediction import Guess, nothing_moved
 from legbench.identify.problem import Misfit, Problem
 from legbench.identify.regression import regressed
 from legbench.identify.spread import spread_of
-from legbench.identify.trial import MeasuredRun
+from legbench.identify.trial import FitTrial
 from legbench.identify.verdict import reasons_against
 from legbench.identify.wiring import check_wiring
 from legbench.mjcf.fitting import fitted_bar_density
@@ -52,8 +52,8 @@ class IdentificationTask:
 
     design: LegDesign
     """Leg as designed, where a fit starts."""
-    trials: tuple[MeasuredRun, ...]
-    held_out: tuple[MeasuredRun, ...] = ()
+    trials: tuple[FitTrial, ...]
+    held_out: tuple[FitTrial, ...] = ()
     free: Freedom = field(default_factory=Freedom)
     mass: float | None = None
     """Mass of the whole leg as weighed [kg]; none: that of the design."""

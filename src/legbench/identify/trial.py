@@ -31,8 +31,8 @@ SETTLED_ROWS: Final = 50
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MeasuredRun:
-    """One run: measured motors and links, the same rows."""
+class FitTrial:
+    """Run as a fit uses it: motors and links in the same rows, measured or planned."""
 
     name: str
     """Name of the run."""
@@ -71,12 +71,12 @@ class MeasuredRun:
         )
         return np.concatenate([parabola[0], parabola[1]])
 
-    def with_links(self, joint_pos: Floats) -> "MeasuredRun":
+    def with_links(self, joint_pos: Floats) -> "FitTrial":
         """Return this trial with other link angles (n, 2), as if wired otherwise."""
         return replace(self, joint_pos=joint_pos)
 
 
-def trial_of(recording: Recording, *, noise: float | None = None) -> MeasuredRun:
+def trial_of(recording: Recording, *, noise: float | None = None) -> FitTrial:
     """Take from a recording what a fit needs.
 
     Args:
@@ -113,7 +113,7 @@ def trial_of(recording: Recording, *, noise: float | None = None) -> MeasuredRun
     # A drive that has not answered repeats itself: what it says is no reading of that row.
     missing = unanswered(recording)
     motor_pos, joint_pos = (between_answers(each, missing) for each in (motor_pos, joint_pos))
-    return MeasuredRun(
+    return FitTrial(
         name=name,
         setup=run.setup.kind,
         time=time,

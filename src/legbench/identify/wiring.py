@@ -10,7 +10,7 @@ import numpy as np
 from legbench.errors import PlantFault
 from legbench.identify.checks import DataFinding
 from legbench.identify.prediction import Guess, Predictor
-from legbench.identify.trial import MeasuredRun
+from legbench.identify.trial import FitTrial
 from legbench.signals import Floats
 
 SUSPICIOUS: Final = 0.15
@@ -21,7 +21,7 @@ AS_GOOD: Final = 1.5
 """Factor within which two wirings explain the data alike [-]."""
 
 
-def check_wiring(trials: Sequence[MeasuredRun], guess: Guess, reach: float) -> list[DataFinding]:
+def check_wiring(trials: Sequence[FitTrial], guess: Guess, reach: float) -> list[DataFinding]:
     """Find runs that another wiring of the encoders explains far better than the one recorded."""
     found = []
     for place, trial in enumerate(trials):
@@ -49,7 +49,7 @@ def check_wiring(trials: Sequence[MeasuredRun], guess: Guess, reach: float) -> l
     return found
 
 
-def _misfit(trial: MeasuredRun, guess: Guess, reach: float) -> float:
+def _misfit(trial: FitTrial, guess: Guess, reach: float) -> float:
     """Root mean square of measured less predicted angles [rad]; infinite if there is no motion."""
     try:
         links = Predictor([trial], reach, friction=False).predict(guess)[0].links
@@ -58,7 +58,7 @@ def _misfit(trial: MeasuredRun, guess: Guess, reach: float) -> float:
     return float(np.sqrt(np.mean((trial.joint_pos - links) ** 2)))
 
 
-def _hypotheses(trial: MeasuredRun) -> list[tuple[str, str, MeasuredRun]]:
+def _hypotheses(trial: FitTrial) -> list[tuple[str, str, FitTrial]]:
     """Every other wiring of link or motor encoders: words, short name, and the run under it."""
     found = []
     for side in ("link", "motor"):
@@ -71,7 +71,7 @@ def _hypotheses(trial: MeasuredRun) -> list[tuple[str, str, MeasuredRun]]:
     return found
 
 
-def _rewired(trial: MeasuredRun, side: str, values: Floats) -> MeasuredRun:
+def _rewired(trial: FitTrial, side: str, values: Floats) -> FitTrial:
     return trial.with_links(values) if side == "link" else replace(trial, motor_pos=values)
 
 

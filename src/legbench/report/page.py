@@ -63,15 +63,15 @@ class CellRow:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ReportText:
-    """Everything of a report that is no figure."""
+class JudgedPaper:
+    """The paper's statements as campaigns judge them, and its numbers as they are measured."""
 
     statements: tuple[Statement, ...]
     numbers: tuple[NumberRow, ...]
     invalid: Mapping[str, tuple[InvalidRun, ...]]
 
 
-def judge(sources: Sequence[CampaignSource], numbers: Mapping[str, Published]) -> ReportText:
+def judge(sources: Sequence[CampaignSource], numbers: Mapping[str, Published]) -> JudgedPaper:
     """Judge the paper's statements and measure its numbers in each campaign."""
     found: dict[str, list[Judgement]] = {}
     first: dict[str, Trend] = {}
@@ -80,7 +80,7 @@ def judge(sources: Sequence[CampaignSource], numbers: Mapping[str, Published]) -
         for trend, other in zip(by[Reference.EQUILIBRIUM], by[Reference.MOTOR], strict=True):
             first.setdefault(trend.key, trend)
             found.setdefault(trend.key, []).extend(_verdicts(source.name, trend, other))
-    return ReportText(
+    return JudgedPaper(
         statements=tuple(
             Statement(trend=first[key], verdicts=tuple(each)) for key, each in found.items()
         ),
@@ -99,7 +99,7 @@ def _verdicts(source: str, equilibrium: Trend, motor: Trend) -> Iterator[Judgeme
         yield Judgement(source=source, about=about, trend=trend)
 
 
-def headlines(judged: ReportText, source: str) -> list[Trend]:
+def headlines(judged: JudgedPaper, source: str) -> list[Trend]:
     """The verdict of one campaign on each statement, about the reference that suits the setup."""
     return [
         next(verdict.trend for verdict in statement.verdicts if verdict.source == source)
@@ -109,7 +109,7 @@ def headlines(judged: ReportText, source: str) -> list[Trend]:
 
 def page_html(
     sources: Sequence[CampaignSource],
-    judged: ReportText,
+    judged: JudgedPaper,
     blocks: Sequence[FigureBlock],
     named: Sequence[Named],
 ) -> str:

@@ -9,7 +9,7 @@ from legbench.errors import ConfigError
 from legbench.loop import Progress
 from legbench.paper import published
 from legbench.report.named import Named, named_experiments
-from legbench.report.page import ReportText, headlines, judge, page_html
+from legbench.report.page import JudgedPaper, headlines, judge, page_html
 from legbench.report.paper_figures import blocks_of, print_figures
 from legbench.report.sources import CampaignSource
 from legbench.viz.print.save import save_figure
@@ -68,7 +68,7 @@ def write_report(
 
 
 def report_content(
-    sources: Sequence[CampaignSource], judged: ReportText, named: Sequence[Named]
+    sources: Sequence[CampaignSource], judged: JudgedPaper, named: Sequence[Named]
 ) -> dict[str, Any]:
     """Everything that the page says in words and numbers, as plain values."""
     return {

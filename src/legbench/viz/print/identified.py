@@ -8,7 +8,7 @@ import numpy as np
 from legbench.identify.adequacy import ROWS
 from legbench.identify.outcome import Estimate, Identification
 from legbench.identify.staged import IdentificationTask
-from legbench.identify.trial import MeasuredRun
+from legbench.identify.trial import FitTrial
 from legbench.signals import Floats
 from legbench.viz.print._matplotlib import Axes, Figure, styled
 
@@ -53,7 +53,7 @@ def _intervals(axes: Axes, estimates: Sequence[Estimate]) -> None:
     axes.set_ylabel("against the design [%]")
 
 
-def _residuals(axes: Axes, trial: MeasuredRun, residuals: Floats, outcome: Identification) -> None:
+def _residuals(axes: Axes, trial: FitTrial, residuals: Floats, outcome: Identification) -> None:
     count = len(residuals) // ROWS
     times = trial.time[: count * ROWS].reshape(count, ROWS).mean(axis=1)
     known = [each for each in outcome.residuals if each.run == trial.name]
