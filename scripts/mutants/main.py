@@ -46,10 +46,10 @@ OTHER_PROCESS = ("test_can_processes.py", "test_can_hardware.py", "test_channel_
 """Tests of other processes, into which no fault is planted."""
 STRICT = (
     *("limits/guard.py", "limits/safety.py", "limits/plausibility.py", "limits/knee.py"),
-    *("limits/shortfall.py", "limits/upper_ends.py", "drives/protocol/cia402.py"),
-    *("drives/master/stop.py", "drives/master/stop_report.py", "drives/master/sdo_stop.py"),
-    *("drives/master/cycle.py", "drives/master/start_up.py", "drives/master/supervisor.py"),
-    "drives/master/outgoing.py",
+    *("limits/encoder_watch.py", "limits/shortfall.py", "limits/upper_ends.py"),
+    *("drives/protocol/cia402.py", "drives/master/stop.py", "drives/master/stop_report.py"),
+    *("drives/master/sdo_stop.py", "drives/master/cycle.py", "drives/master/start_up.py"),
+    *("drives/master/supervisor.py", "drives/master/outgoing.py"),
 )
 """Files of the package that a stop depends on: 97 % must be noticed there, 93 % elsewhere."""
 STRICT_BOUND, BOUND = 0.97, 0.93
