@@ -224,7 +224,7 @@ def test_a_torn_run_is_replayed_as_far_as_it_goes_and_recovered(
     report = json.loads(mended.out)
     assert report["changed"] is True
     assert report["status"] == "recovered"
-    assert report["path"] == str(run)
+    assert report["run"] == str(run)
     again = called(capfd, "recover", run)
     assert again.status == 0
     assert "nothing to recover" in again.out

@@ -71,6 +71,7 @@ def test_strictness_is_checked_as_far_as_the_joints_go(capfd: pytest.CaptureFixt
     content = json.loads(done.out)
     assert 0.5 < content["reach"] < 0.7
     assert set(content["modes"]) == {"radial", "polar"}
+    assert content["out"] is None
 
 
 def test_a_leg_that_is_not_quite_matched_is_told_what_its_free_hops_need(
@@ -159,7 +160,8 @@ def test_hop_makes_the_folder_that_it_writes_to(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "new" / "one"
-    assert called(capfd, "hop", PROTOTYPE, "--hops", "20", "--out", out).status == 0
+    done = called(capfd, "hop", PROTOTYPE, "--hops", "20", "--out", out, "--json")
+    assert (done.status, json.loads(done.out)["out"]) == (0, str(out))
     assert {path.name for path in out.iterdir()} == {"hop.json", "return.png"}
     (tmp_path / "file").write_text("", encoding="utf-8")
     done = called(capfd, "hop", PROTOTYPE, "--hops", "20", "--out", tmp_path / "file", "--json")

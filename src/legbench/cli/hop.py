@@ -71,7 +71,7 @@ def main(arguments: list[str]) -> int:
 
             content, lines = driven(flags, design)
         if flags.json:
-            print_json(content)
+            print_json(content | {"out": flags.out and str(flags.out)})
         else:
             print("\n".join(lines))
         if flags.out is not None:

@@ -84,7 +84,7 @@ def _answer(flags: ModesArguments, scene: Scene) -> int:
         for warning in family.warnings:
             note(f"{family.mode.name} mode: {warning}")
     if flags.json:
-        print_json(content_of(found))
+        print_json(content_of(found) | {"out": flags.out and str(flags.out)})
     else:
         print("\n".join(tables(found)))
     if flags.out is not None:

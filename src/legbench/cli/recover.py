@@ -26,7 +26,8 @@ def main(arguments: list[str]) -> int:
     chosen = parse(RecoverArguments, "recover", arguments)
     report = recover(chosen.run)
     if chosen.json:
-        print_json(asdict(report) | {"path": str(report.path)})
+        content = asdict(report)
+        print_json({"run": str(content.pop("path"))} | content)
     else:
         print(report)
     return 0
