@@ -1,6 +1,7 @@
 """What a leg's springs do not explain tells a link encoder that is wrong, however the leg sways."""
 
 import math
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -215,6 +216,27 @@ def test_momentum_is_asked_where_a_sway_may_hide_a_drift_alone() -> None:
     assert doubt is not None
     assert doubt.startswith("joint encoder: the springs' torques contradict")
     assert "link_error of 0.025 rad" in doubt
+
+
+def calls_in_a_cycle(leg: LegMomentum | None) -> int:
+    """Calls that a guard makes to look at a leg that does not sway."""
+    guard = Guard(SafetyLimits(sway=0.05, standing=0.02, link_error=0.025), PERIOD, momentum=leg)
+    guard.start_at(POSTURE)
+    seen = {"motor_pos": POSTURE, "joint_pos": POSTURE, "spring_torque": (0.0, 0.0)}
+    guard.check(**seen, expected_pos=POSTURE)
+    found: list[str] = []
+    before = sys.getprofile()
+    sys.setprofile(lambda frame, event, _: found.append(event) if event == "call" else None)
+    try:
+        guard.check(**seen, expected_pos=POSTURE)
+    finally:
+        sys.setprofile(before)
+    return len(found)
+
+
+def test_a_leg_that_does_not_sway_costs_no_averages() -> None:
+    # Whether its sway may hide a drift, and that the watch has nothing to forget.
+    assert calls_in_a_cycle(momentum()) - calls_in_a_cycle(None) <= 3
 
 
 def test_what_is_known_of_a_leg_follows_setup_and_encoders() -> None:
