@@ -84,9 +84,9 @@ def rows() -> Iterator[Row]:
 
 def watch_digest() -> str:
     """Return what tells one watch from another: its source, its limits and the leg it watches."""
-    limits = ROOT / "src" / "legbench" / "limits"
-    digest = hashlib.sha256()
-    for path in (*sorted(limits.glob("*.py")), BUS.parent / "limits.toml", BUS, DESIGN):
+    source, digest = ROOT / "src" / "legbench", hashlib.sha256()
+    watch = (*sorted((source / "limits").glob("*.py")), source / "plant" / "leg_momentum.py")
+    for path in (*watch, BUS.parent / "limits.toml", BUS, DESIGN):
         digest.update(path.read_bytes())
     return digest.hexdigest()[:12]
 

@@ -8,15 +8,12 @@ from reference.dop853 import Accuracy
 from reference.hops import Hops
 from reference.law import SCALE
 from reference.legs import Legs, foot
+from reference.verdicts import NEIGHBOUR, UNITS
 
 from legbench.control import JumpConfig
 from legbench.design import LegDesign
 from legbench.signals import Bools, Floats
 
-UNITS = np.array([0.01, 0.1, 0.1, 0.1, 1.0, 1.0])
-"""Units of the six numbers of an apex [m, m/s, rad, rad, rad/s, rad/s]."""
-NEIGHBOUR = 1e-7
-"""Distance in `UNITS` of the starts beside one that may lie on an edge [-]."""
 TOGETHER = 5000
 """Largest number of hops in a batch [-]."""
 

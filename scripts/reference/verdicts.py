@@ -27,8 +27,9 @@ FINER = 0.1
 FINEST = Accuracy(1e-13, 1e-15)
 """Tolerances then."""
 NEIGHBOUR, STEEP = 1e-7, 1e3
-"""Distance of the hops beside a doubtful one, in `UNITS`, and the growth of it in one hop, or the
-shift of an event by it, beyond which the hop grazes [-]."""
+"""Distance in `UNITS` of the hops beside a doubtful one, and of the starts beside one that may lie
+on an edge of a basin; growth of it in one hop, or shift of an event by it, beyond which the hop
+grazes [-]."""
 TWICE = 2e-4
 """Time within which an event that is told twice is doubled [s]."""
 

@@ -1,6 +1,8 @@
 """What a leg's springs do not explain tells a link encoder that is wrong, however the leg sways."""
 
 import math
+import shutil
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,6 +27,7 @@ from legbench.limits.momentum import LegMomentum, MomentumReading, Pair, Support
 from legbench.limits.momentum_watch import CONTACT_TIME, MomentumWatch
 from legbench.limits.safety import SafetyLimits
 from legbench.plant.leg_momentum import momentum_of, momentum_on
+from legbench.plants import LIMITS_NAME
 from legbench.servo import ServoConfig
 
 DESIGN = load_design(Path(BUS).parents[1] / "models" / "prototype.toml")
@@ -217,6 +220,27 @@ def test_momentum_is_asked_where_a_sway_may_hide_a_drift_alone() -> None:
     assert "link_error of 0.025 rad" in doubt
 
 
+def calls_in_a_cycle(leg: LegMomentum | None) -> int:
+    """Calls that a guard makes to look at a leg that does not sway."""
+    guard = Guard(SafetyLimits(sway=0.05, standing=0.02, link_error=0.025), PERIOD, momentum=leg)
+    guard.start_at(POSTURE)
+    seen = {"motor_pos": POSTURE, "joint_pos": POSTURE, "spring_torque": (0.0, 0.0)}
+    guard.check(**seen, expected_pos=POSTURE)
+    found: list[str] = []
+    before = sys.getprofile()
+    sys.setprofile(lambda frame, event, _: found.append(event) if event == "call" else None)
+    try:
+        guard.check(**seen, expected_pos=POSTURE)
+    finally:
+        sys.setprofile(before)
+    return len(found)
+
+
+def test_a_leg_that_does_not_sway_costs_no_averages() -> None:
+    # Whether its sway may hide a drift, and that the watch has nothing to forget.
+    assert calls_in_a_cycle(momentum()) - calls_in_a_cycle(None) <= 3
+
+
 def test_what_is_known_of_a_leg_follows_setup_and_encoders() -> None:
     boom = Setup(kind=SetupKind.FFS, boom_radius=2.0)
     assert momentum_of(DESIGN, boom, 0.0, PERFECT) is None
@@ -273,3 +297,16 @@ def test_a_link_encoder_that_dies_while_the_leg_sways_is_found_in_time(
     death = Death(part=part, drive=drive, onset=1.124)
     found = try_dead_part(SWAYING, emulation, "jump", death, SERVO)
     assert found.within(part), found
+
+
+def test_a_leg_that_sways_is_watched_in_cycles_of_4_ms_as_of_1(tmp_path: Path) -> None:
+    text = Path(BUS).read_text(encoding="utf-8").replace("tpdo_deadline_us = 720", "")
+    slow = replace(SWAYING, bus_file=tmp_path / "leg.toml")
+    slow.bus_file.write_text(text.replace("period_us = 1000", "period_us = 4000"), encoding="utf-8")
+    shutil.copy(Path(BUS).parent / LIMITS_NAME, tmp_path)
+    assert load_bus(slow.bus_file).period_us == 4000
+    # A leg that is taken for broken before the part dies ends the trial by its fault.
+    death = Death(part=Part.LINK_DRIFT, drive=0, onset=1.124)
+    found = try_dead_part(slow, Emulation.CAN, "jump", death, SERVO)
+    assert found.within(death.part), found
+    assert found.cause == "joint encoder"

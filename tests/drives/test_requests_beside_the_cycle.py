@@ -107,3 +107,18 @@ def test_nothing_is_asked_in_a_cycle_without_all_answers_or_in_a_stop() -> None:
     for _ in range(200):
         it.tick()
     assert wire.when(0x601) == wire.when(0x602) == []
+
+
+def test_a_question_after_a_late_sync_waits_for_the_next_one() -> None:
+    wire = Wire()
+    wire.answers = lambda number: answered(415)
+    it = cycle(wire, warm())
+    for number in range(210):
+        if number in (198, 199):  # The requests become due in these cycles.
+            wire.wait_until(wire.when(0x080)[-1] + 1200 * US)
+        it.tick()
+        it.send((0, 0))
+    syncs = wire.when(0x080)
+    assert [at_ns % MS for at_ns in syncs[197:201]] == [0, 200 * US, 400 * US, 0]
+    assert wire.when(0x602) == [syncs[200] + 415 * US]
+    assert wire.when(0x601) == [syncs[201] + 415 * US]

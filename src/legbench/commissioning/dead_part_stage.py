@@ -1,6 +1,5 @@
 """Stages on which motors and encoders of a leg die: simulations behind limits, emulated drives."""
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -29,18 +28,21 @@ from legbench.experiment import (
     targets_of,
 )
 from legbench.limits.safety import SafetyLimits
+from legbench.limits.upper_ends import LIMIT_ENDS
 from legbench.plant.abstract import AbstractPlant
 from legbench.plant.analytic import AnalyticPlant
 from legbench.plant.can import CanPlant
+from legbench.plant.can_open import LEG_PERIOD_NS
+from legbench.plant.design_limits import open_limited
 from legbench.plant.emulated_leg import EmulatedLeg
-from legbench.plant.leg_momentum import momentum_of, momentum_on
-from legbench.plant.limited import LimitedPlant
+from legbench.plant.leg_momentum import momentum_on
+from legbench.plant.opening import Leg
 from legbench.plant.sim import SimPlant
 from legbench.plant.start import Start
 from legbench.plants import LIMITS_NAME, limits_for
 from legbench.servo import PERFECT, ServoConfig
 
-WIDEST_SWAY = 0.5
+WIDEST_SWAY = LIMIT_ENDS["sway"][0]
 """Limit of the sway of a leg that leans as it starts: the widest that a limits file may give [rad].
 """
 CONTROLLERS: dict[str, ControllerSettings] = {
@@ -138,14 +140,8 @@ def _alone(
     if death is not None:
         stiffness = np.asarray(bench.design.stiffness)
         plant = broken = BrokenPlant(plant, stiffness, death.part, death.drive)
-    counts = servo.encoder_counts
-    step = 0.0 if counts is None else 2.0 * math.pi / counts
-    limited = LimitedPlant(
-        plant,
-        bench.limits,
-        delay_cycles=servo.delay_cycles,
-        momentum=momentum_of(bench.design, chosen.setup, step, PERFECT),
-    )
+    leg = Leg(design=bench.design, options=chosen.options, start=start, servo=servo)
+    limited = open_limited(plant, bench.limits, leg).plant
     controller = make_controller(chosen.controller, targets_of(chosen))
     if broken is None:
         return Stage(plant=limited, controller=controller)
@@ -157,8 +153,8 @@ def _alone(
     )
 
 
-class _RunObserver:
-    """The leg on the shafts, which remembers where its links truly are."""
+class _WatchedLeg:
+    """Simulated leg on the shafts, which remembers where its links truly are."""
 
     def __init__(self, leg: EmulatedLeg) -> None:
         self._leg = leg
@@ -179,11 +175,11 @@ def _on_bus(
     death: Death | None,
 ) -> Stage:
     config, start = _with_encoders(load_bus(bench.bus_file), servo), bench.start(chosen)
-    witness = _RunObserver(EmulatedLeg(bench.design, chosen.options, start))
+    watched = _WatchedLeg(EmulatedLeg(bench.design, chosen.options, start))
     behaviours = [
         Behaviour(start_pos=float(value), bandwidth=servo.bandwidth) for value in start.motor_pos
     ]
-    network = emulate(config, behaviours, body=witness)
+    network = emulate(config, behaviours, body=watched, body_period_ns=LEG_PERIOD_NS)
     session = Session(LockstepBus("leg", network=network), config)
     link = session.link(
         bench.limits,
@@ -207,7 +203,7 @@ def _on_bus(
             return abs(motion.demand - motion.actual) / scale
         return max(
             abs(sample.motor_pos[death.drive] - motion.angle),
-            abs(sample.link_pos[death.drive] - witness.links[death.drive]),
+            abs(sample.link_pos[death.drive] - watched.links[death.drive]),
         )
 
     return Stage(plant=plant, controller=controller, kill=kill, contradiction=contradiction)

@@ -151,10 +151,17 @@ class MomentumWatch:
     def start(self) -> None:
         """Begin anew with whatever is shown next, and forget the leg's springs."""
         self._mismatch = _Mismatch(self._torque, self._period)
-        self.restart()
+        self._begin()
 
     def restart(self) -> None:
-        """Begin anew with whatever is shown next."""
+        """Begin anew with whatever is shown next; a watch that has seen nothing yet already does.
+
+        A leg that does not sway asks for this in every cycle.
+        """
+        if self._readings:
+            self._begin()
+
+    def _begin(self) -> None:
         self.residual: float | None = None
         self._readings = deque[MomentumReading](maxlen=3)
         for support in self._supports:

@@ -74,6 +74,7 @@ class SafetyLimits:
     """Consecutive missed ticks that end the run."""
     lost_frames: int = 3
     """Consecutive cycles without a drive's process data that end the run."""
+    # None is left out of an experiment's canonical text; older experiments keep their names.
     link_error: float | None = None
     """Angle by which a link encoder may contradict spring torques and momentum of a leg that sways
     too much for `sway`; beyond it the run ends [rad]."""

@@ -60,7 +60,7 @@ ENDINGS = {Ending.STANDS: Fate.STANDS, Ending.FELL: Fate.FELL, Ending.FAULT: Fat
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GridAxis:
-    """GridAxis of the grid: a coordinate of the apex and its range.
+    """Axis of the grid: a coordinate of the apex and its range.
 
     Raises:
         ConfigError: an unknown number of the apex, or an empty range.

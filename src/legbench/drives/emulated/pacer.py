@@ -3,23 +3,17 @@
 from collections.abc import Callable
 from typing import Protocol, final
 
+from legbench.drives.transport.timebase import Timebase
+
 FORGIVEN_NS = 3_000_000
 """Longest step of virtual time at once; the rest of a longer pause is left out [ns]."""
 
 
-class VirtualTime(Protocol):
+class VirtualTime(Timebase, Protocol):
     """Virtual time of one network, or of several that pass it together."""
-
-    def now_ns(self) -> int:
-        """Return the present time [ns]."""
-        ...
 
     def next_ns(self) -> int:
         """Time of the next event [ns]."""
-        ...
-
-    def wait_until(self, at_ns: int) -> None:
-        """Advance to `at_ns`."""
         ...
 
 

@@ -121,7 +121,8 @@ class Cycle:
         for axis in self.axes:
             axis.begin_cycle()
         missing = self._gather(sync_ns + self._deadline_ns) if sent else self._expected
-        self._requests.turn(None if missing or self.stopping else timebase.now_ns() - sync_ns)
+        # The next SYNC leaves on the grid, however late this one was.
+        self._requests.turn(None if missing or self.stopping else timebase.now_ns() - due_ns)
         for axis, watch in zip(self.axes, self.watches, strict=True):
             watch.cycle(complete=axis.fresh)
         self._due_ns = due_ns + self._period_ns

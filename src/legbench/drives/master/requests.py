@@ -49,12 +49,12 @@ class Requests:
         self._waiting: dict[Poll, tuple[int, Frame]] = {}
         """Poll -> cycle in which its request became due, and the request."""
 
-    def turn(self, after_sync_ns: int | None) -> None:
+    def turn(self, after_tick_ns: int | None) -> None:
         """Count a cycle, and send the oldest request if there is room, or was none for too long.
 
         Args:
-            after_sync_ns: time since SYNC at which all its answers are in [ns]; none in a cycle in
-                which nothing may be asked.
+            after_tick_ns: time since the tick at which all answers to its SYNC are in [ns]; none in
+                a cycle in which nothing may be asked.
         """
         self._cycle += 1
         # None is due unless a multiple of all their intervals is at most one turn of them away.
@@ -63,10 +63,10 @@ class Requests:
                 frame = poll.due(self._cycle + place)
                 if frame is not None:
                     self._waiting.setdefault(poll, (self._cycle, frame))
-        if not self._waiting or after_sync_ns is None:
+        if not self._waiting or after_tick_ns is None:
             return
         poll, (since, frame) = next(iter(self._waiting.items()))
-        if after_sync_ns <= self._latest_ns or self._cycle - since >= self._patience:
+        if after_tick_ns <= self._latest_ns or self._cycle - since >= self._patience:
             del self._waiting[poll]
             try:
                 self._port.send_frame(frame)

@@ -11,7 +11,7 @@ SDO_BYTES = 8
 
 
 def latest_request_us(bus: BusConfig) -> int:
-    """Latest time after SYNC at which a request may leave, so that no answer is late [us].
+    """Latest time after a tick at which a request may leave, so that no answer is late [us].
 
     A frame on the wire is not interrupted (ISO 11898-1): an answer that begins just before SYNC
     holds it up by 135 us at 1 Mbit/s, and with it the answers to SYNC. These have room for one
