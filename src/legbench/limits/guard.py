@@ -117,16 +117,21 @@ class Guard:
             and low2 <= motor2 <= high2
             and -step <= motor1 - last1 <= step
             and -step <= motor2 - last2 <= step
-            and (knee is None or knee[0] <= knee_of(wish) <= knee[1])
+            and (knee is None or knee[0] <= motor2 - motor1 <= knee[1])
         )
 
     def _check_wish(self, wish: Sequence[float]) -> None:
         before = self.applied if self._wish is None else self._wish
         limit = self._limits.command_step
-        for value, wished in zip(wish, before, strict=True):
-            # Of what is not finite no step is within a limit, unless there is none.
-            if not abs(value - wished) <= limit or not math.isfinite(value):
-                self._refuse_wish(wish, before)
+        (wish_1, wish_2), (before_1, before_2) = wish, before
+        # Of what is not finite no step is within a limit, unless there is none.
+        if not (
+            abs(wish_1 - before_1) <= limit
+            and abs(wish_2 - before_2) <= limit
+            and math.isfinite(wish_1)
+            and math.isfinite(wish_2)
+        ):
+            self._refuse_wish(wish, before)
 
     def _refuse_wish(self, wish: Sequence[float], before: Sequence[float]) -> None:
         limit = self._limits.command_step
@@ -252,7 +257,7 @@ class Guard:
         if not (low1 <= joint1 <= high1 and low2 <= joint2 <= high2):
             self._refuse_joints(joint_pos)
         knee = self._joint_knee
-        if knee is not None and not knee[0] <= knee_of(joint_pos) <= knee[1]:
+        if knee is not None and not knee[0] <= joint2 - joint1 <= knee[1]:
             raise PlantFault(
                 "joint range",
                 f"q2 - q1 is at {knee_of(joint_pos):.3f} rad, the limits are [{knee[0]:g}, "

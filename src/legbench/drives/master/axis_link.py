@@ -73,14 +73,16 @@ class AxisLink:
         self.motor_counts = 0
         self.link_counts = 0
         units, link = node.motor, node.link
-        self._motor_rad, self._motor_counts = units.to_rad, units.to_counts
+        self._motor_zero, self._motor_scale = units.offset_counts, units.counts_per_rad
         self._lowest, self._modulus = units.lowest, units.modulus
-        self._link_rad = None if link is None else link.to_rad
-        self.motor_pos = self._motor_rad(0)
+        self._link_zero = 0 if link is None else link.offset_counts
+        self._link_scale = math.nan if link is None else link.counts_per_rad
+        self.motor_pos = units.to_rad(0)
         self.link_pos = math.nan if link is None else link.to_rad(0)
         self._torque_scale = units.sign * node.torque_scale
         self.follows = int(StatusBit.FOLLOWS_COMMAND) if node.quirks.follows_bit else 0
         self.in_mode = node.quirks.mode_shown is ModeShown.CONFIGURED
+        self._shows_link = link is not None
         self._tells_torque = node.torque_object is not None
         self.torque = math.nan
         maps = {node.tpdo_id(pdo): PdoMap(pdo.objects) for pdo in node.tpdos}
@@ -118,10 +120,6 @@ class AxisLink:
         """COB-IDs that have not come in this cycle."""
         return tuple(cob for cob, (bit, _, _) in self._tpdos.items() if bit & self._missing)
 
-    def received(self, cob_id: int) -> bool:
-        """Whether one of its TPDOs has come in this cycle."""
-        return not self._tpdos[cob_id][0] & self._missing
-
     def begin_cycle(self) -> None:
         """Begin a cycle at SYNC, from which all process data is expected again."""
         self._missing = self._all
@@ -152,11 +150,12 @@ class AxisLink:
         self.statusword, motor, link, torque = shown
         if not self._known:
             self._find(motor)
+        # Angles as `AxisUnits.to_rad`, without its calls.
         self.motor_counts = counts = self._motor.feed(motor)
-        self.motor_pos = self._motor_rad(counts)
-        if self._link_rad is not None:
+        self.motor_pos = (counts - self._motor_zero) / self._motor_scale
+        if self._shows_link:
             self.link_counts = counts = self._link.feed(link)
-            self.link_pos = self._link_rad(counts)
+            self.link_pos = (counts - self._link_zero) / self._link_scale
         if self._tells_torque:
             self.torque = self._torque_scale * torque
 
@@ -190,7 +189,8 @@ class AxisLink:
 
     def aim(self, motor_pos: float) -> None:
         """Set the target [rad]."""
-        self.target_counts = self._motor_counts(motor_pos)
+        # As `AxisUnits.to_counts`, without its call.
+        self.target_counts = self._motor_zero + round(motor_pos * self._motor_scale)
 
     def aim_at_actual(self) -> None:
         """Set the target to where the motor is."""

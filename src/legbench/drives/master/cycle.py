@@ -67,7 +67,6 @@ class Cycle:
         self.notices = Notices()
         self.stopping = False
         self._tpdos = {cob: axis for axis in self.axes for cob in axis.tpdo_ids}
-        self._expected = len(self._tpdos)
         self._ours = frozenset(
             {NMT_ID, SYNC_ID, HEARTBEAT_BASE + config.master_id}
             | {node.rpdo_id(pdo) for node in config.nodes for pdo in node.rpdos}
@@ -120,13 +119,14 @@ class Cycle:
         sent = self._outgoing.sync()
         for axis in self.axes:
             axis.begin_cycle()
-        missing = self._gather(sync_ns + self._deadline_ns) if sent else self._expected
+        complete = sent and self._gather(sync_ns + self._deadline_ns)
         # The next SYNC leaves on the grid, however late this one was.
-        self._requests.turn(None if missing or self.stopping else timebase.now_ns() - due_ns)
+        asks = complete and not self.stopping
+        self._requests.turn(timebase.now_ns() - due_ns if asks else None)
         for axis, watch in zip(self.axes, self.watches, strict=True):
             watch.cycle(complete=axis.fresh)
         self._due_ns = due_ns + self._period_ns
-        return Tick(sync_ns, sync_ns - due_ns, skipped + silent, silent, missing == 0)
+        return Tick(sync_ns, sync_ns - due_ns, skipped + silent, silent, complete)
 
     def hears_sync(self, until_ns: int) -> bool:
         """Whether another master sends SYNC by then; from its first one on this one may `follow`.
@@ -143,7 +143,7 @@ class Cycle:
         """Wait for the SYNC of another master, gather process data; nothing is sent."""
         timebase, last_ns = self._port.timebase, self._due_ns
         self.bus_error = None
-        missing, skipped = self._expected, 0
+        complete, skipped = False, 0
         sync_ns = None
         try:
             sync_ns = self._await_sync(timebase.now_ns() + 2 * self._period_ns)
@@ -153,11 +153,11 @@ class Cycle:
             axis.begin_cycle()
         if sync_ns is not None:
             skipped = max(0, round((sync_ns - last_ns) / self._period_ns) - 1)
-            missing = self._gather(sync_ns + self._deadline_ns)
+            complete = self._gather(sync_ns + self._deadline_ns)
         self._due_ns = sync_ns or last_ns + self._period_ns
         for axis, watch in zip(self.axes, self.watches, strict=True):
             watch.cycle(complete=axis.fresh)
-        return Tick(sync_ns or timebase.now_ns(), 0, skipped, skipped, missing == 0)
+        return Tick(sync_ns or timebase.now_ns(), 0, skipped, skipped, complete)
 
     def _await_sync(self, until_ns: int) -> int | None:
         """Time at which the SYNC of another master came [ns]; none if it has not by `until_ns`."""
@@ -229,10 +229,10 @@ class Cycle:
         elif base == SDO_REQUEST_BASE and self._port.foreign(message):
             self.notices.sdo_request(message, node_id, self._port.timebase.now_ns())
 
-    def _gather(self, until_ns: int) -> int:
-        """Take frames until all process data is there or the deadline; counts those missing."""
-        missing, receive, tpdos = self._expected, self._port.receive, self._tpdos
-        garbled: set[int] = set()
+    def _gather(self, until_ns: int) -> bool:
+        """Take frames until all process data is there or the deadline; whether it is complete."""
+        receive, tpdos = self._port.receive, self._tpdos
+        missing, garbled = set(tpdos), set[int]()
         try:
             while missing:
                 message = receive(until_ns)
@@ -245,20 +245,19 @@ class Cycle:
                     if self._port.timebase.now_ns() >= until_ns:
                         break
                     continue
-                before = axis.fresh
-                if axis.received(cob_id):
+                if cob_id not in missing:
                     self.notices.answered_twice(message, self._port.timebase.now_ns())
-                if not axis.feed(cob_id, message.data):
+                if axis.feed(cob_id, message.data):
+                    missing.discard(cob_id)
+                else:
                     garbled.add(cob_id)
                     self._by_node[axis.node.node_id].bad_total += 1
-                elif axis.fresh and not before:
-                    missing -= len(axis.tpdo_ids)
         except BusError as error:
             self._failed(error)
         if missing:
             owed = {cob_id for axis in self.axes for cob_id in axis.missing_ids}
             self._owed = owed - garbled
-        return missing
+        return not missing
 
     def _drain(self) -> None:
         """Discard, before SYNC, what has come by now: late or copied data must not pass for new.

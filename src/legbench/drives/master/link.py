@@ -216,7 +216,7 @@ class Link(DriveLeader):
         """
         self._refuse_ended()
         cycle, motion = self.cycle, self._motion
-        with self._stop_on_error:
+        try:
             tick = self._ticks.watched()
             if self._status.state is LinkState.CYCLIC:
                 self._start_up.idle()
@@ -225,6 +225,9 @@ class Link(DriveLeader):
             cycle.notices.statuswords(cycle.axes, tick.time_ns)
             sample = motion.sample(tick)
             motion.check(sample)
+        except BaseException as error:  # Whatever is raised, the drives stop.
+            self._ending.stop_after(error)
+            raise
         return sample
 
     def look(self) -> Sample:
@@ -256,9 +259,12 @@ class Link(DriveLeader):
             raise DriveError(
                 "this link is read-only" if self._parts.read_only else "the drives are not enabled"
             )
-        with self._stop_on_error:
+        try:
             applied, words = self._motion.aim(motor_pos)
             self._supervisor.sent(complete=self.cycle.send(words))
+        except BaseException as error:  # Whatever is raised, the drives stop.
+            self._ending.stop_after(error)
+            raise
         return applied
 
     def restart_from_applied(self) -> tuple[float, ...]:

@@ -59,14 +59,18 @@ class Outgoing:
         A frame that is refused keeps no other drive from its own. A drive without a controlword
         gets no frame.
         """
-        sent, messages = True, self._commands
+        sent, messages, put = True, self._commands, self._port.put
         for axis, controlword in zip(self._axes, controlwords, strict=True):
             if controlword is None:
                 continue
             for cob_id, data in axis.frames(controlword):
                 message = messages[cob_id]
                 message.data[:] = data
-                sent = self._put(message) and sent
+                try:
+                    put(message)
+                except BusError as error:
+                    self._failed(error)
+                    sent = False
         return sent
 
     def heartbeat(self, due_ns: int) -> bool:

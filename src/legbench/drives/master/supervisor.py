@@ -32,14 +32,18 @@ class Supervisor:
 
     def bus(self, tick: Tick) -> None:
         """Check that the controller is on the bus and the grid is kept; raises PlantFault."""
-        if self._cycle.stranger is not None:
+        cycle = self._cycle
+        if cycle.stranger is not None:
             self.check_no_other_master()
-        missed = tick.skipped - tick.silent
-        self._overruns = self._overruns + missed if missed else 0
-        if self._cycle.bus_off:
+        if cycle.bus_off:
             raise PlantFault(
                 "bus off", "the controller has left the bus; check wiring and termination"
             )
+        missed = tick.skipped - tick.silent
+        if not missed:
+            self._overruns = 0
+            return
+        self._overruns += missed
         if self._overruns >= self._limits.overrun_cycles:
             raise PlantFault(
                 OVERRUNS,
@@ -96,14 +100,18 @@ class Supervisor:
         for axis in self._cycle.axes:
             if not axis.fresh:
                 continue
-            if axis.machine.step(axis.statusword).way is not Way.REACHED:
+            word, machine, follows = axis.statusword, axis.machine, axis.follows
+            if word != machine.settled and machine.step(word).way is not Way.REACHED:
                 raise PlantFault(
                     "drive not enabled",
                     f"drive '{axis.node.name}' (node {axis.node.node_id}) left operation enabled: "
-                    f"{describe_statusword(axis.statusword)}",
+                    f"{describe_statusword(word)}",
                 )
-            ignored = ignored or axis.statusword & axis.follows != axis.follows
-        self._ignored = self._ignored + 1 if ignored else 0
+            ignored = ignored or word & follows != follows
+        if not ignored:
+            self._ignored = 0
+            return
+        self._ignored += 1
         if self._ignored > self._limits.following_cycles:
             words = "; ".join(describe_statusword(axis.statusword) for axis in self._cycle.axes)
             raise PlantFault("command ignored", f"a drive does not follow its target: {words}")

@@ -206,6 +206,8 @@ class PowerMachine:
         goal: state to reach; `DISABLED` after a drive has left operation enabled unasked.
         lost: the drive left operation enabled unasked; cleared by the next `seek`.
         refused: the last step could not be taken from the drive's state.
+        settled: statusword that the last step took and whose repetition needs no step, as the goal
+            is reached and its controlword has been held for long enough; none otherwise.
     """
 
     def __init__(self) -> None:
@@ -217,6 +219,7 @@ class PowerMachine:
         self._begun = False
         self._reset_spent = False
         self.refused = False
+        self.settled: int | None = None
         self._steady: PowerStep | None = None
         self._steady_byte = 0
 
@@ -229,14 +232,16 @@ class PowerMachine:
         """Ask for a goal; asking again for the same one starts a new try."""
         self.goal, self.lost = goal, False
         self._enabled = self._reset_spent = self.refused = False
-        self._steady = None
+        self._steady = self.settled = None
 
     def step(self, statusword: int) -> PowerStep:
         """Decide the controlword of this cycle from the latest statusword."""
         steady = self._steady
         if steady is not None and statusword & 0xFF == self._steady_byte:
             self._age += 1
+            self.settled = statusword if self._age >= HOLD_CYCLES else None
             return steady
+        self.settled = None
         state = decode_state(statusword)
         if state is None:
             self._steady = None
