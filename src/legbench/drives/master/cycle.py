@@ -66,6 +66,7 @@ class Cycle:
         self.silent_total = 0
         self.notices = Notices()
         self.stopping = False
+        self._gaps = True  # A drive may have missed a cycle since two in a row were complete.
         self._tpdos = {cob: axis for axis in self.axes for cob in axis.tpdo_ids}
         self._ours = frozenset(
             {NMT_ID, SYNC_ID, HEARTBEAT_BASE + config.master_id}
@@ -123,8 +124,8 @@ class Cycle:
         # The next SYNC leaves on the grid, however late this one was.
         asks = complete and not self.stopping
         self._requests.turn(timebase.now_ns() - due_ns if asks else None)
-        for axis, watch in zip(self.axes, self.watches, strict=True):
-            watch.cycle(complete=axis.fresh)
+        if self._gaps or not complete:
+            self._count()
         self._due_ns = due_ns + self._period_ns
         return Tick(sync_ns, sync_ns - due_ns, skipped + silent, silent, complete)
 
@@ -155,9 +156,14 @@ class Cycle:
             skipped = max(0, round((sync_ns - last_ns) / self._period_ns) - 1)
             complete = self._gather(sync_ns + self._deadline_ns)
         self._due_ns = sync_ns or last_ns + self._period_ns
+        self._count()
+        return Tick(sync_ns or timebase.now_ns(), 0, skipped, skipped, complete)
+
+    def _count(self) -> None:
+        """Count this cycle for every drive; one in order changes no count while there are none."""
         for axis, watch in zip(self.axes, self.watches, strict=True):
             watch.cycle(complete=axis.fresh)
-        return Tick(sync_ns or timebase.now_ns(), 0, skipped, skipped, complete)
+        self._gaps = any(watch.gaps for watch in self.watches)
 
     def _await_sync(self, until_ns: int) -> int | None:
         """Time at which the SYNC of another master came [ns]; none if it has not by `until_ns`."""
@@ -180,6 +186,7 @@ class Cycle:
         for axis, watch in zip(self.axes, self.watches, strict=True):
             if not self._owed.isdisjoint(axis.tpdo_ids):
                 watch.cycle(complete=False)
+                self._gaps = True
         self._due_ns += self._period_ns
         self._port.timebase.wait_until(self._due_ns)
         self._drain()
@@ -191,13 +198,9 @@ class Cycle:
         return self.stranger is not None
 
     def send(self, controlwords: Sequence[int | None]) -> bool:
-        """Send the RPDOs of all drives, which act at the next SYNC; false if the bus failed.
-
-        A frame that is refused keeps no other drive from its own. A drive without a controlword
-        gets no frame.
-        """
+        """Send the RPDOs and the heartbeat as `Outgoing` does; false if the bus failed."""
         sent = self._outgoing.commands(controlwords)
-        return self.send_heartbeat() and sent
+        return self._outgoing.heartbeat(self._due_ns) and sent
 
     def send_heartbeat(self) -> bool:
         """Send the heartbeat, where due; false if the bus failed."""
@@ -232,7 +235,8 @@ class Cycle:
     def _gather(self, until_ns: int) -> bool:
         """Take frames until all process data is there or the deadline; whether it is complete."""
         receive, tpdos = self._port.receive, self._tpdos
-        missing, garbled = set(tpdos), set[int]()
+        missing: set[int] = set(tpdos)
+        garbled: set[int] = set()
         try:
             while missing:
                 message = receive(until_ns)
@@ -265,11 +269,11 @@ class Cycle:
         Frames that come as fast as they are read hold up no stop: after a period the tick goes on
         with a bus that has failed.
         """
-        timebase = self._port.timebase
-        until_ns = timebase.now_ns() + self._period_ns
+        now_ns, until_ns = self._port.timebase.now_ns, None
         try:
             while (message := self._port.take()) is not None:
-                if timebase.now_ns() > until_ns:
+                until_ns = until_ns or now_ns() + self._period_ns
+                if now_ns() > until_ns:
                     raise BusError(
                         f"frames come faster than they are read, for {1e-6 * self._period_ns:g} ms "
                         "now: look for a node or a program that babbles"

@@ -90,10 +90,10 @@ class LimitedMotion:
             PlantFault: the command is not finite or jumps too far.
         """
         applied = self._guard.command(motor_pos)
-        words: list[int | None] = []
-        for axis, target in zip(self._cycle.axes, applied, strict=True):
+        axes = self._cycle.axes
+        for axis, target in zip(axes, applied, strict=True):
             axis.aim(target)
-            words.append(axis.machine.controlword)
+        words: list[int | None] = [axis.machine.controlword for axis in axes]
         self._acting, self._sent = self._sent, applied
         return applied, words
 

@@ -176,9 +176,8 @@ class Link(DriveLeader):
         """
         self.open()
         if self.state is not LinkState.CONFIGURED:
-            raise DriveError(
-                f"a link that is {self.state.name.lower()} cannot start; make a new one"
-            )
+            name = self.state.name.lower()
+            raise DriveError(f"a link that is {name} cannot start; make a new one")
         parts, ticks = self._parts, self._ticks
         if not parts.read_only and self.cycle.led_by_another():
             self._supervisor.check_no_other_master()  # It came after `open`, and keeps the drives.
@@ -214,11 +213,11 @@ class Link(DriveLeader):
         Raises:
             PlantFault: a watchdog or a limit; all drives have been stopped by then.
         """
+        status, cycle, motion = self._status, self.cycle, self._motion
         self._refuse_ended()
-        cycle, motion = self.cycle, self._motion
         try:
             tick = self._ticks.watched()
-            if self._status.state is LinkState.CYCLIC:
+            if status.state is LinkState.CYCLIC:
                 self._start_up.idle()
                 return motion.sample(tick)
             self._supervisor.states()
@@ -254,11 +253,13 @@ class Link(DriveLeader):
             PlantFault: it is not finite or jumps too far; all drives have been stopped by then.
             DriveError: the drives are not enabled.
         """
-        self._refuse_ended()
-        if self._status.state is not LinkState.RUNNING:
-            raise DriveError(
+        status = self._status
+        if status.fault is not None or status.state is not LinkState.RUNNING:
+            self._refuse_ended()
+            why = (
                 "this link is read-only" if self._parts.read_only else "the drives are not enabled"
             )
+            raise DriveError(why)
         try:
             applied, words = self._motion.aim(motor_pos)
             self._supervisor.sent(complete=self.cycle.send(words))

@@ -3,6 +3,7 @@
 import math
 from typing import final
 
+from legbench.drives.master.axis_link import AxisLink
 from legbench.drives.master.cycle import Cycle
 from legbench.drives.master.tick import Tick
 from legbench.drives.protocol.cia402 import Way, describe_statusword
@@ -73,29 +74,23 @@ class Supervisor:
 
     def drives(self) -> None:
         """Check that every drive answers, lives and reports no emergency; raises PlantFault."""
-        now_ns = self._timebase.now_ns()
+        now_ns, cycle = self._timebase.now_ns(), self._cycle
         if self._watches_temperature:
-            self._temperatures()
-        for watch in self._cycle.watches:
+            for place, poll in enumerate(cycle.polls):
+                if poll.unanswered >= MISSING_TEMPERATURES:
+                    raise _unknown_temperature(cycle.axes[place], poll.unanswered)
+        for watch in cycle.watches:
             trouble = watch.trouble(now_ns, self._lost_frames)
             if trouble is not None:
                 cause, text = trouble
-                error = self._cycle.bus_error
+                error = cycle.bus_error
                 raise PlantFault(cause, text if error is None else f"{text}; {error}")
 
-    def _temperatures(self) -> None:
-        """Check that every drive that is to report its temperature does."""
-        for place, poll in enumerate(self._cycle.polls):
-            if poll.unanswered >= MISSING_TEMPERATURES:
-                axis = self._cycle.axes[place]
-                raise PlantFault(
-                    "temperature",
-                    f"drive '{axis.node.name}' (node {axis.node.node_id}) has not reported its "
-                    f"temperature for {poll.unanswered} requests; its limit cannot be watched",
-                )
-
     def states(self) -> None:
-        """Check that every drive is enabled and follows its target; raises PlantFault."""
+        """Check that every drive is enabled and follows its target; raises PlantFault.
+
+        A statusword that was taken in the cycle before needs no new decision.
+        """
         ignored = False
         for axis in self._cycle.axes:
             if not axis.fresh:
@@ -115,3 +110,12 @@ class Supervisor:
         if self._ignored > self._limits.following_cycles:
             words = "; ".join(describe_statusword(axis.statusword) for axis in self._cycle.axes)
             raise PlantFault("command ignored", f"a drive does not follow its target: {words}")
+
+
+def _unknown_temperature(axis: AxisLink, unanswered: int) -> PlantFault:
+    """Fault of a drive whose temperature has a limit and is not reported."""
+    return PlantFault(
+        "temperature",
+        f"drive '{axis.node.name}' (node {axis.node.node_id}) has not reported its "
+        f"temperature for {unanswered} requests; its limit cannot be watched",
+    )

@@ -87,6 +87,11 @@ class NodeWatch:
             self.missed += 1
             self.lost_total += 1
 
+    @property
+    def gaps(self) -> bool:
+        """Whether it has missed a cycle since two in a row had its process data."""
+        return not self._well or self.missed > 0
+
     def _way(self) -> str:
         """How to go on after an emergency that only the maker of the drive can explain."""
         if self.emergency is None or self.emergency.code in MEANINGS:
