@@ -101,7 +101,8 @@ class NodeWatch:
 
     def trouble(self, now_ns: int, lost_frames: int) -> tuple[str, str] | None:
         """Cause and message of what is wrong with the drive; none if nothing is."""
-        late = self.expects_heartbeat and self._beat.lost(now_ns)
+        beat = self._beat  # Its `lost` without the call.
+        late = now_ns - beat.last_ns > beat.timeout_ns and self.expects_heartbeat
         if not (late or self._reports_trouble or self.missed >= lost_frames):
             return None
         if self.emergency is not None:
