@@ -47,9 +47,9 @@ from legbench.plant.can import CanPlant
 from legbench.recording.writer import RunWriter
 from legbench.signals import Observation
 
-WARM_UP, CYCLES = 1000, 600
+WARM_UP, CYCLES = 700, 300
 """Cycles until a hop sways and its momentum is watched, and those whose CPU time is taken apart."""
-ROUNDS, BLOCK = 80, 30
+ROUNDS, BLOCK = 40, 30
 """Blocks of cycles take turns, so that whatever slows the machine down slows all of them."""
 OTHER_EVERY = 4
 """Rounds between two of the other stack, whose threads take long to begin and to end."""

@@ -169,10 +169,7 @@ class MomentumWatch:
         self._begin()
 
     def restart(self) -> None:
-        """Begin anew with whatever is shown next; a watch that has seen nothing yet already does.
-
-        A leg that does not sway asks for this in every cycle.
-        """
+        """Begin anew with whatever is shown next, unless nothing has been seen yet."""
         if self._readings:
             self._begin()
 
@@ -192,7 +189,9 @@ class MomentumWatch:
             reading: of that cycle.
             stands: whether one link stands while the other one swings.
         """
-        if not (self._regular(reading) and _inside(reading.joint[0], self._leg.hip_range)):
+        # A reading must have come about a period after the one before.
+        regular = 0.5 * self._period < reading.interval < 1.5 * self._period
+        if not (regular and _inside(reading.joint[0], self._leg.hip_range)):
             self.restart()
             return None
         self._readings.append(reading)
@@ -202,36 +201,39 @@ class MomentumWatch:
             self._pushed = self._reach + 2
         elif self._pushed:
             self._pushed -= 1
-        left = self._left(motion_of(self._leg, self._readings))
+        residual, patience = self._left(motion_of(self._leg, self._readings))
         self._seen += 1
         if self._seen < self._reach:
             return None
-        self.residual = min(left)
+        self.residual = residual
         self._age += 1
-        if self.residual <= self._torque:
-            self._age = 0
-            each = zip(left, self._patiences, strict=True)
-            self._patience = max(cycles for torque, cycles in each if torque <= self._torque)
+        if residual <= self._torque:
+            self._age, self._patience = 0, patience
         # A link that is thrown onto the ground, or off it, does not stand.
         lasts = self._age > (self._reach if stands else self._patience)
         return self._doubt() if lasts and self._mismatch.known else None
 
-    def _left(self, motion: LegMotion) -> list[float]:
-        """Torques along q1 + q2 that the supports leave; infinite where the knee rules one out."""
+    def _left(self, motion: LegMotion) -> tuple[float, int]:
+        """Smallest torque along q1 + q2 that a support leaves, and the longest patience of all.
+
+        The torque is infinite where the knee rules all out. Patience is asked of those supports
+        that leave no more than the limit; it is 0 if there are none [cycles].
+        """
         wound = {cycles: average.after(motion.wound) for cycles, average in self._wound.items()}
         share, most = self._mismatch.share, math.inf if self._pushed else self._knee_torque
-        left: list[float] = []
+        patience = 0
         likeliest, torque = math.inf, (math.inf, 0.0)
-        for support in self._supports:
+        for support, cycles in zip(self._supports, self._patiences, strict=True):
             polar, knee = support.after(motion)
             by = wound[support.cycles]
             unexplained = abs(polar - share * by) if abs(knee) <= most else math.inf
-            left.append(unexplained)
+            if cycles > patience and unexplained <= self._torque:
+                patience = cycles
             if unexplained < likeliest:
                 likeliest, torque = unexplained, (polar, by)
         if self._seen >= self._reach:
             self._mismatch.learn(*torque)
-        return left
+        return likeliest, patience
 
     def _doubt(self) -> Doubt:
         return Doubt(
@@ -241,10 +243,6 @@ class MomentumWatch:
             f"link_error of {self._link_error:g} rad: look at the link encoders, at the springs' "
             "stiffness, and whether the foot slides",
         )
-
-    def _regular(self, reading: MomentumReading) -> bool:
-        """Whether a reading came about a period after the one before."""
-        return 0.5 * self._period < reading.interval < 1.5 * self._period
 
 
 def _inside(angle: float, between: Range) -> bool:
