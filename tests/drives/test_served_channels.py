@@ -70,11 +70,11 @@ class Wires:
         ]
 
     def _on_buses(self, _folder: Path, made: ExitStack) -> tuple[Server, list[can.BusABC]]:
-        theirs, ours = (
-            [can.Bus(interface="virtual", channel=f"served {name}") for name in "ab"]
-            for _ in range(2)
-        )
-        return made.enter_context(BusServer(self.networks, theirs, self._clock)), ours
+        def opened() -> list[can.BusABC]:
+            return [can.Bus(interface="virtual", channel=f"served {name}") for name in "ab"]
+
+        split = SplitBus(opened(), self.config)
+        return made.enter_context(BusServer(self.networks, split, self._clock)), opened()
 
     def _clock(self) -> int:
         self.now_ns += MS // 10

@@ -98,7 +98,6 @@ class Emulate:
         from legbench.drives.emulated.bus_server import BusServer
         from legbench.drives.emulated.slcan_server import SlcanServer
         from legbench.drives.emulated.unix_server import ChannelsServer, UnixServer
-        from legbench.drives.transport.split_bus import SplitBus
         from legbench.interrupts import stop_on_interrupt
         from legbench.plant.can_open import open_session
 
@@ -119,8 +118,7 @@ class Emulate:
                 return ChannelsServer(networks, paths)
             if paths:
                 return UnixServer(networks[0], paths[0])
-            bus = open_session(config, bench.choice, leads=False).bus
-            return BusServer(networks, bus.parts if isinstance(bus, SplitBus) else (bus,))
+            return BusServer(networks, open_session(config, bench.choice, leads=False).bus)
 
         with stop_on_interrupt() as stop:
             serve(

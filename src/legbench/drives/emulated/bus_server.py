@@ -3,7 +3,7 @@
 import errno
 import time
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import suppress
 from typing import final
 
 import can
@@ -15,7 +15,7 @@ from legbench.drives.emulated.pacer import Pacer
 from legbench.drives.emulated.shared_body import LockstepChannels
 from legbench.drives.errors import BusError
 from legbench.drives.transport.messages import frame_of, message_of
-from legbench.drives.transport.split_bus import wait_for_any
+from legbench.drives.transport.split_bus import SplitBus, wait_for_any
 
 
 @final
@@ -57,20 +57,26 @@ class BusPort:
 
 @final
 class BusServer(Closing):
-    """Stands between emulated networks, with the times of their wires, and a bus for each."""
+    """Stands between emulated networks, with the times of their wires, and a bus of as many parts."""
 
     def __init__(
         self,
         networks: Sequence[Network],
-        buses: Sequence[can.BusABC],
+        bus: can.BusABC,
         now_ns: Callable[[], int] = time.monotonic_ns,
     ) -> None:
-        """Attach to networks and buses, which close together with this server.
+        """Attach to networks and a bus, which closes together with this server.
 
-        What is sent on one channel is on no other one; all channels pass time together.
+        Args:
+            networks: emulated channels, which pass time together; no frame of one is on another.
+            bus: interface for them, a `SplitBus` for several.
+            now_ns: clock that paces the networks [ns].
         """
-        self._ports = [BusPort(network, bus) for network, bus in zip(networks, buses, strict=True)]
-        self._buses = tuple(buses)
+        self._bus = bus
+        self._buses = bus.parts if isinstance(bus, SplitBus) else (bus,)
+        self._ports = [
+            BusPort(network, bus) for network, bus in zip(networks, self._buses, strict=True)
+        ]
         alone = len(networks) == 1
         passing = NetworkTime(networks[0]) if alone else LockstepChannels(networks)
         self._pacer = Pacer(passing, now_ns)
@@ -99,7 +105,5 @@ class BusServer(Closing):
             raise BusError(f"{port.bus.channel_info}: {error}") from error
 
     def close(self) -> None:
-        """Close the buses, whatever one of them raises; may be called twice."""
-        with ExitStack() as closing:
-            for bus in self._buses:
-                closing.callback(bus.shutdown)
+        """Close the bus; may be called twice."""
+        self._bus.shutdown()
