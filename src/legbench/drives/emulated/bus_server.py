@@ -57,7 +57,7 @@ class BusPort:
 
 @final
 class BusServer(Closing):
-    """Stands between emulated networks, with the times of their wires, and a bus of as many parts."""
+    """Stands between emulated networks, with the times of their wires, and a bus for them."""
 
     def __init__(
         self,
@@ -73,9 +73,9 @@ class BusServer(Closing):
             now_ns: clock that paces the networks [ns].
         """
         self._bus = bus
-        self._buses = bus.parts if isinstance(bus, SplitBus) else (bus,)
+        self._parts = bus.parts if isinstance(bus, SplitBus) else (bus,)
         self._ports = [
-            BusPort(network, bus) for network, bus in zip(networks, self._buses, strict=True)
+            BusPort(network, bus) for network, bus in zip(networks, self._parts, strict=True)
         ]
         alone = len(networks) == 1
         passing = NetworkTime(networks[0]) if alone else LockstepChannels(networks)
@@ -91,7 +91,7 @@ class BusServer(Closing):
         try:
             wait_s = self._pacer.wait_s()
             if len(self._ports) > 1:
-                wait_for_any(self._buses, wait_s)
+                wait_for_any(self._parts, wait_s)
                 wait_s = 0.0
             message = port.receive(wait_s)
             self._pacer.advance()
