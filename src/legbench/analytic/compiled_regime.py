@@ -24,6 +24,8 @@ LAST_LOWERED = int(Event.HIP_HIGH)
 """Number of the last event whose level is lowered for falling."""
 OFF = (0.0, 1.0)
 """Gain and level of an event that is not watched."""
+NEVER = 1e6
+"""Level that is never reached [rad]."""
 
 
 @final
@@ -39,12 +41,33 @@ class CompiledRegime:
         run: its integration to a time, or to the first event.
         state: view of its state (4,).
         pars: view of its parameters (n,).
-        slots: view of them into which single numbers are written in half the time.
+        numbers: view of the state from which single numbers are read and written fast.
+        slots: view of the parameters, for the same reason.
         gain: gain of each event.
         level: level of each event, before the guard moves it.
         moved: events whose levels the guard has moved.
         version: version of the joint limits whose events are set here.
+        lean: largest |q1 + q2| whose events are set here [rad].
     """
+
+    __slots__ = (
+        "_laid",
+        "flies",
+        "gain",
+        "held",
+        "integrator",
+        "kind",
+        "lean",
+        "level",
+        "moved",
+        "numbers",
+        "pars",
+        "pushed",
+        "run",
+        "slots",
+        "state",
+        "version",
+    )
 
     def __init__(self, kind: Kind, values: list[float], tolerance: float) -> None:
         self.kind = kind
@@ -56,18 +79,18 @@ class CompiledRegime:
         self.state: Floats = self.integrator.state
         self.pars: Floats = self.integrator.pars
         self.pars[:] = values[: len(self.pars)]
-        self._state, self.slots = _slots(self.state), _slots(self.pars)
+        self.numbers, self.slots = _slots(self.state), _slots(self.pars)
         self.gain, self.level = [0.0] * len(Event), [1.0] * len(Event)
         self._laid = list(self.level)
         self.moved: list[int] = []
-        self.version = -1
+        self.version, self.lean = -1, 0.0
 
     def put(self, q: Pair, v: Pair, motor: Pair) -> None:
         """Set angles [rad], rates [rad/s] and motors [rad] at time zero of the integrator."""
-        state = self._state
-        state[0], state[1] = q
-        state[2], state[3] = v
-        self.hold(motor)
+        numbers, slots = self.numbers, self.slots
+        numbers[0], numbers[1] = q
+        numbers[2], numbers[3] = v
+        slots[MOTOR], slots[MOTOR + 1] = motor
         self.integrator.time = 0.0
         self.integrator.reset_cooldowns()
 
@@ -78,27 +101,22 @@ class CompiledRegime:
     def lay(self, event: int, gain: float, level: float) -> None:
         """Set an event to the rise of `gain * reading` through a level."""
         self.gain[event], self.level[event] = gain, level
-        self.slots[GAIN + event] = gain
         if gain < 0.0 and event <= LAST_LOWERED:
             level += BACK
+        self.slots[GAIN + event] = gain
         self.slots[LEVEL + event] = self._laid[event] = level
 
-    def lay_bounds(self, fall: int, rise: int, lower: float, upper: float, never: float) -> None:
+    def lay_bounds(self, fall: int, rise: int, lower: float, upper: float) -> None:
         """Set two events: a reading falls through `lower`, and rises through `upper`.
 
-        An event whose level is as far from zero as `never` is switched off.
+        A bound as far from zero as `NEVER` switches its event off.
         """
-        gain, level = self.gain, self.level
-        if upper >= never:
-            if gain[rise] != 0.0:
-                self.lay(rise, *OFF)
-        elif upper != level[rise] or gain[rise] == 0.0:
-            self.lay(rise, 1.0, upper)
-        if lower <= -never:
-            if gain[fall] != 0.0:
-                self.lay(fall, *OFF)
-        elif -lower != level[fall] or gain[fall] == 0.0:
-            self.lay(fall, -1.0, -lower)
+        gain, level, slots, laid = self.gain, self.level, self.slots, self._laid
+        gain[rise], level[rise] = (1.0, upper) if upper < NEVER else OFF
+        gain[fall], level[fall] = (-1.0, -lower) if lower > -NEVER else OFF
+        slots[GAIN + rise], slots[GAIN + fall] = gain[rise], gain[fall]
+        slots[LEVEL + rise] = laid[rise] = level[rise]
+        slots[LEVEL + fall] = laid[fall] = level[fall] + BACK if lower > -NEVER else level[fall]
 
     def restore(self) -> None:
         """Restore the levels that the guard has moved."""

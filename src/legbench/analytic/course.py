@@ -22,15 +22,15 @@ from legbench.analytic.compiled import (
     steady_point,
     terms_of,
 )
-from legbench.analytic.compiled_regime import CompiledRegime
+from legbench.analytic.compiled_regime import NEVER, CompiledRegime
 from legbench.analytic.contact import MIN_PHASE
 from legbench.analytic.dual import DUAL, floats, without_gradients
 from legbench.analytic.equations import Pair, sweep, sweep_rate, touchdown_rates
 from legbench.analytic.event_detector import (
     CONTACT,
+    FELL_BACK,
     HIP_HIGH,
     KINDS,
-    NEVER,
     RECOVER,
     SEEN,
     SILENT,
@@ -39,6 +39,7 @@ from legbench.analytic.event_detector import (
     EventDetector,
     Levels,
 )
+from legbench.analytic.float_leg import FloatLeg
 from legbench.analytic.model import LegModel
 from legbench.analytic.parameters import HEIGHT, SPEED, Event, Kind, Watched
 from legbench.analytic.state import LegState, Regime
@@ -54,7 +55,7 @@ one any number."""
 TIME_LIMIT = int(hy.taylor_outcome.time_limit)
 EVENTS = len(Event)
 """Number of events that an integrator may watch [-]."""
-TOUCHED, TURNED = Watched.CONTACT, Watched.TURN
+TOUCHED = Watched.CONTACT
 
 
 @final
@@ -66,6 +67,8 @@ class Course:
         plain: the leg without derivatives, on which decisions are made; so are `plain_q`, `plain_v`
             and `plain_motor`.
         time: present time [s].
+        began: time at which the present regime or piece began, zero for its integrator [s].
+        elapsed: time since then [s].
         regime: regime whose equations hold.
         q: angles [rad].
         v: rates [rad/s].
@@ -90,13 +93,15 @@ class Course:
         self.model: LegModel = model
         self.plain: LegModel = without_gradients(model)
         self.probe: Pair = probe or (0.0, 0.0)
-        self.stop_switches = StopSwitches(self.plain)
         self._tolerance, self._min_phase = tolerance, min_phase
         self._arm = foot_from_centre(model)
         self._regimes: dict[tuple[Regime, bool], CompiledRegime] = {}
         self._terms = {regime: terms_of(self.plain, regime) for regime in Regime}
         self._variation = Variation(tolerance) if model.ops is DUAL else None
-        self.detector = EventDetector(self, self.plain, min_phase)
+        arm = floats(self._arm)
+        quick = FloatLeg(self.plain, arm)
+        self.stop_switches = StopSwitches(self.plain, quick)
+        self.detector = EventDetector(self, self.plain, quick, arm, min_phase)
         self.motor: Pair = (0.0, 0.0)
         self.told: LegState | None = None
 
@@ -192,12 +197,16 @@ class Course:
                 end = detector.blind if self.time < detector.blind < until else until
                 if end > self.time:
                     event = self._piece(end)
-            if event is not None:
-                seen = self._meaning(event)
-                if seen is not None:
-                    return seen
-            elif self.time >= until:
-                return None
+                if event is None:
+                    if self.time >= until:
+                        return None
+                    continue
+            if event <= FELL_BACK:
+                if event == TURN:
+                    detector.turned()
+                return SEEN[event]
+            if self._handle(event):
+                return TOUCHED
         why = f"integration failed at t = {self.time:.6f} s: the leg chatters"
         raise PlantFault("integration failed", why)
 
@@ -217,44 +226,42 @@ class Course:
     def _piece(self, until: float) -> int | None:
         """Integrate to `until` or to the next event."""
         compiled = self.compiled
+        length = float(until - self.began)
         # max_steps is passed by position: a keyword costs a fifth of a short call.
-        outcome = int(compiled.run(float(until - self.began), MAX_STEPS)[0])
-        event = None if outcome == TIME_LIMIT else -outcome - 1
-        if event is not None and not 0 <= event < EVENTS:
-            at = self.began + float(compiled.integrator.time)
-            why = f"integration failed at t = {at:.6f} s: the state runs away"
-            raise PlantFault("integration failed", why)
-        q1, q2, v1, v2 = compiled.state.tolist()
+        outcome = compiled.run(length, MAX_STEPS)[0].value
+        q1, q2, v1, v2 = compiled.numbers
         self.plain_q, self.plain_v = (q1, q2), (v1, v2)
+        if outcome == TIME_LIMIT:
+            event, self.elapsed = None, length
+        else:
+            event, self.elapsed = -outcome - 1, compiled.integrator.time
+            if not 0 <= event < EVENTS:
+                at = self.began + self.elapsed
+                why = f"integration failed at t = {at:.6f} s: the state runs away"
+                raise PlantFault("integration failed", why)
         if self._variation is not None:
             self._variation.carry(self, self.plain_q, self.plain_v, until, event)
             return event
         self.q, self.v = self.plain_q, self.plain_v
         # Exactly `until`, since a time that is short of it by rounding would never be reached.
-        self.time = until if event is None else self.began + compiled.integrator.time
+        self.time = until if event is None else self.began + self.elapsed
         return event
 
-    def _meaning(self, event: int) -> Watched | None:
-        """Event as the caller sees it; those of stops and held feet are handled here, for None."""
+    def _handle(self, event: int) -> bool:
+        """Handle an event of a stop, a held foot or the ground; true if contact is to change."""
         compiled = self.compiled
-        if event in SEEN:
-            return SEEN[event]
-        if event == TURN:
-            self.detector.turned()
-            return TURNED
         if event <= HIP_HIGH:
-            self.stop_switches.cross(event)
-            self.stop_switches.lay(compiled)
+            self.stop_switches.cross(compiled, event)
             self._decide()
         elif event == RECOVER:
             self._load(held=False)
         elif event != CONTACT:
             self.stop_switches.flip(compiled, event)
         elif compiled.flies or compiled.held or self.detector.released() > -TIE:
-            return TOUCHED
+            return True
         else:
             self._load(held=True)
-        return None
+        return False
 
     def _put(
         self, regime: Regime, q: Pair, v: Pair, point: Pair, drift: Pair, lean: float = NEVER
@@ -278,7 +285,7 @@ class Course:
         if self._variation is not None:
             self.plain_q, self.plain_v = floats(self.q), floats(self.v)
             self.plain_motor = floats(self.motor)
-        self.began = self.time
+        self.began, self.elapsed = self.time, 0.0
         compiled.put(self.plain_q, self.plain_v, self.plain_motor)
         if compiled.flies:
             compiled.slots[HEIGHT], compiled.slots[SPEED] = self.point[1], self.drift[1]

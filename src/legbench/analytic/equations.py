@@ -62,15 +62,6 @@ def guide_torque(ops: Ops, reach: float, guide: Pair, q: Pair, v: Pair) -> Pair:
     )
 
 
-def pair_bias(ops: Ops, terms: PairTerms, q: Pair, v: Pair) -> Pair:
-    """`C(q, qdot) qdot + g(q)` of Appendix I [N m]."""
-    swirl = ops.sin(q[0] - q[1])
-    return (
-        terms.coupling * (swirl * (v[1] * v[1])) + terms.moment[0] * ops.sin(q[0]),
-        -terms.coupling * (swirl * (v[0] * v[0])) + terms.moment[1] * ops.sin(q[1]),
-    )
-
-
 def pair_solve(ops: Ops, terms: PairTerms, q: Pair, right: Pair) -> Pair:
     """`M(q)^-1 right` for the inertia matrix of Appendix I, by Cramer's rule."""
     (i1, i2), mixed = terms.inertia, terms.coupling
@@ -95,9 +86,15 @@ def pair_share(ops: Ops, terms: PairTerms, q: Pair, along: Pair) -> Pair:
 
 
 def pair_acceleration(ops: Ops, terms: PairTerms, q: Pair, v: Pair, torque: Pair) -> Pair:
-    """Eq. (1) solved for the accelerations: `M^-1 (tau - C qdot - g)` [rad/s^2]."""
-    bias = pair_bias(ops, terms, q, v)
-    return pair_solve(ops, terms, q, (torque[0] - bias[0], torque[1] - bias[1]))
+    """Eq. (1) solved for the accelerations: `M^-1 (tau - C qdot - g)` [rad/s^2].
+
+    `C(q, qdot) qdot + g(q)` is that of Appendix I.
+    """
+    (q1, q2), (v1, v2), mixed, moment = q, v, terms.coupling, terms.moment
+    swirl = ops.sin(q1 - q2)
+    bias_1 = mixed * (swirl * (v2 * v2)) + moment[0] * ops.sin(q1)
+    bias_2 = -mixed * (swirl * (v1 * v1)) + moment[1] * ops.sin(q2)
+    return pair_solve(ops, terms, q, (torque[0] - bias_1, torque[1] - bias_2))
 
 
 def pair_kinetic(ops: Ops, terms: PairTerms, q: Pair, v: Pair) -> Term:

@@ -7,17 +7,15 @@ that holds already, because a motor, the regime or a level has jumped, is an eve
 
 from typing import TYPE_CHECKING, NamedTuple, final
 
-from legbench.analytic.compiled import foot_from_centre
-from legbench.analytic.compiled_regime import NUDGE, OFF, CompiledRegime
-from legbench.analytic.dual import floats
+from legbench.analytic.compiled_regime import NEVER, NUDGE, OFF, CompiledRegime
 from legbench.analytic.equations import (
     Pair,
     contact_force,
     free_foot_acceleration,
     pair_acceleration,
-    sweep_height,
     sweep_rate,
 )
+from legbench.analytic.float_leg import FloatLeg
 from legbench.analytic.model import LegModel
 from legbench.analytic.parameters import Event, Kind, Watched
 from legbench.analytic.state import Regime
@@ -26,8 +24,6 @@ from legbench.design.statics import GRAVITY
 if TYPE_CHECKING:
     from legbench.analytic.course import Course
 
-NEVER = 1e6
-"""Level that is never reached [rad]."""
 TIE = 1e-7
 """Tolerance of acceleration over gravity and of force over weight when the foot is released [-]: on
 the radial mode both vanish together, and rounding decides their signs."""
@@ -36,13 +32,8 @@ JUMPED = 1e-9
 RISE, FALL, TURN, FELL, FELL_BACK = range(Event.RISE, Event.FELL_BACK + 1)
 KNEE_LOW, KNEE_HIGH, HIP_LOW, HIP_HIGH = range(Event.KNEE_LOW, Event.HIP_HIGH + 1)
 CONTACT, RECOVER = int(Event.CONTACT), int(Event.RECOVER)
-SEEN = {
-    RISE: Watched.RISE,
-    FALL: Watched.FALL,
-    FELL: Watched.FELL,
-    FELL_BACK: Watched.FELL,
-}
-"""Events of angles that the caller sees, whose condition may hold already when a piece begins."""
+SEEN = (Watched.RISE, Watched.FALL, Watched.TURN, Watched.FELL, Watched.FELL)
+"""Events of angles as the caller sees them, in their order, which are the first ones."""
 KINDS = {Regime.FLIGHT: Kind.FLIGHT, Regime.STANCE: Kind.STANCE}
 """Compiled equations with which a regime begins; regimes that are not listed take `Kind.FIXED`."""
 
@@ -70,17 +61,39 @@ class EventDetector:
         blind: time until which touchdown and lift-off are not watched [s].
     """
 
-    def __init__(self, course: "Course", model: LegModel, min_phase: float) -> None:
-        self._course, self._plain, self._min_phase = course, model, min_phase
-        self._arm = floats(foot_from_centre(model))
+    __slots__ = (
+        "_above",
+        "_arm",
+        "_below",
+        "_compiled",
+        "_course",
+        "_floats",
+        "_free",
+        "_min_phase",
+        "_most",
+        "_plain",
+        "_probe",
+        "_turn",
+        "_weight",
+        "blind",
+        "lean",
+        "levels",
+    )
+
+    def __init__(
+        self, course: "Course", model: LegModel, floats: FloatLeg, arm: Pair, min_phase: float
+    ) -> None:
+        self._course, self._plain, self._floats = course, model, floats
+        self._arm, self._min_phase, self._probe = arm, min_phase, course.probe
         self._weight = model.floating.mass * GRAVITY
         self.levels, self.lean, self.blind = SILENT, NEVER, 0.0
+        self._most = NEVER - NUDGE
         self._below, self._above = -NEVER, NEVER
         self._turn, self._free = 0.0, False
 
     def begin(self, lean: float) -> None:
         """Begin with a leg in a new state, whose turning points are those after it."""
-        self.lean, self._turn = lean, 0.0
+        self.lean, self._most, self._turn = lean, lean - NUDGE, 0.0
 
     def enter(self, regime: Regime, since: float) -> None:
         """Begin a regime, in which contact is not watched for the shortest phase at first."""
@@ -89,22 +102,26 @@ class EventDetector:
 
     def move_to(self, compiled: CompiledRegime) -> None:
         """Set all levels in another integrator."""
-        course, self._compiled = self._course, compiled
-        compiled.restore()
-        compiled.lay_bounds(FELL, FELL_BACK, -self.lean, self.lean, NEVER)
-        course.stop_switches.lay(compiled)
+        self._compiled = compiled
+        if compiled.moved:
+            compiled.restore()
+        if compiled.lean != self.lean:
+            compiled.lean = self.lean
+            compiled.lay_bounds(FELL, FELL_BACK, -self.lean, self.lean)
+        self._course.stop_switches.lay(compiled)
         self.lay(self.levels)
+        if compiled.gain[TURN] != self._turn:
+            compiled.lay(TURN, self._turn, 0.0) if self._turn else compiled.lay(TURN, *OFF)
 
     def lay(self, levels: Levels) -> None:
         """Replace the levels of the probe."""
-        self.levels, compiled = levels, self._compiled
+        self.levels = levels
         upper, lower, turns = levels
-        compiled.lay_bounds(FALL, RISE, lower, upper, NEVER)
+        self._compiled.lay_bounds(FALL, RISE, lower, upper)
         self._below, self._above = lower + NUDGE, upper - NUDGE
-        if not turns:
+        if not turns and self._turn != 0.0:
             self._turn = 0.0
-            if compiled.gain[TURN] != 0.0:
-                compiled.lay(TURN, *OFF)
+            self._compiled.lay(TURN, *OFF)
 
     def turned(self) -> None:
         """Watch the probe's next turning point: a minimum after a maximum, or the reverse."""
@@ -116,32 +133,27 @@ class EventDetector:
         course, compiled = self._course, self._compiled
         if compiled.moved:
             compiled.restore()
-        due = self._near()
+        (p1, p2), (q1, q2) = self._probe, course.plain_q
+        switches, due = course.stop_switches, None
+        reading, lean, knee = p1 * q1 + p2 * q2, q1 + q2, q2 - q1
+        if not self._below < reading < self._above:
+            due = self._guard_two(RISE, FALL, reading)
+        if not -self._most < lean < self._most:
+            fell = self._guard_two(FELL, FELL_BACK, lean)
+            due = fell if due is None else due
+        low, high, back, front = switches.clear
+        if not (low < knee < high and back < q1 < front):
+            self._guard_two(KNEE_LOW, KNEE_HIGH, knee)
+            self._guard_two(HIP_LOW, HIP_HIGH, q1)
         if self.levels.turns and self._guard_turn() and due is None:
             due = TURN
-        if course.stop_switches.touched:
-            course.stop_switches.guard(
+        if switches.touched:
+            switches.guard(
                 compiled, course.terms, course.plain_motor, course.plain_q, course.plain_v
             )
         if self._free:
             contact = self._contact()
             due = contact if due is None else due
-        return due
-
-    def _near(self) -> int | None:
-        """Guard the events of angles, and return one whose condition holds already, or None."""
-        course = self._course
-        (p1, p2), (q1, q2) = course.probe, course.plain_q
-        reading, lean = p1 * q1 + p2 * q2, q1 + q2
-        due = None
-        if not self._below < reading < self._above:
-            due = self._guard_two(RISE, FALL, reading)
-        if abs(lean) > self.lean - NUDGE:
-            fell = self._guard_two(FELL, FELL_BACK, lean)
-            due = fell if due is None else due
-        if not course.stop_switches.clear(q2 - q1, q1):
-            self._guard_two(KNEE_LOW, KNEE_HIGH, q2 - q1)
-            self._guard_two(HIP_LOW, HIP_HIGH, q1)
         return due
 
     def _guard_two(self, first: int, second: int, value: float) -> int | None:
@@ -178,11 +190,9 @@ class EventDetector:
     def _touchdown(self) -> int | None:
         """Guard touchdown, and return it if the foot is below the ground and sinking."""
         course, compiled = self._course, self._compiled
-        elapsed = float(compiled.integrator.time)
-        z, dz = float(course.point[1]), float(course.drift[1])
+        elapsed, z, dz = course.elapsed, float(course.point[1]), float(course.drift[1])
         fallen = self._plain.floating.gravity * elapsed
-        height = z + (dz - 0.5 * fallen) * elapsed
-        height += sweep_height(self._plain.ops, course.plain_q, self._arm)
+        height = z + (dz - 0.5 * fallen) * elapsed + self._floats.foot_height(course.plain_q)
         if height > 0.0:
             self._expect(height)
             return None
@@ -203,34 +213,37 @@ class EventDetector:
     def _force(self) -> float:
         """Vertical contact force on the standing foot over the weight [-]."""
         course, plain = self._course, self._plain
-        q, v = course.plain_q, course.plain_v
-        a = self._accelerations()
-        return contact_force(plain.ops, plain.floating, q, v, a)[1] / self._weight
+        motor, q, v = course.plain_motor, course.plain_q, course.plain_v
+        if not course.stop_switches.touched:
+            return self._floats.force(motor, q, v)
+        return contact_force(plain.ops, plain.floating, q, v, self._accelerations())[1] / self._weight
 
     def released(self) -> float:
         """Upward acceleration that the standing foot would have if released, over gravity [-]."""
         course, plain = self._course, self._plain
-        q, v = course.plain_q, course.plain_v
-        torque = plain.torque(course.plain_motor, q, v)
-        a = course.stop_switches.released(plain.falling, torque, q, v)
+        motor, q, v = course.plain_motor, course.plain_q, course.plain_v
+        if course.stop_switches.touched:
+            torque = self._floats.torque(motor, q, v)
+            a = course.stop_switches.released(plain.falling, torque, q, v)
+        else:
+            a = self._floats.accelerations(plain.falling, motor, q, v)
         return free_foot_acceleration(plain.ops, plain.floating, q, v, a)[1] / GRAVITY
 
     def _accelerations(self) -> Pair:
         """Accelerations of the angles, with the stops that are switched on [rad/s^2]."""
         course, plain = self._course, self._plain
-        q, v = course.plain_q, course.plain_v
-        torque = plain.torque(course.plain_motor, q, v)
+        motor, q, v = course.plain_motor, course.plain_q, course.plain_v
         if course.stop_switches.touched:
+            torque = self._floats.torque(motor, q, v)
             return course.stop_switches.turns(plain.ops, course.terms, torque, q, v)[1]
-        return pair_acceleration(plain.ops, course.terms, q, v, torque)
+        return self._floats.accelerations(course.terms, motor, q, v)
 
     def _guard_turn(self) -> bool:
         """Watch the probe's next turning point, the kind of which follows from its present rate.
 
         Returns whether an impact has just turned the probe, which is a turning point, too.
         """
-        course = self._course
-        (p1, p2), (v1, v2) = course.probe, course.plain_v
+        (p1, p2), (v1, v2) = self._probe, self._course.plain_v
         rate = p1 * v1 + p2 * v2
         if self._turn == 0.0:
             towards = rate
@@ -238,7 +251,6 @@ class EventDetector:
                 a = self._accelerations()
                 towards = p1 * a[0] + p2 * a[1]
             self._turn = -1.0 if towards > 0.0 else 1.0
-        if self._compiled.gain[TURN] != self._turn:
             self._compiled.lay(TURN, self._turn, 0.0)
         if self._turn * rate > -NUDGE:
             self._compiled.guard(TURN, rate)

@@ -13,6 +13,7 @@ from typing import final
 
 from legbench.analytic.compiled_regime import NUDGE, OFF, CompiledRegime
 from legbench.analytic.equations import SCALAR, Ops, Pair, Term, pair_acceleration, pair_share
+from legbench.analytic.float_leg import FloatLeg
 from legbench.analytic.model import LegModel
 from legbench.analytic.parameters import FREE_PUSHES, PUSHES, Event
 from legbench.analytic.stops import TIME_CONSTANT, Stop
@@ -24,6 +25,10 @@ FIRST = int(Event.KNEE_LOW)
 """Number of the first of the four events in which a joint meets or leaves a limit."""
 KNEE_PUSH, KNEE_FREE = int(Event.KNEE_PUSH), int(Event.KNEE_FREE)
 """Numbers of the events of the knee's stop; those of the hip's come next."""
+SQUARE = TIME_CONSTANT**2
+"""Factor of a stop's acceleration in its reading [s^2]."""
+
+Bounds = tuple[float, float, float, float]
 
 
 @final
@@ -34,25 +39,36 @@ class StopSwitches:
 
     Attributes:
         touched: whether a joint is beyond a limit.
+        clear: angles of knee and hip between which no event of a limit is near: lowest and highest
+            of the knee, then of the hip [rad].
     """
 
-    def __init__(self, model: LegModel) -> None:
-        self._model, self._stops = model, model.stops
+    __slots__ = (
+        "_acting",
+        "_answer",
+        "_asked_at",
+        "_floats",
+        "_free",
+        "_known",
+        "_model",
+        "_pushing",
+        "_stops",
+        "_touched",
+        "_version",
+        "clear",
+        "touched",
+    )
+
+    def __init__(self, model: LegModel, floats: FloatLeg) -> None:
+        self._model, self._stops, self._floats = model, model.stops, floats
         self._touched = [False] * len(model.stops)
         self._pushing, self._free = [False, False], [False, False]
-        self._acting: list[Stop | None] = [None, None]
-        """Stop that acts on each joint, or none within the limits."""
-        self.touched, self._version = False, 0
+        self._known: dict[tuple[bool, ...], tuple[list[Stop | None], Bounds]] = {}
+        self._version = 0
         self._asked_at: tuple[PairTerms, Pair, Pair, Pair] | None = None
         """Objects for which `_answer` has been computed."""
         self._answer: list[float] = [0.0, 0.0]
-        ends = [stop.limit + stop.sign * NUDGE for stop in model.stops]
-        self._ends = tuple(ends) or (-math.inf, math.inf) * 2
-
-    def clear(self, knee: float, hip: float) -> bool:
-        """Whether no joint at these angles [rad] is at a limit or beyond one."""
-        knee_low, knee_high, hip_low, hip_high = self._ends
-        return not self.touched and knee_low < knee < knee_high and hip_low < hip < hip_high
+        self._changed()
 
     def find(self, q: Pair, v: Pair) -> None:
         """Determine by the law which limits a joint is beyond, for a leg set to a new state."""
@@ -66,43 +82,61 @@ class StopSwitches:
 
     def lay(self, compiled: CompiledRegime) -> None:
         """Set the four events of the limits: to go beyond each, or to come back from beyond it."""
-        if compiled.version == self._version:
-            return
-        compiled.version = self._version
-        for event, (stop, beyond) in enumerate(zip(self._stops, self._touched, strict=True), FIRST):
-            gain = stop.sign if beyond else -stop.sign
-            if compiled.gain[event] != gain:
-                compiled.lay(event, gain, gain * stop.limit)
+        if compiled.version != self._version:
+            compiled.version = self._version
+            for event in range(FIRST, FIRST + len(self._stops)):
+                self._lay_limit(compiled, event)
 
-    def cross(self, event: int) -> None:
-        """Note that a joint has gone beyond a limit, or has come back."""
+    def _lay_limit(self, compiled: CompiledRegime, event: int) -> None:
+        stop = self._stops[event - FIRST]
+        gain = stop.sign if self._touched[event - FIRST] else -stop.sign
+        compiled.lay(event, gain, gain * stop.limit)
+
+    def cross(self, compiled: CompiledRegime, event: int) -> None:
+        """Note that a joint has gone beyond a limit, or has come back, and watch the way back."""
         self._touched[event - FIRST] ^= True
         self._changed()
+        self._lay_limit(compiled, event)
+        compiled.version = self._version
 
     def _changed(self) -> None:
-        self._acting = [None, None]
-        for index, (stop, beyond) in enumerate(zip(self._stops, self._touched, strict=True)):
-            if beyond:
-                self._acting[index // 2] = stop
-        self.touched = True in self._touched
+        beyond = tuple(self._touched)
+        if beyond not in self._known:
+            self._known[beyond] = self._within(beyond)
+        self._acting, self.clear = self._known[beyond]
+        self.touched = True in beyond
         self._version += 1
         self._asked_at = None
+
+    def _within(self, touched: tuple[bool, ...]) -> tuple[list[Stop | None], Bounds]:
+        """Stop that acts on each joint, and the angles at which no limit is near."""
+        acting: list[Stop | None] = [None, None]
+        bounds = [-math.inf, math.inf, -math.inf, math.inf]
+        for index, (stop, beyond) in enumerate(zip(self._stops, touched, strict=True)):
+            if beyond:
+                acting[index // 2] = stop
+            # A lower end bounds a joint from below, and one that is beyond it from above.
+            place = index ^ beyond
+            if place % 2:
+                bounds[place] = min(bounds[place], stop.limit - NUDGE)
+            else:
+                bounds[place] = max(bounds[place], stop.limit + NUDGE)
+        low, high, back, front = bounds
+        return acting, (low, high, back, front)
 
     def decide(
         self, compiled: CompiledRegime, terms: PairTerms, motor: Pair, q: Pair, v: Pair
     ) -> None:
         """Set the switches of the pushes by the law, after something has jumped."""
-        if not self.touched:
-            if compiled.pushed:
-                self._silence(compiled)
-            return
-        compiled.pushed = True
-        asked = self._asked(terms, motor, q, v)
-        self._pushing = [push > 0.0 for push in asked]
-        if compiled.held:
-            asked = self._asked(self._model.falling, motor, q, v)
-            self._free = [push > 0.0 for push in asked]
-        self._switch(compiled)
+        if self.touched:
+            asked = self._asked(terms, motor, q, v)
+            self._pushing = [push > 0.0 for push in asked]
+            if compiled.held:
+                asked = self._asked(self._model.falling, motor, q, v)
+                self._free = [push > 0.0 for push in asked]
+        if self.touched or compiled.pushed:
+            compiled.pushed = self.touched
+            self._switch(compiled)
 
     def flip(self, compiled: CompiledRegime, event: int) -> None:
         """Note that a stop begins or ends to push, or would if the foot were released."""
@@ -115,42 +149,40 @@ class StopSwitches:
     def guard(
         self, compiled: CompiledRegime, terms: PairTerms, motor: Pair, q: Pair, v: Pair
     ) -> None:
-        """Set and guard the events of the pushes, for the joints that are beyond a limit."""
-        found = [(KNEE_PUSH, terms, self._pushing)]
+        """Guard the events of the pushes, for the joints that are beyond a limit."""
+        asked = self._asked(terms, motor, q, v)
+        for joint, stop in enumerate(self._acting):
+            if stop is not None:
+                compiled.guard(KNEE_PUSH + joint, stop.sign * asked[joint])
         if compiled.held:
-            found.append((KNEE_FREE, self._model.falling, self._free))
-        for first, inertia, pushing in found:
-            asked = self._asked(inertia, motor, q, v)
-            for joint in (0, 1):
-                stop, event = self._acting[joint], first + joint
-                if stop is None:
-                    if compiled.gain[event] != 0.0:
-                        compiled.lay(event, *OFF)
-                    continue
-                gain = -stop.sign if pushing[joint] else stop.sign
-                if compiled.gain[event] != gain:
-                    compiled.lay(event, gain, 0.0)
-                compiled.guard(event, stop.sign * asked[joint])
-
-    def _silence(self, compiled: CompiledRegime) -> None:
-        """Switch all pushes and their events off, as no joint is beyond a limit."""
-        compiled.pushed = False
-        compiled.slots[PUSHES] = compiled.slots[PUSHES + 2] = 0.0
-        for event in (KNEE_PUSH, KNEE_PUSH + 1):
-            compiled.lay(event, *OFF)
-        if compiled.held:
-            compiled.slots[FREE_PUSHES] = compiled.slots[FREE_PUSHES + 1] = 0.0
-            for event in (KNEE_FREE, KNEE_FREE + 1):
-                compiled.lay(event, *OFF)
+            asked = self._asked(self._model.falling, motor, q, v)
+            for joint, stop in enumerate(self._acting):
+                if stop is not None:
+                    compiled.guard(KNEE_FREE + joint, stop.sign * asked[joint])
 
     def _switch(self, compiled: CompiledRegime) -> None:
-        for joint in (0, 1):
-            stop = self._acting[joint]
-            place = PUSHES + 2 * joint
-            compiled.slots[place] = float(stop is not None and self._pushing[joint])
-            compiled.slots[place + 1] = 0.0 if stop is None else stop.limit
+        """Set the switches in the equations, and the events in which they change."""
+        slots, place = compiled.slots, PUSHES
+        for joint, stop in enumerate(self._acting):
+            pushes, event = self._pushing[joint], KNEE_PUSH + joint
+            if stop is None:
+                slots[place] = slots[place + 1] = 0.0
+                compiled.lay(event, *OFF)
+            else:
+                slots[place], slots[place + 1] = float(pushes), stop.limit
+                compiled.lay(event, -stop.sign if pushes else stop.sign, 0.0)
+            place += 2
             if compiled.held:
-                compiled.slots[FREE_PUSHES + joint] = float(stop is not None and self._free[joint])
+                self._switch_free(compiled, joint, stop)
+
+    def _switch_free(self, compiled: CompiledRegime, joint: int, stop: Stop | None) -> None:
+        """Set the switch and the event of a stop on the foot as if it were released."""
+        pushes, event = self._free[joint], KNEE_FREE + joint
+        compiled.slots[FREE_PUSHES + joint] = float(stop is not None and pushes)
+        if stop is None:
+            compiled.lay(event, *OFF)
+        else:
+            compiled.lay(event, -stop.sign if pushes else stop.sign, 0.0)
 
     def turns(
         self, ops: Ops, terms: PairTerms, torque: Pair, q: Pair, v: Pair, *, free: bool = False
@@ -171,9 +203,17 @@ class StopSwitches:
         """Readings of the events of each joint's stop where every stop acts that would push."""
         at = (terms, motor, q, v)
         if self._asked_at is None or not all(map(is_, at, self._asked_at)):
-            torque = self._model.torque(motor, q, v)
-            self._asked_at, self._answer = at, self._turns(SCALAR, terms, torque, q, v, None)[0]
+            self._asked_at, self._answer = at, self._ask(terms, motor, q, v)
         return self._answer
+
+    def _ask(self, terms: PairTerms, motor: Pair, q: Pair, v: Pair) -> list[float]:
+        knee, hip = self._acting
+        if knee is not None and hip is not None:
+            return self._turns(SCALAR, terms, self._floats.torque(motor, q, v), q, v, None)[0]
+        a = self._floats.accelerations(terms, motor, q, v)
+        if knee is not None:
+            return [SQUARE * knee.turn(q, v, a), 0.0]
+        return [0.0, SQUARE * hip.turn(q, v, a) if hip is not None else 0.0]
 
     def _turns(
         self,
@@ -191,7 +231,7 @@ class StopSwitches:
             if stop is None:
                 continue
             turn = stop.turn(q, v, a)
-            found[joint] = TIME_CONSTANT**2 * turn
+            found[joint] = SQUARE * turn
             if pushing[joint] if pushing is not None else turn > 0.0:
                 share = pair_share(ops, terms, q, stop.normal)
                 a = a[0] + share[0] * turn, a[1] + share[1] * turn

@@ -61,9 +61,11 @@ class Stop:
             v: their rates [rad/s].
             a: their accelerations without this stop [rad/s^2].
         """
-        n1, n2 = self.normal
-        back = 2.0 / TIME_CONSTANT * self.speed(v) + self.depth(q) / TIME_CONSTANT**2
-        return back - IMPEDANCE * (n1 * a[0] + n2 * a[1])
+        (on_1, on_2), sign = self.on, self.sign
+        speed = -sign * (on_1 * v[0] + on_2 * v[1])
+        depth = sign * (self.limit - on_1 * q[0] - on_2 * q[1])
+        back = 2.0 / TIME_CONSTANT * speed + depth / TIME_CONSTANT**2
+        return back - IMPEDANCE * (sign * on_1 * a[0] + sign * on_2 * a[1])
 
     def push(self, q: Pair, v: Pair, a: Pair, answer: Pair) -> Term:
         """Torque on a joint beyond its limit by the law [N m]; below zero the stop does not act.

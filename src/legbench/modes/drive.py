@@ -7,7 +7,7 @@ from typing import final
 import numpy as np
 
 from legbench.analytic.equations import Pair
-from legbench.analytic.event_detector import NEVER
+from legbench.analytic.compiled_regime import NEVER
 from legbench.analytic.taylor import SILENT, Levels, Watched
 from legbench.control import JumpConfig, LegTargets
 from legbench.control.jump_rules import JumpPhase, phase_exits

@@ -1,0 +1,79 @@
+"""Readings of one leg on plain floats, each formula written out in one piece.
+
+They are asked for at every event of a hop, where calls and attributes of the general equations
+(`analytic.equations`) would take longer than the arithmetic. Results are equal to theirs to the last
+bit.
+"""
+
+from math import cos, sin
+from typing import final
+
+from legbench.analytic.equations import Pair
+from legbench.analytic.model import LegModel
+from legbench.analytic.terms import PairTerms
+from legbench.design.statics import GRAVITY
+
+
+@final
+class FloatLeg:
+    """Accelerations, contact force and height of the foot of one leg without joint stops.
+
+    Args:
+        model: the leg, in plain floats.
+        arm: foot tip seen from the centre of mass, along dir(q1) and dir(q2) [m].
+    """
+
+    __slots__ = ("_arm", "_floating", "_springs", "_stance")
+
+    def __init__(self, model: LegModel, arm: Pair) -> None:
+        floating, stance = model.floating, model.stance
+        self._springs = (*model.stiffness, *model.damping)
+        self._stance = (
+            *stance.inertia,
+            stance.coupling,
+            *stance.moment,
+            *floating.above_foot,
+            floating.mass * floating.gravity,
+            floating.mass * GRAVITY,
+        )
+        self._arm = arm
+        self._floating = floating
+
+    def torque(self, motor: Pair, q: Pair, v: Pair) -> Pair:
+        """Torque of springs and dampers on q1 and q2 [N m]."""
+        k1, k2, d1, d2 = self._springs
+        return k1 * (motor[0] - q[0]) - d1 * v[0], k2 * (motor[1] - q[1]) - d2 * v[1]
+
+    def accelerations(self, terms: PairTerms, motor: Pair, q: Pair, v: Pair) -> Pair:
+        """Accelerations of q1 and q2 under the inertia `terms` [rad/s^2]."""
+        k1, k2, d1, d2 = self._springs
+        (q1, q2), (v1, v2), (i1, i2), (g1, g2) = q, v, terms.inertia, terms.moment
+        mixed = terms.coupling
+        swirl, cosine = sin(q1 - q2), cos(q1 - q2)
+        right_1 = k1 * (motor[0] - q1) - d1 * v1 - (mixed * (swirl * (v2 * v2)) + g1 * sin(q1))
+        right_2 = k2 * (motor[1] - q2) - d2 * v2 - (-mixed * (swirl * (v1 * v1)) + g2 * sin(q2))
+        determinant = i1 * i2 - mixed * mixed * (cosine * cosine)
+        return (
+            (i2 * right_1 - mixed * (cosine * right_2)) / determinant,
+            (i1 * right_2 - mixed * (cosine * right_1)) / determinant,
+        )
+
+    def force(self, motor: Pair, q: Pair, v: Pair) -> float:
+        """Vertical contact force on the standing foot over the weight [-]."""
+        k1, k2, d1, d2 = self._springs
+        i1, i2, mixed, g1, g2, h1, h2, carried, weight = self._stance
+        (q1, q2), (v1, v2) = q, v
+        swirl, cosine, s1, s2 = sin(q1 - q2), cos(q1 - q2), sin(q1), sin(q2)
+        square_1, square_2 = v1 * v1, v2 * v2
+        right_1 = k1 * (motor[0] - q1) - d1 * v1 - (mixed * (swirl * square_2) + g1 * s1)
+        right_2 = k2 * (motor[1] - q2) - d2 * v2 - (-mixed * (swirl * square_1) + g2 * s2)
+        determinant = i1 * i2 - mixed * mixed * (cosine * cosine)
+        a1 = (i2 * right_1 - mixed * (cosine * right_2)) / determinant
+        a2 = (i1 * right_2 - mixed * (cosine * right_1)) / determinant
+        lifted = h1 * (s1 * a1 + cos(q1) * square_1) + h2 * (s2 * a2 + cos(q2) * square_2)
+        return (lifted + carried) / weight
+
+    def foot_height(self, q: Pair) -> float:
+        """Height of the foot tip over the centre of mass [m]."""
+        arm_1, arm_2 = self._arm
+        return -arm_1 * cos(q[0]) - arm_2 * cos(q[1])
