@@ -14,6 +14,8 @@ from typing import final
 from legbench.analytic.compiled import event_integrator
 from legbench.analytic.equations import Pair
 from legbench.analytic.parameters import GAIN, LEVEL, MOTOR, Event, Kind
+from legbench.analytic.state import Regime
+from legbench.analytic.terms import PairTerms
 from legbench.signals import Floats
 
 NUDGE = 1e-13
@@ -34,6 +36,10 @@ class CompiledRegime:
 
     Attributes:
         kind: set of equations and events.
+        regime: contact regime.
+        terms: inertia and gravity of the angles.
+        free: whether touchdown or lift-off ends the regime.
+        opposite: regime on the other side of touchdown or lift-off, once the leg has been there.
         held: whether the ground pulls on a foot that would go down if it were released.
         flies: whether the leg is in the air.
         pushed: whether a joint is beyond a limit.
@@ -46,13 +52,14 @@ class CompiledRegime:
         gain: gain of each event.
         level: level of each event, before the guard moves it.
         moved: events whose levels the guard has moved.
-        version: version of the joint limits whose events are set here.
+        beyond: the limits that joints were beyond when their events were set here.
         lean: largest |q1 + q2| whose events are set here [rad].
     """
 
     __slots__ = (
-        "_laid",
+        "beyond",
         "flies",
+        "free",
         "gain",
         "held",
         "integrator",
@@ -61,16 +68,27 @@ class CompiledRegime:
         "level",
         "moved",
         "numbers",
+        "opposite",
         "pars",
         "pushed",
+        "regime",
         "run",
         "slots",
         "state",
-        "version",
+        "terms",
     )
 
-    def __init__(self, kind: Kind, values: list[float], tolerance: float) -> None:
-        self.kind = kind
+    def __init__(
+        self,
+        kind: Kind,
+        regime: Regime,
+        terms: PairTerms,
+        values: list[float],
+        tolerance: float,
+    ) -> None:
+        self.kind, self.regime, self.terms = kind, regime, terms
+        self.free = kind is not Kind.FIXED
+        self.opposite: CompiledRegime | None = None
         self.held = kind is Kind.HELD
         self.flies = kind is Kind.FLIGHT
         self.pushed = False
@@ -81,9 +99,9 @@ class CompiledRegime:
         self.pars[:] = values[: len(self.pars)]
         self.numbers, self.slots = _slots(self.state), _slots(self.pars)
         self.gain, self.level = [0.0] * len(Event), [1.0] * len(Event)
-        self._laid = list(self.level)
         self.moved: list[int] = []
-        self.version, self.lean = -1, 0.0
+        self.beyond: tuple[bool, ...] | None = None
+        self.lean = 0.0
 
     def put(self, q: Pair, v: Pair, motor: Pair) -> None:
         """Set angles [rad], rates [rad/s] and motors [rad] at time zero of the integrator."""
@@ -101,27 +119,32 @@ class CompiledRegime:
     def lay(self, event: int, gain: float, level: float) -> None:
         """Set an event to the rise of `gain * reading` through a level."""
         self.gain[event], self.level[event] = gain, level
-        if gain < 0.0 and event <= LAST_LOWERED:
-            level += BACK
         self.slots[GAIN + event] = gain
-        self.slots[LEVEL + event] = self._laid[event] = level
+        lowered = gain < 0.0 and event <= LAST_LOWERED
+        self.slots[LEVEL + event] = level + BACK if lowered else level
 
     def lay_bounds(self, fall: int, rise: int, lower: float, upper: float) -> None:
         """Set two events: a reading falls through `lower`, and rises through `upper`.
 
         A bound as far from zero as `NEVER` switches its event off.
         """
-        gain, level, slots, laid = self.gain, self.level, self.slots, self._laid
-        gain[rise], level[rise] = (1.0, upper) if upper < NEVER else OFF
-        gain[fall], level[fall] = (-1.0, -lower) if lower > -NEVER else OFF
-        slots[GAIN + rise], slots[GAIN + fall] = gain[rise], gain[fall]
-        slots[LEVEL + rise] = laid[rise] = level[rise]
-        slots[LEVEL + fall] = laid[fall] = level[fall] + BACK if lower > -NEVER else level[fall]
+        gain, level, slots = self.gain, self.level, self.slots
+        if upper < NEVER:
+            gain[rise] = slots[GAIN + rise] = 1.0
+            level[rise] = slots[LEVEL + rise] = upper
+        elif gain[rise] != 0.0:
+            self.lay(rise, *OFF)
+        if lower > -NEVER:
+            gain[fall] = slots[GAIN + fall] = -1.0
+            level[fall] = -lower
+            slots[LEVEL + fall] = BACK - lower
+        elif gain[fall] != 0.0:
+            self.lay(fall, *OFF)
 
     def restore(self) -> None:
         """Restore the levels that the guard has moved."""
         for event in self.moved:
-            self.slots[LEVEL + event] = self._laid[event]
+            self.lay(event, self.gain[event], self.level[event])
         self.moved.clear()
 
     def guard(self, event: int, reading: float) -> bool:

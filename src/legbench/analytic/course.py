@@ -25,7 +25,7 @@ from legbench.analytic.compiled import (
 from legbench.analytic.compiled_regime import NEVER, CompiledRegime
 from legbench.analytic.contact import MIN_PHASE
 from legbench.analytic.dual import DUAL, floats, without_gradients
-from legbench.analytic.equations import Pair, sweep, sweep_rate, touchdown_rates
+from legbench.analytic.equations import Pair, sweep, sweep_motion, sweep_rate, touchdown_rates
 from legbench.analytic.event_detector import (
     CONTACT,
     FELL_BACK,
@@ -96,7 +96,6 @@ class Course:
         self._tolerance, self._min_phase = tolerance, min_phase
         self._arm = foot_from_centre(model)
         self._regimes: dict[tuple[Regime, bool], CompiledRegime] = {}
-        self._terms = {regime: terms_of(self.plain, regime) for regime in Regime}
         self._variation = Variation(tolerance) if model.ops is DUAL else None
         arm = floats(self._arm)
         quick = FloatLeg(self.plain, arm)
@@ -165,21 +164,22 @@ class Course:
 
     def switch(self) -> None:
         """Apply a touchdown or lift-off: change the regime, and the rates by eq. (12)."""
-        ops, model = self.model.ops, self.model
-        arm, arm_vel = sweep(ops, self.q, self._arm), sweep_rate(ops, self.q, self.v, self._arm)
-        if self.compiled.flies:
+        ops, model, compiled = self.model.ops, self.model, self.compiled
+        arm, arm_vel = sweep_motion(ops, self.q, self.v, self._arm)
+        if compiled.flies:
             (x, _), (dx, dz) = self.centre()
             # The height is zero by definition, also if the foot went below it while unwatched.
             self.point, self.drift = (x + arm[0], 0.0), (0.0, 0.0)
             foot_vel = dx + arm_vel[0], dz + arm_vel[1]
             self.v = touchdown_rates(ops, model.stance, model.floating, self.q, self.v, foot_vel)
-            regime = Regime.STANCE
         else:
             self.point = self.point[0] - arm[0], self.point[1] - arm[1]
             self.drift = -arm_vel[0], -arm_vel[1]
-            regime = Regime.FLIGHT
         self.since = self.time
-        self._enter(regime)
+        if compiled.opposite is None:
+            regime = Regime.STANCE if compiled.flies else Regime.FLIGHT
+            compiled.opposite = self._compiled_for(regime)
+        self._enter(compiled.opposite)
 
     def go(self, until: float, levels: Levels = SILENT) -> Watched | None:
         """Integrate to `until`, or to the first watched event, which is not yet applied.
@@ -254,13 +254,13 @@ class Course:
             self.stop_switches.cross(compiled, event)
             self._decide()
         elif event == RECOVER:
-            self._load(held=False)
+            self._load(self._compiled_for(self.regime))
         elif event != CONTACT:
             self.stop_switches.flip(compiled, event)
         elif compiled.flies or compiled.held or self.detector.released() > -TIE:
             return True
         else:
-            self._load(held=True)
+            self._load(self._compiled_for(self.regime, held=True))
         return False
 
     def _put(
@@ -269,18 +269,17 @@ class Course:
         self.q, self.v, self.point, self.drift = q, v, point, drift
         self.detector.begin(lean)
         self.stop_switches.find(floats(q), floats(v))
-        self._enter(regime)
+        self._enter(self._compiled_for(regime))
 
-    def _enter(self, regime: Regime) -> None:
+    def _enter(self, compiled: CompiledRegime) -> None:
         """Begin a regime at the present time."""
-        self.regime, self.told = regime, None
-        self.terms = self._terms[regime]
-        self.detector.enter(regime, self.since)
-        self._load(held=False)
+        self.regime, self.terms, self.told = compiled.regime, compiled.terms, None
+        self.detector.enter(compiled, self.since)
+        self._load(compiled)
 
-    def _load(self, *, held: bool) -> None:
-        """Load the present state into the integrator of the regime."""
-        compiled = self.compiled = self._compiled_for(held=held)
+    def _load(self, compiled: CompiledRegime) -> None:
+        """Load the present state into a compiled regime."""
+        self.compiled = compiled
         self.plain_q, self.plain_v, self.plain_motor = self.q, self.v, self.motor
         if self._variation is not None:
             self.plain_q, self.plain_v = floats(self.q), floats(self.v)
@@ -298,10 +297,12 @@ class Course:
         if switches.touched or compiled.pushed:
             switches.decide(compiled, self.terms, self.plain_motor, self.plain_q, self.plain_v)
 
-    def _compiled_for(self, *, held: bool) -> CompiledRegime:
-        found = self._regimes.get((self.regime, held))
+    def _compiled_for(self, regime: Regime, *, held: bool = False) -> CompiledRegime:
+        found = self._regimes.get((regime, held))
         if found is None:
-            kind = Kind.HELD if held else KINDS.get(self.regime, Kind.FIXED)
-            values = parameters_of(self.plain, self.regime, self.probe)
-            found = self._regimes[self.regime, held] = CompiledRegime(kind, values, self._tolerance)
+            kind = Kind.HELD if held else KINDS.get(regime, Kind.FIXED)
+            values = parameters_of(self.plain, regime, self.probe)
+            terms = terms_of(self.plain, regime)
+            found = CompiledRegime(kind, regime, terms, values, self._tolerance)
+            self._regimes[regime, held] = found
         return found

@@ -133,6 +133,16 @@ def sweep_rate(ops: Ops, q: Pair, v: Pair, along: Pair) -> Pair:
     )
 
 
+def sweep_motion(ops: Ops, q: Pair, v: Pair, along: Pair) -> tuple[Pair, Pair]:
+    """`sweep` and `sweep_rate` together."""
+    s1, c1, s2, c2 = ops.sin(q[0]), ops.cos(q[0]), ops.sin(q[1]), ops.cos(q[1])
+    along_1, along_2 = along
+    return (
+        (along_1 * s1 + along_2 * s2, -along_1 * c1 - along_2 * c2),
+        (along_1 * c1 * v[0] + along_2 * c2 * v[1], along_1 * s1 * v[0] + along_2 * s2 * v[1]),
+    )
+
+
 def sweep_acceleration(ops: Ops, q: Pair, v: Pair, a: Pair, along: Pair) -> Pair:
     """Second time derivative of `sweep`: `dir'(q_i) a_i - dir(q_i) v_i^2`."""
     s1, c1, s2, c2 = ops.sin(q[0]), ops.cos(q[0]), ops.sin(q[1]), ops.cos(q[1])
@@ -178,9 +188,10 @@ def touchdown_rates(
     `M qdot+ = M qdot- + B v_foot`, `B_i = (first_i - m l2) dir'(q_i)^T`, M of Appendix I.
     """
     h1, h2 = terms.above_foot
+    forward, up = foot_vel
     kick = (
-        h1 * (ops.cos(q[0]) * foot_vel[0] + ops.sin(q[0]) * foot_vel[1]),
-        h2 * (ops.cos(q[1]) * foot_vel[0] + ops.sin(q[1]) * foot_vel[1]),
+        h1 * (ops.cos(q[0]) * forward + ops.sin(q[0]) * up),
+        h2 * (ops.cos(q[1]) * forward + ops.sin(q[1]) * up),
     )
     change = pair_solve(ops, stance, q, kick)
     return v[0] + change[0], v[1] + change[1]

@@ -68,7 +68,6 @@ class EventDetector:
         "_compiled",
         "_course",
         "_floats",
-        "_free",
         "_min_phase",
         "_most",
         "_plain",
@@ -89,16 +88,15 @@ class EventDetector:
         self.levels, self.lean, self.blind = SILENT, NEVER, 0.0
         self._most = NEVER - NUDGE
         self._below, self._above = -NEVER, NEVER
-        self._turn, self._free = 0.0, False
+        self._turn = 0.0
 
     def begin(self, lean: float) -> None:
         """Begin with a leg in a new state, whose turning points are those after it."""
         self.lean, self._most, self._turn = lean, lean - NUDGE, 0.0
 
-    def enter(self, regime: Regime, since: float) -> None:
+    def enter(self, compiled: CompiledRegime, since: float) -> None:
         """Begin a regime, in which contact is not watched for the shortest phase at first."""
-        self._free = regime in KINDS
-        self.blind = since + self._min_phase if self._free else since
+        self.blind = since + self._min_phase if compiled.free else since
 
     def move_to(self, compiled: CompiledRegime) -> None:
         """Set all levels in another integrator."""
@@ -151,7 +149,7 @@ class EventDetector:
             switches.guard(
                 compiled, course.terms, course.plain_motor, course.plain_q, course.plain_v
             )
-        if self._free:
+        if compiled.free:
             contact = self._contact()
             due = contact if due is None else due
         return due

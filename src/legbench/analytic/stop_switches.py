@@ -47,68 +47,72 @@ class StopSwitches:
         "_acting",
         "_answer",
         "_asked_at",
+        "_beyond",
         "_floats",
         "_free",
         "_known",
         "_model",
         "_pushing",
+        "_range",
         "_stops",
-        "_touched",
-        "_version",
         "clear",
         "touched",
     )
 
     def __init__(self, model: LegModel, floats: FloatLeg) -> None:
         self._model, self._stops, self._floats = model, model.stops, floats
-        self._touched = [False] * len(model.stops)
         self._pushing, self._free = [False, False], [False, False]
         self._known: dict[tuple[bool, ...], tuple[list[Stop | None], Bounds]] = {}
-        self._version = 0
         self._asked_at: tuple[PairTerms, Pair, Pair, Pair] | None = None
         """Objects for which `_answer` has been computed."""
         self._answer: list[float] = [0.0, 0.0]
-        self._changed()
+        within = (False,) * len(model.stops)
+        self._range = self._within(within, AT_LIMIT)[1]
+        self._change(within)
 
     def find(self, q: Pair, v: Pair) -> None:
         """Determine by the law which limits a joint is beyond, for a leg set to a new state."""
+        low, high, back, front = self._range
+        if low < q[1] - q[0] < high and back < q[0] < front:
+            if self.touched:
+                self._change((False,) * len(self._stops))
+            return
         found = []
         for stop in self._stops:
             depth = stop.depth(q)
             found.append(depth > AT_LIMIT or (depth > -AT_LIMIT and stop.speed(v) > 0.0))
-        if found != self._touched:
-            self._touched = found
-            self._changed()
+        self._change(tuple(found))
 
     def lay(self, compiled: CompiledRegime) -> None:
         """Set the four events of the limits: to go beyond each, or to come back from beyond it."""
-        if compiled.version != self._version:
-            compiled.version = self._version
+        if compiled.beyond != self._beyond:
+            compiled.beyond = self._beyond
             for event in range(FIRST, FIRST + len(self._stops)):
                 self._lay_limit(compiled, event)
 
     def _lay_limit(self, compiled: CompiledRegime, event: int) -> None:
         stop = self._stops[event - FIRST]
-        gain = stop.sign if self._touched[event - FIRST] else -stop.sign
+        gain = stop.sign if self._beyond[event - FIRST] else -stop.sign
         compiled.lay(event, gain, gain * stop.limit)
 
     def cross(self, compiled: CompiledRegime, event: int) -> None:
         """Note that a joint has gone beyond a limit, or has come back, and watch the way back."""
-        self._touched[event - FIRST] ^= True
-        self._changed()
+        index = event - FIRST
+        crossed = self._beyond[index]
+        self._change((*self._beyond[:index], not crossed, *self._beyond[index + 1 :]))
         self._lay_limit(compiled, event)
-        compiled.version = self._version
+        compiled.beyond = self._beyond
 
-    def _changed(self) -> None:
-        beyond = tuple(self._touched)
+    def _change(self, beyond: tuple[bool, ...]) -> None:
+        """Set which limits a joint is beyond."""
         if beyond not in self._known:
             self._known[beyond] = self._within(beyond)
         self._acting, self.clear = self._known[beyond]
-        self.touched = True in beyond
-        self._version += 1
-        self._asked_at = None
+        self._beyond, self.touched, self._asked_at = beyond, True in beyond, None
 
-    def _within(self, touched: tuple[bool, ...]) -> tuple[list[Stop | None], Bounds]:
+    def _within(
+        self, touched: tuple[bool, ...], near: float = NUDGE
+    ) -> tuple[list[Stop | None], Bounds]:
         """Stop that acts on each joint, and the angles at which no limit is near."""
         acting: list[Stop | None] = [None, None]
         bounds = [-math.inf, math.inf, -math.inf, math.inf]
@@ -118,9 +122,9 @@ class StopSwitches:
             # A lower end bounds a joint from below, and one that is beyond it from above.
             place = index ^ beyond
             if place % 2:
-                bounds[place] = min(bounds[place], stop.limit - NUDGE)
+                bounds[place] = min(bounds[place], stop.limit - near)
             else:
-                bounds[place] = max(bounds[place], stop.limit + NUDGE)
+                bounds[place] = max(bounds[place], stop.limit + near)
         low, high, back, front = bounds
         return acting, (low, high, back, front)
 
