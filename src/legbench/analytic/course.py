@@ -24,17 +24,15 @@ from legbench.analytic.compiled import (
 )
 from legbench.analytic.compiled_regime import NEVER, CompiledRegime
 from legbench.analytic.contact import MIN_PHASE
+from legbench.analytic.contact_watch import CONTACT, RECOVER, ContactWatch
 from legbench.analytic.dual import DUAL, floats, without_gradients
-from legbench.analytic.equations import Pair, sweep, sweep_motion, sweep_rate, touchdown_rates
+from legbench.analytic.equations import Pair, sweep, sweep_motion, sweep_rate, touchdown
 from legbench.analytic.event_detector import (
-    CONTACT,
     FELL_BACK,
     HIP_HIGH,
     KINDS,
-    RECOVER,
     SEEN,
     SILENT,
-    TIE,
     TURN,
     EventDetector,
     Levels,
@@ -76,8 +74,10 @@ class Course:
         since: time at which the regime began [s].
         point: steady point of the angles at the beginning of the piece (forward, up) [m].
         drift: velocity of the steady point then [m/s].
+        lost: energy lost in impacts with the ground since the leg was set to a state [J].
         compiled: the compiled regime.
         stop_switches: the joint stops.
+        contact: the watch over touchdown and lift-off.
         detector: the events that are watched.
         told: the state that `state` last returned; None once the leg has moved on.
     """
@@ -100,7 +100,8 @@ class Course:
         arm = floats(self._arm)
         quick = FloatLeg(self.plain, arm)
         self.stop_switches = StopSwitches(self.plain, quick)
-        self.detector = EventDetector(self, self.plain, quick, arm, min_phase)
+        self.contact = ContactWatch(self, self.plain, quick, arm, min_phase)
+        self.detector = EventDetector(self)
         self.motor: Pair = (0.0, 0.0)
         self.told: LegState | None = None
 
@@ -171,7 +172,8 @@ class Course:
             # The height is zero by definition, also if the foot went below it while unwatched.
             self.point, self.drift = (x + arm[0], 0.0), (0.0, 0.0)
             foot_vel = dx + arm_vel[0], dz + arm_vel[1]
-            self.v = touchdown_rates(ops, model.stance, model.floating, self.q, self.v, foot_vel)
+            self.v, lost = touchdown(ops, model.stance, model.floating, self.q, self.v, foot_vel)
+            self.lost += lost
         else:
             self.point = self.point[0] - arm[0], self.point[1] - arm[1]
             self.drift = -arm_vel[0], -arm_vel[1]
@@ -188,13 +190,13 @@ class Course:
             PlantFault: the integration failed.
         """
         self.told = None
-        detector = self.detector
+        detector, contact = self.detector, self.contact
         if levels is not detector.levels:
             detector.lay(levels)
         for _ in range(MAX_EVENTS):
             event = detector.due()
             if event is None:
-                end = detector.blind if self.time < detector.blind < until else until
+                end = contact.blind if contact.deaf and contact.blind < until else until
                 if end > self.time:
                     event = self._piece(end)
                 if event is None:
@@ -257,16 +259,16 @@ class Course:
             self._load(self._compiled_for(self.regime))
         elif event != CONTACT:
             self.stop_switches.flip(compiled, event)
-        elif compiled.flies or compiled.held or self.detector.released() > -TIE:
+        elif self.contact.happens():
             return True
-        else:
+        elif not self.contact.deaf:
             self._load(self._compiled_for(self.regime, held=True))
         return False
 
     def _put(
         self, regime: Regime, q: Pair, v: Pair, point: Pair, drift: Pair, lean: float = NEVER
     ) -> None:
-        self.q, self.v, self.point, self.drift = q, v, point, drift
+        self.q, self.v, self.point, self.drift, self.lost = q, v, point, drift, 0.0
         self.detector.begin(lean)
         self.stop_switches.find(floats(q), floats(v))
         self._enter(self._compiled_for(regime))
@@ -274,7 +276,7 @@ class Course:
     def _enter(self, compiled: CompiledRegime) -> None:
         """Begin a regime at the present time."""
         self.regime, self.terms, self.told = compiled.regime, compiled.terms, None
-        self.detector.enter(compiled, self.since)
+        self.contact.enter(self.since)
         self._load(compiled)
 
     def _load(self, compiled: CompiledRegime) -> None:

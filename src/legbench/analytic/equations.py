@@ -179,13 +179,14 @@ def free_foot_acceleration(ops: Ops, terms: FloatingTerms, q: Pair, v: Pair, a: 
     return trunk[0] + inner[0], trunk[1] + inner[1]
 
 
-def touchdown_rates(
+def touchdown(
     ops: Ops, stance: PairTerms, terms: FloatingTerms, q: Pair, v: Pair, foot_vel: Pair
-) -> Pair:
+) -> tuple[Pair, Term]:
     """Eq. (12) in closed form: joint rates after the foot, at `foot_vel` before, has stopped.
 
     The impulse acts on the foot alone, so in coordinates (foot, q) the momentum of q stays:
-    `M qdot+ = M qdot- + B v_foot`, `B_i = (first_i - m l2) dir'(q_i)^T`, M of Appendix I.
+    `M qdot+ = M qdot- + B v_foot`, `B_i = (first_i - m l2) dir'(q_i)^T`, M of Appendix I. The second
+    result is the energy that is lost, `(m v_foot^2 - (qdot+ - qdot-) . B v_foot) / 2` [J].
     """
     h1, h2 = terms.above_foot
     forward, up = foot_vel
@@ -194,4 +195,6 @@ def touchdown_rates(
         h2 * (ops.cos(q[1]) * forward + ops.sin(q[1]) * up),
     )
     change = pair_solve(ops, stance, q, kick)
-    return v[0] + change[0], v[1] + change[1]
+    whole = terms.mass * (forward * forward + up * up)
+    lost = 0.5 * (whole - change[0] * kick[0] - change[1] * kick[1])
+    return (v[0] + change[0], v[1] + change[1]), lost

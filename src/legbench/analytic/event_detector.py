@@ -8,30 +8,16 @@ that holds already, because a motor, the regime or a level has jumped, is an eve
 from typing import TYPE_CHECKING, NamedTuple, final
 
 from legbench.analytic.compiled_regime import NEVER, NUDGE, OFF, CompiledRegime
-from legbench.analytic.equations import (
-    Pair,
-    contact_force,
-    free_foot_acceleration,
-    pair_acceleration,
-    sweep_rate,
-)
-from legbench.analytic.float_leg import FloatLeg
-from legbench.analytic.model import LegModel
 from legbench.analytic.parameters import Event, Kind, Watched
 from legbench.analytic.state import Regime
-from legbench.design.statics import GRAVITY
 
 if TYPE_CHECKING:
     from legbench.analytic.course import Course
 
-TIE = 1e-7
-"""Tolerance of acceleration over gravity and of force over weight when the foot is released [-]: on
-the radial mode both vanish together, and rounding decides their signs."""
 JUMPED = 1e-9
 """Rate beyond zero that a turning point cannot leave by rounding, only an impact [rad/s]."""
 RISE, FALL, TURN, FELL, FELL_BACK = range(Event.RISE, Event.FELL_BACK + 1)
 KNEE_LOW, KNEE_HIGH, HIP_LOW, HIP_HIGH = range(Event.KNEE_LOW, Event.HIP_HIGH + 1)
-CONTACT, RECOVER = int(Event.CONTACT), int(Event.RECOVER)
 SEEN = (Watched.RISE, Watched.FALL, Watched.TURN, Watched.FELL, Watched.FELL)
 """Events of angles as the caller sees them, in their order, which are the first ones."""
 KINDS = {Regime.FLIGHT: Kind.FLIGHT, Regime.STANCE: Kind.STANCE}
@@ -58,45 +44,28 @@ class EventDetector:
     Attributes:
         levels: levels of the probe.
         lean: largest |q1 + q2| of a leg that has not fallen [rad].
-        blind: time until which touchdown and lift-off are not watched [s].
     """
 
     __slots__ = (
         "_above",
-        "_arm",
         "_below",
         "_compiled",
         "_course",
-        "_floats",
-        "_min_phase",
         "_most",
-        "_plain",
         "_probe",
         "_turn",
-        "_weight",
-        "blind",
         "lean",
         "levels",
     )
 
-    def __init__(
-        self, course: "Course", model: LegModel, floats: FloatLeg, arm: Pair, min_phase: float
-    ) -> None:
-        self._course, self._plain, self._floats = course, model, floats
-        self._arm, self._min_phase, self._probe = arm, min_phase, course.probe
-        self._weight = model.floating.mass * GRAVITY
-        self.levels, self.lean, self.blind = SILENT, NEVER, 0.0
-        self._most = NEVER - NUDGE
-        self._below, self._above = -NEVER, NEVER
-        self._turn = 0.0
+    def __init__(self, course: "Course") -> None:
+        self._course, self._probe = course, course.probe
+        self.levels, self.lean, self._turn = SILENT, NEVER, 0.0
+        self._below, self._above, self._most = -NEVER, NEVER, NEVER - NUDGE
 
     def begin(self, lean: float) -> None:
         """Begin with a leg in a new state, whose turning points are those after it."""
         self.lean, self._most, self._turn = lean, lean - NUDGE, 0.0
-
-    def enter(self, compiled: CompiledRegime, since: float) -> None:
-        """Begin a regime, in which contact is not watched for the shortest phase at first."""
-        self.blind = since + self._min_phase if compiled.free else since
 
     def move_to(self, compiled: CompiledRegime) -> None:
         """Set all levels in another integrator."""
@@ -107,6 +76,8 @@ class EventDetector:
             compiled.lean = self.lean
             compiled.lay_bounds(FELL, FELL_BACK, -self.lean, self.lean)
         self._course.stop_switches.lay(compiled)
+        if compiled.free:
+            self._course.contact.move_to(compiled)
         self.lay(self.levels)
         if compiled.gain[TURN] != self._turn:
             compiled.lay(TURN, self._turn, 0.0) if self._turn else compiled.lay(TURN, *OFF)
@@ -150,7 +121,7 @@ class EventDetector:
                 compiled, course.terms, course.plain_motor, course.plain_q, course.plain_v
             )
         if compiled.free:
-            contact = self._contact()
+            contact = course.contact.due()
             due = contact if due is None else due
         return due
 
@@ -162,80 +133,6 @@ class EventDetector:
                 due = event
         return due
 
-    def _contact(self) -> int | None:
-        """Guard touchdown or lift-off; return the event if the leg cannot stay in its regime."""
-        course, compiled = self._course, self._compiled
-        if course.time < self.blind:
-            if compiled.gain[CONTACT] != 0.0:
-                compiled.lay(CONTACT, *OFF)
-            return None
-        if compiled.flies:
-            return self._touchdown()
-        force = self._force()
-        if not compiled.held:
-            if force < 0.0:
-                return CONTACT
-            self._expect(force)
-            return None
-        released = self.released()
-        if force > TIE or released > -TIE:
-            return RECOVER if force > TIE else CONTACT
-        for event, reading in ((CONTACT, released), (RECOVER, force)):
-            compiled.lay(event, 1.0, 0.0)
-            compiled.guard(event, reading)
-        return None
-
-    def _touchdown(self) -> int | None:
-        """Guard touchdown, and return it if the foot is below the ground and sinking."""
-        course, compiled = self._course, self._compiled
-        elapsed, z, dz = course.elapsed, float(course.point[1]), float(course.drift[1])
-        fallen = self._plain.floating.gravity * elapsed
-        height = z + (dz - 0.5 * fallen) * elapsed + self._floats.foot_height(course.plain_q)
-        if height > 0.0:
-            self._expect(height)
-            return None
-        arm_vel = sweep_rate(self._plain.ops, course.plain_q, course.plain_v, self._arm)
-        if dz - fallen + arm_vel[1] < 0.0:
-            return CONTACT
-        self.blind = course.time + self._min_phase  # below the ground and rising: no touchdown yet
-        compiled.lay(CONTACT, *OFF)
-        return None
-
-    def _expect(self, reading: float) -> None:
-        """Watch the height or the contact force fall to zero."""
-        if self._compiled.gain[CONTACT] != -1.0:
-            self._compiled.lay(CONTACT, -1.0, 0.0)
-        if reading < NUDGE:
-            self._compiled.guard(CONTACT, reading)
-
-    def _force(self) -> float:
-        """Vertical contact force on the standing foot over the weight [-]."""
-        course, plain = self._course, self._plain
-        motor, q, v = course.plain_motor, course.plain_q, course.plain_v
-        if not course.stop_switches.touched:
-            return self._floats.force(motor, q, v)
-        return contact_force(plain.ops, plain.floating, q, v, self._accelerations())[1] / self._weight
-
-    def released(self) -> float:
-        """Upward acceleration that the standing foot would have if released, over gravity [-]."""
-        course, plain = self._course, self._plain
-        motor, q, v = course.plain_motor, course.plain_q, course.plain_v
-        if course.stop_switches.touched:
-            torque = self._floats.torque(motor, q, v)
-            a = course.stop_switches.released(plain.falling, torque, q, v)
-        else:
-            a = self._floats.accelerations(plain.falling, motor, q, v)
-        return free_foot_acceleration(plain.ops, plain.floating, q, v, a)[1] / GRAVITY
-
-    def _accelerations(self) -> Pair:
-        """Accelerations of the angles, with the stops that are switched on [rad/s^2]."""
-        course, plain = self._course, self._plain
-        motor, q, v = course.plain_motor, course.plain_q, course.plain_v
-        if course.stop_switches.touched:
-            torque = self._floats.torque(motor, q, v)
-            return course.stop_switches.turns(plain.ops, course.terms, torque, q, v)[1]
-        return self._floats.accelerations(course.terms, motor, q, v)
-
     def _guard_turn(self) -> bool:
         """Watch the probe's next turning point, the kind of which follows from its present rate.
 
@@ -246,7 +143,10 @@ class EventDetector:
         if self._turn == 0.0:
             towards = rate
             if abs(rate) <= NUDGE:
-                a = self._accelerations()
+                course = self._course
+                a = course.stop_switches.accelerations(
+                    course.terms, course.plain_motor, course.plain_q, course.plain_v
+                )
                 towards = p1 * a[0] + p2 * a[1]
             self._turn = -1.0 if towards > 0.0 else 1.0
             self._compiled.lay(TURN, self._turn, 0.0)

@@ -23,7 +23,7 @@ class FloatLeg:
         arm: foot tip seen from the centre of mass, along dir(q1) and dir(q2) [m].
     """
 
-    __slots__ = ("_arm", "_floating", "_springs", "_stance")
+    __slots__ = ("_arm", "_falling", "_gravity", "_springs", "_stance")
 
     def __init__(self, model: LegModel, arm: Pair) -> None:
         floating, stance = model.floating, model.stance
@@ -36,8 +36,7 @@ class FloatLeg:
             floating.mass * floating.gravity,
             floating.mass * GRAVITY,
         )
-        self._arm = arm
-        self._floating = floating
+        self._arm, self._falling, self._gravity = arm, model.falling, floating.gravity
 
     def torque(self, motor: Pair, q: Pair, v: Pair) -> Pair:
         """Torque of springs and dampers on q1 and q2 [N m]."""
@@ -72,6 +71,13 @@ class FloatLeg:
         a2 = (i1 * right_2 - mixed * (cosine * right_1)) / determinant
         lifted = h1 * (s1 * a1 + cos(q1) * square_1) + h2 * (s2 * a2 + cos(q2) * square_2)
         return (lifted + carried) / weight
+
+    def released(self, motor: Pair, q: Pair, v: Pair) -> float:
+        """Upward acceleration of the foot tip if nothing held it, over gravity [-]."""
+        (a1, a2), (arm_1, arm_2) = self.accelerations(self._falling, motor, q, v), self._arm
+        turned = arm_1 * (sin(q[0]) * a1 + cos(q[0]) * (v[0] * v[0]))
+        turned += arm_2 * (sin(q[1]) * a2 + cos(q[1]) * (v[1] * v[1]))
+        return (turned - self._gravity) / GRAVITY
 
     def foot_height(self, q: Pair) -> float:
         """Height of the foot tip over the centre of mass [m]."""

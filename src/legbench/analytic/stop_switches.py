@@ -199,6 +199,12 @@ class StopSwitches:
         """
         return self._turns(ops, terms, torque, q, v, self._free if free else self._pushing)
 
+    def accelerations(self, terms: PairTerms, motor: Pair, q: Pair, v: Pair) -> Pair:
+        """Accelerations of the angles, with the stops that are switched on [rad/s^2]."""
+        if not self.touched:
+            return self._floats.accelerations(terms, motor, q, v)
+        return self.turns(SCALAR, terms, self._floats.torque(motor, q, v), q, v)[1]
+
     def released(self, terms: PairTerms, torque: Pair, q: Pair, v: Pair) -> Pair:
         """Accelerations of the angles where every touched stop acts that would push [rad/s^2]."""
         return self._turns(SCALAR, terms, torque, q, v, None)[1]

@@ -11,7 +11,7 @@ from enum import StrEnum
 import numpy as np
 
 from legbench.analytic.course import Course
-from legbench.analytic.equations import Pair, pair_kinetic
+from legbench.analytic.equations import Pair
 from legbench.analytic.model import LegModel
 from legbench.analytic.state import LegState, flying
 from legbench.analytic.taylor import TaylorLeg, Watched
@@ -135,54 +135,49 @@ def hop(leg: TaylorLeg, drive: AbstractDrive, start: Apex) -> Hop:
     course = leg.course
     _launch(course, start)
     touchdown = liftoff = math.nan
-    lost, landed, flew, ending = 0.0, False, False, None
+    apex, landed, ending = math.inf, False, Ending.FAULT
     try:
         for _ in range(CALLS):
-            what, ending = _pause(course, drive, flew=flew)
-            if ending is not None:
+            alarm = drive.alarm
+            until = alarm if alarm < HORIZON else HORIZON
+            if course.time <= apex <= until:
+                until = apex
+            course.hold(drive.motor)
+            what = course.go(until, drive.levels())
+            if what is CONTACT:
+                if course.compiled.flies:
+                    touchdown, landed = touchdown if landed else course.time, True
+                course.switch()
+                apex = math.inf
+                if course.compiled.flies:
+                    liftoff, apex = course.time, course.apex_time()
+            elif what is FELL:
+                ending = Ending.FELL
                 break
-            if what is None:
-                drive.on_alarm(_probe(drive, course.q), course.time)
-            elif what is not CONTACT:
+            elif what is not None:
                 drive.on_event(what, _probe(drive, course.q), course.time)
-            elif course.compiled.flies:
-                lost += _kinetic(course)
-                course.switch()
-                lost -= _kinetic(course)
-                touchdown, landed = touchdown if landed else course.time, True
+            elif course.time >= alarm:
+                drive.on_alarm(_probe(drive, course.q), course.time)
             else:
-                course.switch()
-                liftoff, flew = course.time, True
+                ending = _end(drive, reached=until == apex)
+                break
     except PlantFault:
         ending = Ending.FAULT
     return Hop(
-        ending=ending or Ending.FAULT,
+        ending=ending,
         after=_reached(course) if ending is Ending.APEX else None,
         duration=course.time,
         touchdown=touchdown,
         liftoff=liftoff,
-        impact=lost,
+        impact=course.lost,
     )
 
 
-def _pause(
-    course: Course, drive: AbstractDrive, *, flew: bool
-) -> tuple[Watched | None, Ending | None]:
-    """Go on to the next event, alarm or ending; `flew` if the leg has lifted off."""
-    alarm = drive.alarm
-    until = alarm if alarm < HORIZON else HORIZON
-    apex = course.apex_time() if flew and course.compiled.flies else math.inf
-    if course.time <= apex <= until:
-        until = apex
-    course.hold(drive.motor)
-    what = course.go(until, drive.levels())
-    if what is FELL:
-        return what, Ending.FELL
-    if what is not None or course.time >= alarm:
-        return what, None
-    if until == apex:
-        return what, Ending.APEX if drive.settled else Ending.FAULT
-    return what, Ending.STANDS
+def _end(drive: AbstractDrive, *, reached: bool) -> Ending:
+    """How a hop ends at its horizon, or at an apex that it has `reached`."""
+    if not reached:
+        return Ending.STANDS
+    return Ending.APEX if drive.settled else Ending.FAULT
 
 
 def _launch(course: Course, start: Apex) -> None:
@@ -201,16 +196,6 @@ def _reached(course: Course) -> Apex:
     """Apex of a leg that has reached it."""
     (_, height), (speed, _) = course.centre()
     return Apex.at(height, speed, course.q, course.v)
-
-
-def _kinetic(course: Course) -> float:
-    """Kinetic energy of a leg in flight or stance [J]."""
-    model, ops = course.model, course.model.ops
-    if not course.compiled.flies:
-        return pair_kinetic(ops, model.stance, course.q, course.v)
-    dx, dz = course.centre()[1]
-    own = 0.5 * model.floating.mass * (dx * dx + dz * dz)
-    return own + pair_kinetic(ops, model.falling, course.q, course.v)
 
 
 def _probe(drive: AbstractDrive, q: Pair) -> float:

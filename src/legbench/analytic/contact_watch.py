@@ -1,0 +1,147 @@
+"""Watch over touchdown and lift-off of a course: their event, and conditions that hold already.
+
+After an event the new regime lasts a shortest time at least, at the end of which a foot that sinks
+below the ground lands, and a force that pulls lifts the foot off. The event is watched from the
+beginning all the same, because the piece then need not end there: it is only an event that comes too
+early, or a reading that has no room to fall, which makes the watch deaf until that time.
+"""
+
+from typing import TYPE_CHECKING, final
+
+from legbench.analytic.compiled_regime import NUDGE, OFF, CompiledRegime
+from legbench.analytic.equations import Pair, contact_force, free_foot_acceleration, sweep_rate
+from legbench.analytic.float_leg import FloatLeg
+from legbench.analytic.model import LegModel
+from legbench.analytic.parameters import Event
+from legbench.design.statics import GRAVITY
+
+if TYPE_CHECKING:
+    from legbench.analytic.course import Course
+
+TIE = 1e-7
+"""Tolerance of acceleration over gravity and of force over weight when the foot is released [-]: on
+the radial mode both vanish together, and rounding decides their signs."""
+CONTACT, RECOVER = int(Event.CONTACT), int(Event.RECOVER)
+
+
+@final
+class ContactWatch:
+    """Touchdown and lift-off of one course.
+
+    Attributes:
+        blind: time before which the regime cannot end [s].
+        deaf: whether the event is switched off until then.
+    """
+
+    __slots__ = ("_arm", "_compiled", "_course", "_floats", "_min_phase", "_plain", "blind", "deaf")
+
+    def __init__(
+        self, course: "Course", model: LegModel, floats: FloatLeg, arm: Pair, min_phase: float
+    ) -> None:
+        self._course, self._plain, self._floats = course, model, floats
+        self._arm, self._min_phase = arm, min_phase
+        self.blind, self.deaf = 0.0, False
+
+    def enter(self, since: float) -> None:
+        """Begin a regime."""
+        self.blind, self.deaf = since + self._min_phase, False
+
+    def move_to(self, compiled: CompiledRegime) -> None:
+        """Watch the event in another integrator."""
+        self._compiled = compiled
+        if compiled.held:
+            compiled.lay(CONTACT, 1.0, 0.0)
+            compiled.lay(RECOVER, 1.0, 0.0)
+        elif compiled.gain[CONTACT] != -1.0:
+            compiled.lay(CONTACT, -1.0, 0.0)
+
+    def due(self) -> int | None:
+        """Guard touchdown or lift-off; return the event if the leg cannot stay in its regime."""
+        compiled = self._compiled
+        if self.deaf:
+            if self._course.time < self.blind:
+                return None
+            self.deaf = False
+            compiled.lay(CONTACT, -1.0, 0.0)
+        if compiled.flies:
+            height = self._height()
+            return self._touchdown(height) if height < NUDGE else None
+        if compiled.held:
+            return self._held()
+        force = self._force()
+        return self._liftoff(force) if force < NUDGE else None
+
+    def happens(self) -> bool:
+        """Whether the event that has been met ends the regime, or else is too early or no release."""
+        if self._course.time < self.blind:
+            self._deafen()
+            return False
+        compiled = self._compiled
+        return compiled.flies or compiled.held or self.released() > -TIE
+
+    def released(self) -> float:
+        """Upward acceleration that the standing foot would have if released, over gravity [-]."""
+        course, plain = self._course, self._plain
+        motor, q, v = course.plain_motor, course.plain_q, course.plain_v
+        if course.stop_switches.touched:
+            torque = self._floats.torque(motor, q, v)
+            a = course.stop_switches.released(plain.falling, torque, q, v)
+            return free_foot_acceleration(plain.ops, plain.floating, q, v, a)[1] / GRAVITY
+        return self._floats.released(motor, q, v)
+
+    def _deafen(self) -> None:
+        """Switch the event off until the regime may end."""
+        self.deaf = True
+        self._compiled.lay(CONTACT, *OFF)
+
+    def _height(self) -> float:
+        """Height of the foot over the ground in flight [m]."""
+        course = self._course
+        elapsed, z, dz = course.elapsed, float(course.point[1]), float(course.drift[1])
+        centre = z + (dz - 0.5 * self._plain.floating.gravity * elapsed) * elapsed
+        return centre + self._floats.foot_height(course.plain_q)
+
+    def _force(self) -> float:
+        """Vertical contact force on the standing foot over the weight [-]."""
+        course, plain = self._course, self._plain
+        motor, q, v = course.plain_motor, course.plain_q, course.plain_v
+        if not course.stop_switches.touched:
+            return self._floats.force(motor, q, v)
+        a = course.stop_switches.accelerations(course.terms, motor, q, v)
+        weight = plain.floating.mass * GRAVITY
+        return contact_force(plain.ops, plain.floating, q, v, a)[1] / weight
+
+    def _touchdown(self, height: float) -> int | None:
+        """Guard a touchdown that is near; it is due if the foot is below the ground and sinking."""
+        course, compiled = self._course, self._compiled
+        early = course.time < self.blind
+        if height > (-NUDGE if early else 0.0):
+            compiled.guard(CONTACT, height)
+            return None
+        if not early:
+            arm_vel = sweep_rate(self._plain.ops, course.plain_q, course.plain_v, self._arm)
+            fallen = self._plain.floating.gravity * course.elapsed
+            if course.drift[1] - fallen + arm_vel[1] < 0.0:
+                return CONTACT
+            self.blind = course.time + self._min_phase
+        self._deafen()
+        return None
+
+    def _liftoff(self, force: float) -> int | None:
+        """Guard a lift-off that is near; it is due if the ground would have to pull."""
+        if force >= 0.0:
+            self._compiled.guard(CONTACT, force)
+            return None
+        if self._course.time >= self.blind:
+            return CONTACT
+        self._deafen()
+        return None
+
+    def _held(self) -> int | None:
+        """Guard the end of a pull; return how it ends if it cannot go on."""
+        force, released = self._force(), self.released()
+        if force > TIE or released > -TIE:
+            return RECOVER if force > TIE else CONTACT
+        self._compiled.guard(CONTACT, released)
+        self._compiled.guard(RECOVER, force)
+        return None
