@@ -134,8 +134,12 @@ def _tell_next(story: Story, course: Course, law: JumpLaw) -> None:
         reach = course.apex_time()
         until = min(until, reach) if reach >= course.time else until
     course.hold(law.motor)
-    what = course.go(until, law.levels())
+    what = course.go(until, law.levels)
     value = law.probe[0] * course.q[0] + law.probe[1] * course.q[1]
+    waited = ("waited", law.released)
+    if phase == "release" and law.alarm == math.inf and waited not in story.events:
+        # The law passes over the end of a release in silence if no load has come before.
+        story.events += [waited] if course.time >= law.released else []
     if what is Watched.CONTACT:
         story.events.append(("touchdown" if flies else "liftoff", course.time))
         course.switch()
@@ -149,8 +153,10 @@ def _tell_next(story: Story, course: Course, law: JumpLaw) -> None:
             told = "turned"
         elif phase == "push":
             told = "released"
-        story.events.append((told, course.time))
         law.on_event(what, value, course.time)
+        if phase == "release" and law.phase.name == "RELEASE":
+            return  # a load that comes too early
+        story.events.append((told, course.time))
         if phase == "compress" and law.phase.name == "RELEASE":  # the push begins unloaded
             story.events.append(("released", course.time))
     elif course.time >= law.alarm:

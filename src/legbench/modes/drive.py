@@ -6,8 +6,8 @@ from typing import final
 
 import numpy as np
 
-from legbench.analytic.equations import Pair
 from legbench.analytic.compiled_regime import NEVER
+from legbench.analytic.equations import Pair
 from legbench.analytic.taylor import SILENT, Levels, Watched
 from legbench.control import JumpConfig, LegTargets
 from legbench.control.jump_rules import JumpPhase, phase_exits
@@ -16,7 +16,8 @@ from legbench.design.statics import Support
 from legbench.kinematics import ModalConvention
 
 SCALE = math.sqrt(0.5)
-FLIGHT, COMPRESS, PUSH = JumpPhase.FLIGHT, JumpPhase.COMPRESS, JumpPhase.PUSH
+FLIGHT, COMPRESS = JumpPhase.FLIGHT, JumpPhase.COMPRESS
+PUSH, RELEASE = JumpPhase.PUSH, JumpPhase.RELEASE
 RISE, FALL, TURN = Watched.RISE, Watched.FALL, Watched.TURN
 """Members that are asked for at every event; the enumerations themselves take longer."""
 
@@ -30,14 +31,12 @@ class AbstractDrive(ABC):
     """Factors p1, p2 of the probe `p1 q1 + p2 q2` that the law watches [-]."""
     alarm: float
     """Time at which `on_alarm` is to be called [s]."""
+    levels: Levels
+    """Probe values at which `on_event` is to be called; the same object as long as they stay."""
 
     @abstractmethod
     def restart(self) -> None:
         """Begin at the apex of a flight."""
-
-    @abstractmethod
-    def levels(self) -> Levels:
-        """Probe values at which `on_event` is to be called."""
 
     @abstractmethod
     def on_event(self, what: Watched, value: float, time: float) -> None:
@@ -59,6 +58,7 @@ class Passive(AbstractDrive):
 
     probe = (-SCALE, SCALE)
     alarm = math.inf
+    levels = SILENT
 
     def __init__(self, motor: Pair) -> None:
         self.motor = motor
@@ -70,10 +70,6 @@ class Passive(AbstractDrive):
 
     def restart(self) -> None:
         """Do nothing, as there is no state."""
-
-    def levels(self) -> Levels:
-        """No levels, as there is nothing to watch."""
-        return SILENT
 
     def on_event(self, what: Watched, value: float, time: float) -> None:
         """Do nothing, as no event is watched."""
@@ -89,6 +85,11 @@ class JumpLaw(AbstractDrive):
     Fold and load are both `y = s (k2 q2 - k1 q1) / k`, shifted by the motor position, so every
     threshold of the controller is a level of y, and every extreme one of its turning points.
 
+    Attributes:
+        phase: phase of the controller. It is still RELEASE after the time of the release has passed,
+            as long as the leg is not loaded.
+        released: time from which a load counts after a push [s].
+
     Raises:
         ConfigError: settings that the controller itself refuses for this leg.
     """
@@ -98,7 +99,8 @@ class JumpLaw(AbstractDrive):
             designs=design, support=Support.FOOT, convention=ModalConvention.ORTHONORMAL
         )
         config.build(targets)
-        self._exits, self._turn = phase_exits(config), config.apex_turn
+        exits, self._turn = phase_exits(config), config.apex_turn
+        self._dwell = {phase: exits[phase].dwell for phase in (FLIGHT, RELEASE)}
         k1, k2 = design.stiffness
         self._k = min(k1, k2)
         self._stiffness = (k1, k2)
@@ -110,64 +112,45 @@ class JumpLaw(AbstractDrive):
         rest = targets.link_at_rest(folded)
         torque = np.asarray(design.stiffness) * (folded - rest)
         standing = -float(targets.radial(torque))
-        self._at_load = {
-            phase: self._load_level(end.load * standing, self._motor_in(phase))
-            for phase, end in self._exits.items()
-        }
-        self._in_flight = Levels(upper=self._at_load[FLIGHT])
-        self._in_doubt = Levels(lower=self._at_load[FLIGHT])
-        self._extreme, self._loaded = 0.0, False
-        self._levels: Levels | None = None
+        self._loaded, self._unloaded = (
+            self._load_level(exits[phase].load * standing, motor)
+            for phase, motor in ((FLIGHT, self._folded), (PUSH, self._stretched))
+        )
+        self._in_flight, self._in_doubt = Levels(upper=self._loaded), Levels(lower=self._loaded)
+        self._extreme, self.released = 0.0, 0.0
         self._enter(FLIGHT)
 
     def restart(self) -> None:
         """Begin in flight, unloaded and settled."""
         self._enter(FLIGHT)
 
-    def levels(self) -> Levels:
-        """Levels that end the phase; the same object as long as they do not change."""
-        if self._levels is None:
-            self._levels = self._new_levels()
-        return self._levels
-
-    def _new_levels(self) -> Levels:
-        if self.phase is FLIGHT:
-            return self._in_doubt if self._loaded else self._in_flight
-        if self.phase is COMPRESS:
-            return Levels(NEVER, self._extreme - self._turn, True)
-        if self.phase is PUSH:
-            return Levels(self._extreme + self._turn, self._at_load[PUSH], True)
-        return SILENT
-
     def on_event(self, what: Watched, value: float, time: float) -> None:
         """Advance the phase after an event of the probe."""
-        self._levels = None
-        if self.phase is FLIGHT:
-            if what is RISE:
-                self._load(time)
-            elif what is FALL:
-                self._enter(FLIGHT)
+        if what is TURN:
+            further = value - self._extreme
+            if further > 0.0 if self.phase is COMPRESS else further < 0.0:
+                self._search(value)
         elif self.phase is COMPRESS:
-            if what is TURN:
-                self._extreme = max(self._extreme, value)
-            elif what is FALL:
-                self._leave(value)
-                if value < self._at_load[PUSH]:
-                    self._release(time)
-        elif self.phase is PUSH:
-            if what is TURN:
-                self._extreme = min(self._extreme, value)
-            else:
+            self._leave(value)
+            if value < self._unloaded:
                 self._release(time)
+        elif self.phase is PUSH:
+            self._release(time)
+        elif what is FALL:
+            self._enter(FLIGHT)
+        elif self.phase is FLIGHT or time >= self.released:
+            self._enter(FLIGHT)
+            self._load(time)
+        else:
+            self.levels, self.alarm = SILENT, self.released
 
     def on_alarm(self, value: float, time: float) -> None:
         """Advance the phase after the alarm: the release is over, or a load has lasted."""
-        self._levels = None
-        if self._loaded:
+        if self.phase is FLIGHT:
             self._leave(value)
             return
         self._enter(FLIGHT)
-        if value > self._at_load[FLIGHT]:
+        if value > self._loaded:
             self._load(time)
 
     @property
@@ -176,24 +159,32 @@ class JumpLaw(AbstractDrive):
         return self.phase in (JumpPhase.FLIGHT, JumpPhase.RELEASE)
 
     def _load(self, time: float) -> None:
-        self._loaded, self.alarm = True, time + self._exit.dwell
+        self.levels, self.alarm = self._in_doubt, time + self._dwell[FLIGHT]
 
     def _release(self, time: float) -> None:
-        self._enter(self._exit.to)
-        self.alarm = time + self._exit.dwell
+        """Let the motors go back, and watch for a load, which counts after some time only.
+
+        No alarm tells that time, because nothing changes then unless a load comes before.
+        """
+        self._enter(RELEASE)
+        self.released = time + self._dwell[RELEASE]
 
     def _leave(self, value: float) -> None:
         """Go on to the next phase, whose extreme is searched from `value` on."""
-        self._enter(self._exit.to)
-        self._extreme = value
+        self._enter(COMPRESS if self.phase is FLIGHT else PUSH)
+        self._search(value)
+
+    def _search(self, extreme: float) -> None:
+        """Watch for the turn that ends the phase, after the extreme so far."""
+        self._extreme = extreme
+        if self.phase is COMPRESS:
+            self.levels = Levels(NEVER, extreme - self._turn, True)
+        else:
+            self.levels = Levels(extreme + self._turn, self._unloaded, True)
 
     def _enter(self, phase: JumpPhase) -> None:
-        self.phase, self._exit = phase, self._exits[phase]
-        self.motor = self._motor_in(phase)
-        self.alarm, self._loaded, self._levels = math.inf, False, None
-
-    def _motor_in(self, phase: JumpPhase) -> Pair:
-        return self._stretched if phase is PUSH else self._folded
+        self.phase, self.alarm, self.levels = phase, math.inf, self._in_flight
+        self.motor = self._stretched if phase is PUSH else self._folded
 
     def _load_level(self, load: float, motor: Pair) -> float:
         """The y of a load [N m] at a motor position."""

@@ -143,7 +143,7 @@ def hop(leg: TaylorLeg, drive: AbstractDrive, start: Apex) -> Hop:
             if course.time <= apex <= until:
                 until = apex
             course.hold(drive.motor)
-            what = course.go(until, drive.levels())
+            what = course.go(until, drive.levels)
             if what is CONTACT:
                 if course.compiled.flies:
                     touchdown, landed = touchdown if landed else course.time, True
