@@ -191,7 +191,7 @@ def told(tools: Tools | None, case: Case, *, mapped: bool = True) -> Story | Non
     if tools is None:
         return None
     leg, law = tools
-    if case.start.height + leg.course.foot_from_centre(case.start.angles()[0])[1] < 0.0:
+    if case.start.height + leg.course.foot_height(case.start.angles()[0]) < 0.0:
         return None
     story = told_by_compiled(leg, law, case.start)
     if mapped:

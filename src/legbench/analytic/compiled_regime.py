@@ -54,6 +54,7 @@ class CompiledRegime:
         moved: events whose levels the guard has moved.
         beyond: the limits that joints were beyond when their events were set here.
         lean: largest |q1 + q2| whose events are set here [rad].
+        levels: levels of the probe whose events are set here.
     """
 
     __slots__ = (
@@ -66,6 +67,7 @@ class CompiledRegime:
         "kind",
         "lean",
         "level",
+        "levels",
         "moved",
         "numbers",
         "opposite",
@@ -101,7 +103,7 @@ class CompiledRegime:
         self.gain, self.level = [0.0] * len(Event), [1.0] * len(Event)
         self.moved: list[int] = []
         self.beyond: tuple[bool, ...] | None = None
-        self.lean = 0.0
+        self.lean, self.levels = 0.0, None
 
     def put(self, q: Pair, v: Pair, motor: Pair) -> None:
         """Set angles [rad], rates [rad/s] and motors [rad] at time zero of the integrator."""

@@ -26,7 +26,7 @@ from legbench.analytic.compiled_regime import NEVER, CompiledRegime
 from legbench.analytic.contact import MIN_PHASE
 from legbench.analytic.contact_watch import CONTACT, RECOVER, ContactWatch
 from legbench.analytic.dual import DUAL, floats, without_gradients
-from legbench.analytic.equations import Pair, sweep, sweep_motion, sweep_rate, touchdown
+from legbench.analytic.equations import Pair, sweep, sweep_height, sweep_motion, sweep_rate, touchdown
 from legbench.analytic.event_detector import (
     FELL_BACK,
     HIP_HIGH,
@@ -81,6 +81,37 @@ class Course:
         detector: the events that are watched.
         told: the state that `state` last returned; None once the leg has moved on.
     """
+
+    __slots__ = (
+        "_arm",
+        "_min_phase",
+        "_regimes",
+        "_tolerance",
+        "_variation",
+        "began",
+        "compiled",
+        "contact",
+        "detector",
+        "drift",
+        "elapsed",
+        "lost",
+        "model",
+        "motor",
+        "plain",
+        "plain_motor",
+        "plain_q",
+        "plain_v",
+        "point",
+        "probe",
+        "q",
+        "regime",
+        "since",
+        "stop_switches",
+        "terms",
+        "time",
+        "told",
+        "v",
+    )
 
     def __init__(
         self,
@@ -152,14 +183,16 @@ class Course:
         """Time at which the centre of mass is highest in this flight [s]."""
         return self.began + self.drift[1] / self.model.floating.gravity
 
-    def foot_from_centre(self, q: Pair) -> Pair:
-        """Foot tip seen from the centre of mass (forward, up) [m]."""
-        return sweep(self.model.ops, q, self._arm)
+    def foot_height(self, q: Pair) -> float:
+        """Height of the foot tip over the centre of mass [m]."""
+        return sweep_height(self.model.ops, q, self._arm)
 
     def hold(self, motor: Pair) -> None:
         """Set the motor positions, which are held until the next call [rad]."""
         if motor != self.motor:
-            self.motor, self.plain_motor = motor, floats(motor)
+            self.motor = self.plain_motor = motor
+            if self._variation is not None:
+                self.plain_motor = floats(motor)
             self.compiled.hold(self.plain_motor)
             self._decide()
 
@@ -174,6 +207,7 @@ class Course:
             foot_vel = dx + arm_vel[0], dz + arm_vel[1]
             self.v, lost = touchdown(ops, model.stance, model.floating, self.q, self.v, foot_vel)
             self.lost += lost
+            self._flatten()
         else:
             self.point = self.point[0] - arm[0], self.point[1] - arm[1]
             self.drift = -arm_vel[0], -arm_vel[1]
@@ -270,8 +304,16 @@ class Course:
     ) -> None:
         self.q, self.v, self.point, self.drift, self.lost = q, v, point, drift, 0.0
         self.detector.begin(lean)
-        self.stop_switches.find(floats(q), floats(v))
+        self._flatten()
+        self.stop_switches.find(self.plain_q, self.plain_v)
         self._enter(self._compiled_for(regime))
+
+    def _flatten(self) -> None:
+        """Take the values of angles, rates and motors, on which decisions are made."""
+        self.plain_q, self.plain_v, self.plain_motor = self.q, self.v, self.motor
+        if self._variation is not None:
+            self.plain_q, self.plain_v = floats(self.q), floats(self.v)
+            self.plain_motor = floats(self.motor)
 
     def _enter(self, compiled: CompiledRegime) -> None:
         """Begin a regime at the present time."""
@@ -282,10 +324,6 @@ class Course:
     def _load(self, compiled: CompiledRegime) -> None:
         """Load the present state into a compiled regime."""
         self.compiled = compiled
-        self.plain_q, self.plain_v, self.plain_motor = self.q, self.v, self.motor
-        if self._variation is not None:
-            self.plain_q, self.plain_v = floats(self.q), floats(self.v)
-            self.plain_motor = floats(self.motor)
         self.began, self.elapsed = self.time, 0.0
         compiled.put(self.plain_q, self.plain_v, self.plain_motor)
         if compiled.flies:

@@ -54,13 +54,15 @@ class EventDetector:
         "_most",
         "_probe",
         "_turn",
+        "_turns",
         "lean",
         "levels",
     )
 
     def __init__(self, course: "Course") -> None:
         self._course, self._probe = course, course.probe
-        self.levels, self.lean, self._turn = SILENT, NEVER, 0.0
+        self.levels, self.lean = SILENT, NEVER
+        self._turns, self._turn = False, 0.0
         self._below, self._above, self._most = -NEVER, NEVER, NEVER - NUDGE
 
     def begin(self, lean: float) -> None:
@@ -78,14 +80,16 @@ class EventDetector:
         self._course.stop_switches.lay(compiled)
         if compiled.free:
             self._course.contact.move_to(compiled)
-        self.lay(self.levels)
+        if compiled.levels is not self.levels:
+            self.lay(self.levels)
         if compiled.gain[TURN] != self._turn:
             compiled.lay(TURN, self._turn, 0.0) if self._turn else compiled.lay(TURN, *OFF)
 
     def lay(self, levels: Levels) -> None:
         """Replace the levels of the probe."""
-        self.levels = levels
+        self.levels = self._compiled.levels = levels
         upper, lower, turns = levels
+        self._turns = turns
         self._compiled.lay_bounds(FALL, RISE, lower, upper)
         self._below, self._above = lower + NUDGE, upper - NUDGE
         if not turns and self._turn != 0.0:
@@ -114,7 +118,7 @@ class EventDetector:
         if not (low < knee < high and back < q1 < front):
             self._guard_two(KNEE_LOW, KNEE_HIGH, knee)
             self._guard_two(HIP_LOW, HIP_HIGH, q1)
-        if self.levels.turns and self._guard_turn() and due is None:
+        if self._turns and self._guard_turn() and due is None:
             due = TURN
         if switches.touched:
             switches.guard(

@@ -8,7 +8,6 @@ stop can pull.
 """
 
 import math
-from operator import is_
 from typing import final
 
 from legbench.analytic.compiled_regime import NUDGE, OFF, CompiledRegime
@@ -28,6 +27,8 @@ KNEE_PUSH, KNEE_FREE = int(Event.KNEE_PUSH), int(Event.KNEE_FREE)
 SQUARE = TIME_CONSTANT**2
 """Factor of a stop's acceleration in its reading [s^2]."""
 
+NOTHING = (None, None, None, None)
+"""Objects for which no answer has been computed."""
 Bounds = tuple[float, float, float, float]
 
 
@@ -63,7 +64,7 @@ class StopSwitches:
         self._model, self._stops, self._floats = model, model.stops, floats
         self._pushing, self._free = [False, False], [False, False]
         self._known: dict[tuple[bool, ...], tuple[list[Stop | None], Bounds]] = {}
-        self._asked_at: tuple[PairTerms, Pair, Pair, Pair] | None = None
+        self._asked_at: tuple[PairTerms, Pair, Pair, Pair] | tuple[None, ...] = NOTHING
         """Objects for which `_answer` has been computed."""
         self._answer: list[float] = [0.0, 0.0]
         within = (False,) * len(model.stops)
@@ -97,9 +98,9 @@ class StopSwitches:
 
     def cross(self, compiled: CompiledRegime, event: int) -> None:
         """Note that a joint has gone beyond a limit, or has come back, and watch the way back."""
-        index = event - FIRST
-        crossed = self._beyond[index]
-        self._change((*self._beyond[:index], not crossed, *self._beyond[index + 1 :]))
+        beyond = list(self._beyond)
+        beyond[event - FIRST] ^= True
+        self._change(tuple(beyond))
         self._lay_limit(compiled, event)
         compiled.beyond = self._beyond
 
@@ -108,7 +109,7 @@ class StopSwitches:
         if beyond not in self._known:
             self._known[beyond] = self._within(beyond)
         self._acting, self.clear = self._known[beyond]
-        self._beyond, self.touched, self._asked_at = beyond, True in beyond, None
+        self._beyond, self.touched, self._asked_at = beyond, True in beyond, NOTHING
 
     def _within(
         self, touched: tuple[bool, ...], near: float = NUDGE
@@ -133,11 +134,11 @@ class StopSwitches:
     ) -> None:
         """Set the switches of the pushes by the law, after something has jumped."""
         if self.touched:
-            asked = self._asked(terms, motor, q, v)
-            self._pushing = [push > 0.0 for push in asked]
+            knee, hip = self._asked(terms, motor, q, v)
+            self._pushing = [knee > 0.0, hip > 0.0]
             if compiled.held:
-                asked = self._asked(self._model.falling, motor, q, v)
-                self._free = [push > 0.0 for push in asked]
+                knee, hip = self._asked(self._model.falling, motor, q, v)
+                self._free = [knee > 0.0, hip > 0.0]
         if self.touched or compiled.pushed:
             compiled.pushed = self.touched
             self._switch(compiled)
@@ -166,16 +167,19 @@ class StopSwitches:
 
     def _switch(self, compiled: CompiledRegime) -> None:
         """Set the switches in the equations, and the events in which they change."""
-        slots, place = compiled.slots, PUSHES
+        slots = compiled.slots
         for joint, stop in enumerate(self._acting):
-            pushes, event = self._pushing[joint], KNEE_PUSH + joint
+            event, place = KNEE_PUSH + joint, PUSHES + 2 * joint
             if stop is None:
-                slots[place] = slots[place + 1] = 0.0
-                compiled.lay(event, *OFF)
+                if compiled.gain[event] != 0.0:
+                    slots[place] = 0.0
+                    compiled.lay(event, *OFF)
+            elif self._pushing[joint]:
+                slots[place], slots[place + 1] = 1.0, stop.limit
+                compiled.lay(event, -stop.sign, 0.0)
             else:
-                slots[place], slots[place + 1] = float(pushes), stop.limit
-                compiled.lay(event, -stop.sign if pushes else stop.sign, 0.0)
-            place += 2
+                slots[place], slots[place + 1] = 0.0, stop.limit
+                compiled.lay(event, stop.sign, 0.0)
             if compiled.held:
                 self._switch_free(compiled, joint, stop)
 
@@ -211,9 +215,9 @@ class StopSwitches:
 
     def _asked(self, terms: PairTerms, motor: Pair, q: Pair, v: Pair) -> list[float]:
         """Readings of the events of each joint's stop where every stop acts that would push."""
-        at = (terms, motor, q, v)
-        if self._asked_at is None or not all(map(is_, at, self._asked_at)):
-            self._asked_at, self._answer = at, self._ask(terms, motor, q, v)
+        inertia, held, angles, rates = self._asked_at
+        if q is not angles or v is not rates or motor is not held or terms is not inertia:
+            self._asked_at, self._answer = (terms, motor, q, v), self._ask(terms, motor, q, v)
         return self._answer
 
     def _ask(self, terms: PairTerms, motor: Pair, q: Pair, v: Pair) -> list[float]:

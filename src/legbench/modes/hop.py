@@ -132,7 +132,7 @@ def hop(leg: TaylorLeg, drive: AbstractDrive, start: Apex) -> Hop:
     Raises:
         ConfigError: a start below the ground.
     """
-    course = leg.course
+    course, (p1, p2) = leg.course, drive.probe
     _launch(course, start)
     touchdown = liftoff = math.nan
     apex, landed, ending = math.inf, False, Ending.FAULT
@@ -155,9 +155,11 @@ def hop(leg: TaylorLeg, drive: AbstractDrive, start: Apex) -> Hop:
                 ending = Ending.FELL
                 break
             elif what is not None:
-                drive.on_event(what, _probe(drive, course.q), course.time)
+                q1, q2 = course.q
+                drive.on_event(what, p1 * q1 + p2 * q2, course.time)
             elif course.time >= alarm:
-                drive.on_alarm(_probe(drive, course.q), course.time)
+                q1, q2 = course.q
+                drive.on_alarm(p1 * q1 + p2 * q2, course.time)
             else:
                 ending = _end(drive, reached=until == apex)
                 break
@@ -187,7 +189,7 @@ def _launch(course: Course, start: Apex) -> None:
         ConfigError: the foot would be below the ground.
     """
     q, v = start.angles()
-    if start.height + course.foot_from_centre(q)[1] < 0.0:
+    if start.height + course.foot_height(q) < 0.0:
         start.state(course.model)  # says so
     course.fly(q, v, (0.0, start.height), (start.speed, 0.0), 2.0 * FALLEN)
 
@@ -196,10 +198,6 @@ def _reached(course: Course) -> Apex:
     """Apex of a leg that has reached it."""
     (_, height), (speed, _) = course.centre()
     return Apex.at(height, speed, course.q, course.v)
-
-
-def _probe(drive: AbstractDrive, q: Pair) -> float:
-    return drive.probe[0] * q[0] + drive.probe[1] * q[1]
 
 
 def return_map(leg: TaylorLeg, drive: AbstractDrive, start: Apex) -> Hop:
