@@ -136,13 +136,13 @@ def _tell_next(story: Story, course: Course, law: JumpLaw) -> None:
     course.hold(law.motor)
     what = course.go(until, law.levels)
     value = law.probe[0] * course.q[0] + law.probe[1] * course.q[1]
-    waited = ("waited", law.released)
-    if phase == "release" and law.alarm == math.inf and waited not in story.events:
-        # The law passes over the end of a release in silence if no load has come before.
-        story.events += [waited] if course.time >= law.released else []
+    lapsed = ("waited" if phase == "release" else "touched", law.lapse)
+    if course.time >= law.lapse and lapsed not in story.events:
+        story.events.append(lapsed)  # the law passes over it in silence
     if what is Watched.CONTACT:
         story.events.append(("touchdown" if flies else "liftoff", course.time))
         course.switch()
+        law.stands = flies
     elif what is Watched.FELL:
         story.ending = "fell"
     elif what is Watched.TURN:
@@ -165,7 +165,7 @@ def _tell_next(story: Story, course: Course, law: JumpLaw) -> None:
         if phase == "release" and law.alarm < math.inf:  # loaded already when it begins to fly
             story.events.append(("loaded", course.time))
     elif until == reach:
-        story.ending = "apex" if law.settled else "fault"
+        story.ending = "apex" if law.settled(course.time) else "fault"
     elif course.time >= HORIZON:
         story.ending = "stands"
 

@@ -16,6 +16,8 @@ from legbench.design.statics import Support
 from legbench.kinematics import ModalConvention
 
 SCALE = math.sqrt(0.5)
+CROSSED = 1e-9
+"""Largest reading beyond a level that has been crossed and not jumped over [rad]."""
 FLIGHT, COMPRESS = JumpPhase.FLIGHT, JumpPhase.COMPRESS
 PUSH, RELEASE = JumpPhase.PUSH, JumpPhase.RELEASE
 RISE, FALL, TURN = Watched.RISE, Watched.FALL, Watched.TURN
@@ -33,6 +35,8 @@ class AbstractDrive(ABC):
     """Time at which `on_alarm` is to be called [s]."""
     levels: Levels
     """Probe values at which `on_event` is to be called; the same object as long as they stay."""
+    stands: bool = False
+    """Whether the foot is on the ground, which is a hint at what comes next: the law is the same."""
 
     @abstractmethod
     def restart(self) -> None:
@@ -46,9 +50,8 @@ class AbstractDrive(ABC):
     def on_alarm(self, value: float, time: float) -> None:
         """Handle the alarm."""
 
-    @property
     @abstractmethod
-    def settled(self) -> bool:
+    def settled(self, time: float) -> bool:
         """Whether the law keeps no state from the stance, so that the leg's state is complete."""
 
 
@@ -63,8 +66,7 @@ class Passive(AbstractDrive):
     def __init__(self, motor: Pair) -> None:
         self.motor = motor
 
-    @property
-    def settled(self) -> bool:
+    def settled(self, time: float) -> bool:
         """Whether the law is without state, which is always so."""
         return True
 
@@ -85,10 +87,13 @@ class JumpLaw(AbstractDrive):
     Fold and load are both `y = s (k2 q2 - k1 q1) / k`, shifted by the motor position, so every
     threshold of the controller is a level of y, and every extreme one of its turning points.
 
+    A time that only has to pass is no alarm as long as nothing can depend on it: the law passes over
+    it in silence, and an event before it sets the alarm.
+
     Attributes:
-        phase: phase of the controller. It is still RELEASE after the time of the release has passed,
-            as long as the leg is not loaded.
-        released: time from which a load counts after a push [s].
+        phase: phase of the controller, which may have changed at `lapse` without notice.
+        lapse: time that is passed over in silence [s]: a release is over, or a rising load has
+            lasted. Infinity if there is none.
 
     Raises:
         ConfigError: settings that the controller itself refuses for this leg.
@@ -117,19 +122,19 @@ class JumpLaw(AbstractDrive):
             for phase, motor in ((FLIGHT, self._folded), (PUSH, self._stretched))
         )
         self._in_flight, self._in_doubt = Levels(upper=self._loaded), Levels(lower=self._loaded)
-        self._extreme, self.released = 0.0, 0.0
+        self._rising = Levels(lower=self._loaded, turns=True)
+        self._extreme = 0.0
         self._enter(FLIGHT)
 
     def restart(self) -> None:
         """Begin in flight, unloaded and settled."""
+        self.stands = False
         self._enter(FLIGHT)
 
     def on_event(self, what: Watched, value: float, time: float) -> None:
         """Advance the phase after an event of the probe."""
         if what is TURN:
-            further = value - self._extreme
-            if further > 0.0 if self.phase is COMPRESS else further < 0.0:
-                self._search(value)
+            self._turned(value, time)
         elif self.phase is COMPRESS:
             self._leave(value)
             if value < self._unloaded:
@@ -138,11 +143,11 @@ class JumpLaw(AbstractDrive):
             self._release(time)
         elif what is FALL:
             self._enter(FLIGHT)
-        elif self.phase is FLIGHT or time >= self.released:
-            self._enter(FLIGHT)
-            self._load(time)
+        elif self.phase is RELEASE and time < self.lapse:
+            self.levels, self.alarm, self.lapse = SILENT, self.lapse, math.inf
         else:
-            self.levels, self.alarm = SILENT, self.released
+            self._enter(FLIGHT)
+            self._load(time, rises=self.stands and value - self._loaded < CROSSED)
 
     def on_alarm(self, value: float, time: float) -> None:
         """Advance the phase after the alarm: the release is over, or a load has lasted."""
@@ -151,23 +156,37 @@ class JumpLaw(AbstractDrive):
             return
         self._enter(FLIGHT)
         if value > self._loaded:
-            self._load(time)
+            self._load(time, rises=False)
 
-    @property
-    def settled(self) -> bool:
+    def settled(self, time: float) -> bool:
         """Whether the leg is in flight, or about to be."""
-        return self.phase in (JumpPhase.FLIGHT, JumpPhase.RELEASE)
+        return self.phase is RELEASE or (self.phase is FLIGHT and time < self.lapse)
 
-    def _load(self, time: float) -> None:
-        self.levels, self.alarm = self._in_doubt, time + self._dwell[FLIGHT]
+    def _turned(self, value: float, time: float) -> None:
+        """Note an extreme of the probe."""
+        if self.phase is COMPRESS:
+            if value > self._extreme:
+                self._search(value)
+        elif self.phase is PUSH:
+            if value < self._extreme:
+                self._search(value)
+        elif time >= self.lapse:
+            self._leave(value)
+        else:
+            self.levels, self.alarm, self.lapse = self._in_doubt, self.lapse, math.inf
+
+    def _load(self, time: float, *, rises: bool) -> None:
+        """Wait for a load to last; one that rises can only fall after a turn."""
+        lasted = time + self._dwell[FLIGHT]
+        if rises:
+            self.levels, self.lapse = self._rising, lasted
+        else:
+            self.levels, self.alarm = self._in_doubt, lasted
 
     def _release(self, time: float) -> None:
-        """Let the motors go back, and watch for a load, which counts after some time only.
-
-        No alarm tells that time, because nothing changes then unless a load comes before.
-        """
+        """Let the motors go back, and watch for a load, which counts after some time only."""
         self._enter(RELEASE)
-        self.released = time + self._dwell[RELEASE]
+        self.lapse = time + self._dwell[RELEASE]
 
     def _leave(self, value: float) -> None:
         """Go on to the next phase, whose extreme is searched from `value` on."""
@@ -183,7 +202,8 @@ class JumpLaw(AbstractDrive):
             self.levels = Levels(extreme + self._turn, self._unloaded, True)
 
     def _enter(self, phase: JumpPhase) -> None:
-        self.phase, self.alarm, self.levels = phase, math.inf, self._in_flight
+        self.phase, self.levels = phase, self._in_flight
+        self.alarm = self.lapse = math.inf
         self.motor = self._stretched if phase is PUSH else self._folded
 
     def _load_level(self, load: float, motor: Pair) -> float:

@@ -145,12 +145,13 @@ def hop(leg: TaylorLeg, drive: AbstractDrive, start: Apex) -> Hop:
             course.hold(drive.motor)
             what = course.go(until, drive.levels)
             if what is CONTACT:
-                if course.compiled.flies:
-                    touchdown, landed = touchdown if landed else course.time, True
                 course.switch()
-                apex = math.inf
-                if course.compiled.flies:
+                drive.stands = not course.compiled.flies
+                if not drive.stands:
                     liftoff, apex = course.time, course.apex_time()
+                else:
+                    touchdown, landed = touchdown if landed else course.time, True
+                    apex = math.inf
             elif what is FELL:
                 ending = Ending.FELL
                 break
@@ -161,7 +162,7 @@ def hop(leg: TaylorLeg, drive: AbstractDrive, start: Apex) -> Hop:
                 q1, q2 = course.q
                 drive.on_alarm(p1 * q1 + p2 * q2, course.time)
             else:
-                ending = _end(drive, reached=until == apex)
+                ending = _end(drive, course.time, reached=until == apex)
                 break
     except PlantFault:
         ending = Ending.FAULT
@@ -175,11 +176,11 @@ def hop(leg: TaylorLeg, drive: AbstractDrive, start: Apex) -> Hop:
     )
 
 
-def _end(drive: AbstractDrive, *, reached: bool) -> Ending:
+def _end(drive: AbstractDrive, time: float, *, reached: bool) -> Ending:
     """How a hop ends at its horizon, or at an apex that it has `reached`."""
     if not reached:
         return Ending.STANDS
-    return Ending.APEX if drive.settled else Ending.FAULT
+    return Ending.APEX if drive.settled(time) else Ending.FAULT
 
 
 def _launch(course: Course, start: Apex) -> None:
