@@ -151,10 +151,11 @@ class CompiledRegime:
 
     def guard(self, event: int, reading: float) -> bool:
         """Make an event's function negative; true if it was positive by more than rounding."""
-        ahead = self.gain[event] * reading - self.level[event]
+        reading *= self.gain[event]
+        ahead = reading - self.slots[LEVEL + event]
         if ahead <= -NUDGE:
             return False
-        self.slots[LEVEL + event] = self.gain[event] * reading + NUDGE
+        self.slots[LEVEL + event] = reading + NUDGE
         self.moved.append(event)
         return ahead > NUDGE
 

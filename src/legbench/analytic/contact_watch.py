@@ -64,7 +64,9 @@ class ContactWatch:
             self.deaf = False
             compiled.lay(CONTACT, -1.0, 0.0)
         if compiled.flies:
-            height = self._height()
+            course = self._course
+            z, dz = float(course.point[1]), float(course.drift[1])
+            height = self._floats.height(z, dz, course.elapsed, course.plain_q)
             return self._touchdown(height) if height < NUDGE else None
         if compiled.held:
             return self._held()
@@ -93,13 +95,6 @@ class ContactWatch:
         """Switch the event off until the regime may end."""
         self.deaf = True
         self._compiled.lay(CONTACT, *OFF)
-
-    def _height(self) -> float:
-        """Height of the foot over the ground in flight [m]."""
-        course = self._course
-        elapsed, z, dz = course.elapsed, float(course.point[1]), float(course.drift[1])
-        centre = z + (dz - 0.5 * self._plain.floating.gravity * elapsed) * elapsed
-        return centre + self._floats.foot_height(course.plain_q)
 
     def _force(self) -> float:
         """Vertical contact force on the standing foot over the weight [-]."""

@@ -91,7 +91,7 @@ class EventDetector:
         upper, lower, turns = levels
         self._turns = turns
         self._compiled.lay_bounds(FALL, RISE, lower, upper)
-        self._below, self._above = lower + NUDGE, upper - NUDGE
+        self._below, self._above = lower - NUDGE, upper - NUDGE
         if not turns and self._turn != 0.0:
             self._turn = 0.0
             self._compiled.lay(TURN, *OFF)
@@ -154,6 +154,6 @@ class EventDetector:
                 towards = p1 * a[0] + p2 * a[1]
             self._turn = -1.0 if towards > 0.0 else 1.0
             self._compiled.lay(TURN, self._turn, 0.0)
-        if self._turn * rate > -NUDGE:
+        if self._turn * (rate + NUDGE) > 0.0:
             self._compiled.guard(TURN, rate)
         return self._turn * rate > JUMPED

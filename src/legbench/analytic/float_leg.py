@@ -79,7 +79,15 @@ class FloatLeg:
         turned += arm_2 * (sin(q[1]) * a2 + cos(q[1]) * (v[1] * v[1]))
         return (turned - self._gravity) / GRAVITY
 
-    def foot_height(self, q: Pair) -> float:
-        """Height of the foot tip over the centre of mass [m]."""
+    def height(self, z: float, dz: float, elapsed: float, q: Pair) -> float:
+        """Height of the foot tip over the ground in flight [m].
+
+        Args:
+            z: height of the centre of mass at the beginning of the piece [m].
+            dz: its upward speed then [m/s].
+            elapsed: time since then [s].
+            q: angles [rad].
+        """
         arm_1, arm_2 = self._arm
-        return -arm_1 * cos(q[0]) - arm_2 * cos(q[1])
+        centre = z + (dz - 0.5 * (self._gravity * elapsed)) * elapsed
+        return centre - arm_1 * cos(q[0]) - arm_2 * cos(q[1])

@@ -68,8 +68,10 @@ class StopSwitches:
         """Objects for which `_answer` has been computed."""
         self._answer: list[float] = [0.0, 0.0]
         within = (False,) * len(model.stops)
-        self._range = self._within(within, AT_LIMIT)[1]
         self._change(within)
+        low, high, back, front = self.clear
+        margin = 2.0 * AT_LIMIT
+        self._range = (low + margin, high - margin, back + margin, front - margin)
 
     def find(self, q: Pair, v: Pair) -> None:
         """Determine by the law which limits a joint is beyond, for a leg set to a new state."""
@@ -111,21 +113,18 @@ class StopSwitches:
         self._acting, self.clear = self._known[beyond]
         self._beyond, self.touched, self._asked_at = beyond, True in beyond, NOTHING
 
-    def _within(
-        self, touched: tuple[bool, ...], near: float = NUDGE
-    ) -> tuple[list[Stop | None], Bounds]:
+    def _within(self, touched: tuple[bool, ...]) -> tuple[list[Stop | None], Bounds]:
         """Stop that acts on each joint, and the angles at which no limit is near."""
         acting: list[Stop | None] = [None, None]
         bounds = [-math.inf, math.inf, -math.inf, math.inf]
         for index, (stop, beyond) in enumerate(zip(self._stops, touched, strict=True)):
             if beyond:
                 acting[index // 2] = stop
-            # A lower end bounds a joint from below, and one that is beyond it from above.
+            # A lower end bounds a joint from below, and one that is beyond it from above. Either way
+            # a joint that has just crossed is clear, since levels are lower for falling.
             place = index ^ beyond
-            if place % 2:
-                bounds[place] = min(bounds[place], stop.limit - near)
-            else:
-                bounds[place] = max(bounds[place], stop.limit + near)
+            pick = min if place % 2 else max
+            bounds[place] = pick(bounds[place], stop.limit - NUDGE)
         low, high, back, front = bounds
         return acting, (low, high, back, front)
 
