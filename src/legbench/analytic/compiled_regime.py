@@ -134,14 +134,16 @@ class CompiledRegime:
         if upper < NEVER:
             gain[rise] = slots[GAIN + rise] = 1.0
             level[rise] = slots[LEVEL + rise] = upper
-        elif gain[rise] != 0.0:
-            self.lay(rise, *OFF)
+        else:
+            gain[rise] = slots[GAIN + rise] = 0.0
+            level[rise] = slots[LEVEL + rise] = 1.0
         if lower > -NEVER:
             gain[fall] = slots[GAIN + fall] = -1.0
             level[fall] = -lower
             slots[LEVEL + fall] = BACK - lower
-        elif gain[fall] != 0.0:
-            self.lay(fall, *OFF)
+        else:
+            gain[fall] = slots[GAIN + fall] = 0.0
+            level[fall] = slots[LEVEL + fall] = 1.0
 
     def restore(self) -> None:
         """Restore the levels that the guard has moved."""

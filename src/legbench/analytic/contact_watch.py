@@ -70,7 +70,11 @@ class ContactWatch:
             return self._touchdown(height) if height < NUDGE else None
         if compiled.held:
             return self._held()
-        force = self._force()
+        course = self._course
+        if course.stop_switches.touched:
+            force = self._force()
+        else:
+            force = self._floats.force(course.plain_motor, course.plain_q, course.plain_v)
         return self._liftoff(force) if force < NUDGE else None
 
     def happens(self) -> bool:
@@ -97,11 +101,9 @@ class ContactWatch:
         self._compiled.lay(CONTACT, *OFF)
 
     def _force(self) -> float:
-        """Vertical contact force on the standing foot over the weight [-]."""
+        """Vertical contact force on the standing foot over the weight, with the stops [-]."""
         course, plain = self._course, self._plain
         motor, q, v = course.plain_motor, course.plain_q, course.plain_v
-        if not course.stop_switches.touched:
-            return self._floats.force(motor, q, v)
         a = course.stop_switches.accelerations(course.terms, motor, q, v)
         weight = plain.floating.mass * GRAVITY
         return contact_force(plain.ops, plain.floating, q, v, a)[1] / weight

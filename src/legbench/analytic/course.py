@@ -83,6 +83,7 @@ class Course:
     """
 
     __slots__ = (
+        "_air",
         "_arm",
         "_min_phase",
         "_regimes",
@@ -127,6 +128,7 @@ class Course:
         self._tolerance, self._min_phase = tolerance, min_phase
         self._arm = foot_from_centre(model)
         self._regimes: dict[tuple[Regime, bool], CompiledRegime] = {}
+        self._air: CompiledRegime | None = None
         self._variation = Variation(tolerance) if model.ops is DUAL else None
         arm = floats(self._arm)
         quick = FloatLeg(self.plain, arm)
@@ -146,7 +148,7 @@ class Course:
             x, z = sweep_rate(ops, state.q, state.v, along)
             drift = state.trunk_vel[0] + x, state.trunk_vel[1] + z
         self.time, self.since = state.time, state.since
-        self._put(state.regime, state.q, state.v, point, drift)
+        self._put(self._compiled_for(state.regime), state.q, state.v, point, drift)
 
     def fly(self, q: Pair, v: Pair, centre: Pair, velocity: Pair, lean: float = NEVER) -> None:
         """Begin a flight at time zero, from the place and velocity of the centre of mass.
@@ -154,7 +156,8 @@ class Course:
         `lean` is the largest |q1 + q2|, twice the polar angle, of a leg that has not fallen [rad].
         """
         self.time, self.since = 0.0, -self._min_phase
-        self._put(Regime.FLIGHT, q, v, centre, velocity, lean)
+        air = self._air = self._air or self._compiled_for(Regime.FLIGHT)
+        self._put(air, q, v, centre, velocity, lean)
 
     def state(self) -> LegState:
         """State of the leg at the present time."""
@@ -194,7 +197,8 @@ class Course:
             if self._variation is not None:
                 self.plain_motor = floats(motor)
             self.compiled.hold(self.plain_motor)
-            self._decide()
+            if self.stop_switches.touched:
+                self._decide()
 
     def switch(self) -> None:
         """Apply a touchdown or lift-off: change the regime, and the rates by eq. (12)."""
@@ -262,7 +266,7 @@ class Course:
     def _piece(self, until: float) -> int | None:
         """Integrate to `until` or to the next event."""
         compiled = self.compiled
-        length = float(until - self.began)
+        length = until - self.began
         # max_steps is passed by position: a keyword costs a fifth of a short call.
         outcome = compiled.run(length, MAX_STEPS)[0].value
         q1, q2, v1, v2 = compiled.numbers
@@ -300,13 +304,13 @@ class Course:
         return False
 
     def _put(
-        self, regime: Regime, q: Pair, v: Pair, point: Pair, drift: Pair, lean: float = NEVER
+        self, compiled: CompiledRegime, q: Pair, v: Pair, point: Pair, drift: Pair, lean: float = NEVER
     ) -> None:
         self.q, self.v, self.point, self.drift, self.lost = q, v, point, drift, 0.0
         self.detector.begin(lean)
         self._flatten()
         self.stop_switches.find(self.plain_q, self.plain_v)
-        self._enter(self._compiled_for(regime))
+        self._enter(compiled)
 
     def _flatten(self) -> None:
         """Take the values of angles, rates and motors, on which decisions are made."""
@@ -329,13 +333,14 @@ class Course:
         if compiled.flies:
             compiled.slots[HEIGHT], compiled.slots[SPEED] = self.point[1], self.drift[1]
         self.detector.move_to(compiled)
-        self._decide()
+        if self.stop_switches.touched or compiled.pushed:
+            self._decide()
 
     def _decide(self) -> None:
         """Decide which stops push, after something has jumped."""
-        switches, compiled = self.stop_switches, self.compiled
-        if switches.touched or compiled.pushed:
-            switches.decide(compiled, self.terms, self.plain_motor, self.plain_q, self.plain_v)
+        self.stop_switches.decide(
+            self.compiled, self.terms, self.plain_motor, self.plain_q, self.plain_v
+        )
 
     def _compiled_for(self, regime: Regime, *, held: bool = False) -> CompiledRegime:
         found = self._regimes.get((regime, held))

@@ -138,9 +138,8 @@ class StopSwitches:
             if compiled.held:
                 knee, hip = self._asked(self._model.falling, motor, q, v)
                 self._free = [knee > 0.0, hip > 0.0]
-        if self.touched or compiled.pushed:
-            compiled.pushed = self.touched
-            self._switch(compiled)
+        compiled.pushed = self.touched
+        self._switch(compiled)
 
     def flip(self, compiled: CompiledRegime, event: int) -> None:
         """Note that a stop begins or ends to push, or would if the foot were released."""

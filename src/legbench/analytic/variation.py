@@ -45,7 +45,7 @@ class Variation:
             event: the event that ended it, if one did.
         """
         compiled, plain = course.compiled, course.plain
-        time = course.elapsed
+        time = float(course.elapsed)
         varied = parameters_of(course.model, course.regime, course.probe)[:MOTOR]
         start = [*course.q, *course.v]
         moved = self._moved(start, compiled.pars, time, [*varied, *course.motor])

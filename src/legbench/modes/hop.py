@@ -142,7 +142,8 @@ def hop(leg: TaylorLeg, drive: AbstractDrive, start: Apex) -> Hop:
             until = alarm if alarm < HORIZON else HORIZON
             if course.time <= apex <= until:
                 until = apex
-            course.hold(drive.motor)
+            if drive.motor is not course.motor:
+                course.hold(drive.motor)
             what = course.go(until, drive.levels)
             if what is CONTACT:
                 course.switch()
