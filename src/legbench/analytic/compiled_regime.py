@@ -42,7 +42,7 @@ class CompiledRegime:
         opposite: regime on the other side of touchdown or lift-off, once the leg has been there.
         held: whether the ground pulls on a foot that would go down if it were released.
         flies: whether the leg is in the air.
-        pushed: whether a joint is beyond a limit.
+        pushed: the limits that joints were beyond when their pushes were set here, as bits.
         integrator: heyoka's integrator of (q1, q2, v1, v2).
         run: its integration to a time, or to the first event.
         state: view of its state (4,).
@@ -52,7 +52,7 @@ class CompiledRegime:
         gain: gain of each event.
         level: level of each event, before the guard moves it.
         moved: events whose levels the guard has moved.
-        beyond: the limits that joints were beyond when their events were set here.
+        beyond: the limits that joints were beyond when their events were set here, as bits.
         lean: largest |q1 + q2| whose events are set here [rad].
         levels: levels of the probe whose events are set here.
     """
@@ -93,7 +93,7 @@ class CompiledRegime:
         self.opposite: CompiledRegime | None = None
         self.held = kind is Kind.HELD
         self.flies = kind is Kind.FLIGHT
-        self.pushed = False
+        self.pushed = 0
         self.integrator = event_integrator(kind, tolerance)
         self.run = self.integrator.propagate_until
         self.state: Floats = self.integrator.state
@@ -102,7 +102,7 @@ class CompiledRegime:
         self.numbers, self.slots = _slots(self.state), _slots(self.pars)
         self.gain, self.level = [0.0] * len(Event), [1.0] * len(Event)
         self.moved: list[int] = []
-        self.beyond: tuple[bool, ...] | None = None
+        self.beyond = -1
         self.lean, self.levels = 0.0, None
 
     def put(self, q: Pair, v: Pair, motor: Pair) -> None:

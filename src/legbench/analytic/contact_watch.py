@@ -8,7 +8,7 @@ early, or a reading that has no room to fall, which makes the watch deaf until t
 
 from typing import TYPE_CHECKING, final
 
-from legbench.analytic.compiled_regime import NUDGE, OFF, CompiledRegime
+from legbench.analytic.compiled_regime import NUDGE, OFF
 from legbench.analytic.equations import Pair, contact_force, free_foot_acceleration, sweep_rate
 from legbench.analytic.float_leg import FloatLeg
 from legbench.analytic.model import LegModel
@@ -22,6 +22,8 @@ TIE = 1e-7
 """Tolerance of acceleration over gravity and of force over weight when the foot is released [-]: on
 the radial mode both vanish together, and rounding decides their signs."""
 CONTACT, RECOVER = int(Event.CONTACT), int(Event.RECOVER)
+FALLS, RISES = (-1.0, 0.0), (1.0, 0.0)
+"""Gain and level of an event whose reading falls, or rises, through zero."""
 
 
 @final
@@ -33,7 +35,7 @@ class ContactWatch:
         deaf: whether the event is switched off until then.
     """
 
-    __slots__ = ("_arm", "_compiled", "_course", "_floats", "_min_phase", "_plain", "blind", "deaf")
+    __slots__ = ("_arm", "_course", "_floats", "_min_phase", "_plain", "blind", "deaf")
 
     def __init__(
         self, course: "Course", model: LegModel, floats: FloatLeg, arm: Pair, min_phase: float
@@ -44,33 +46,24 @@ class ContactWatch:
 
     def enter(self, since: float) -> None:
         """Begin a regime."""
-        self.blind, self.deaf = since + self._min_phase, False
-
-    def move_to(self, compiled: CompiledRegime) -> None:
-        """Watch the event in another integrator."""
-        self._compiled = compiled
-        if compiled.held:
-            compiled.lay(CONTACT, 1.0, 0.0)
-            compiled.lay(RECOVER, 1.0, 0.0)
-        elif compiled.gain[CONTACT] != -1.0:
-            compiled.lay(CONTACT, -1.0, 0.0)
+        if self.deaf:
+            self._hear()
+        self.blind = since + self._min_phase
 
     def due(self) -> int | None:
         """Guard touchdown or lift-off; return the event if the leg cannot stay in its regime."""
-        compiled = self._compiled
+        course = self._course
+        compiled = course.compiled
         if self.deaf:
-            if self._course.time < self.blind:
+            if course.time < self.blind:
                 return None
-            self.deaf = False
-            compiled.lay(CONTACT, -1.0, 0.0)
+            self._hear()
         if compiled.flies:
-            course = self._course
             z, dz = float(course.point[1]), float(course.drift[1])
             height = self._floats.height(z, dz, course.elapsed, course.plain_q)
             return self._touchdown(height) if height < NUDGE else None
         if compiled.held:
             return self._held()
-        course = self._course
         if course.stop_switches.touched:
             force = self._force()
         else:
@@ -82,7 +75,7 @@ class ContactWatch:
         if self._course.time < self.blind:
             self._deafen()
             return False
-        compiled = self._compiled
+        compiled = self._course.compiled
         return compiled.flies or compiled.held or self.released() > -TIE
 
     def released(self) -> float:
@@ -98,7 +91,12 @@ class ContactWatch:
     def _deafen(self) -> None:
         """Switch the event off until the regime may end."""
         self.deaf = True
-        self._compiled.lay(CONTACT, *OFF)
+        self._course.compiled.lay(CONTACT, *OFF)
+
+    def _hear(self) -> None:
+        """Switch the event on again."""
+        self.deaf = False
+        self._course.compiled.lay(CONTACT, *FALLS)
 
     def _force(self) -> float:
         """Vertical contact force on the standing foot over the weight, with the stops [-]."""
@@ -110,7 +108,7 @@ class ContactWatch:
 
     def _touchdown(self, height: float) -> int | None:
         """Guard a touchdown that is near; it is due if the foot is below the ground and sinking."""
-        course, compiled = self._course, self._compiled
+        course, compiled = self._course, self._course.compiled
         early = course.time < self.blind
         if height > (-NUDGE if early else 0.0):
             compiled.guard(CONTACT, height)
@@ -127,7 +125,7 @@ class ContactWatch:
     def _liftoff(self, force: float) -> int | None:
         """Guard a lift-off that is near; it is due if the ground would have to pull."""
         if force >= 0.0:
-            self._compiled.guard(CONTACT, force)
+            self._course.compiled.guard(CONTACT, force)
             return None
         if self._course.time >= self.blind:
             return CONTACT
@@ -139,6 +137,6 @@ class ContactWatch:
         force, released = self._force(), self.released()
         if force > TIE or released > -TIE:
             return RECOVER if force > TIE else CONTACT
-        self._compiled.guard(CONTACT, released)
-        self._compiled.guard(RECOVER, force)
+        self._course.compiled.guard(CONTACT, released)
+        self._course.compiled.guard(RECOVER, force)
         return None

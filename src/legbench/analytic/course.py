@@ -24,7 +24,7 @@ from legbench.analytic.compiled import (
 )
 from legbench.analytic.compiled_regime import NEVER, CompiledRegime
 from legbench.analytic.contact import MIN_PHASE
-from legbench.analytic.contact_watch import CONTACT, RECOVER, ContactWatch
+from legbench.analytic.contact_watch import CONTACT, FALLS, RECOVER, RISES, ContactWatch
 from legbench.analytic.dual import DUAL, floats, without_gradients
 from legbench.analytic.equations import Pair, sweep, sweep_height, sweep_motion, sweep_rate, touchdown
 from legbench.analytic.event_detector import (
@@ -349,5 +349,9 @@ class Course:
             values = parameters_of(self.plain, regime, self.probe)
             terms = terms_of(self.plain, regime)
             found = CompiledRegime(kind, regime, terms, values, self._tolerance)
+            if held:
+                found.lay(RECOVER, *RISES)
+            if found.free:
+                found.lay(CONTACT, *(RISES if held else FALLS))
             self._regimes[regime, held] = found
         return found

@@ -78,8 +78,6 @@ class EventDetector:
             compiled.lean = self.lean
             compiled.lay_bounds(FELL, FELL_BACK, -self.lean, self.lean)
         self._course.stop_switches.lay(compiled)
-        if compiled.free:
-            self._course.contact.move_to(compiled)
         if compiled.levels is not self.levels:
             self.lay(self.levels)
         if compiled.gain[TURN] != self._turn:

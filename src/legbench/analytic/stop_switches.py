@@ -27,6 +27,8 @@ KNEE_PUSH, KNEE_FREE = int(Event.KNEE_PUSH), int(Event.KNEE_FREE)
 SQUARE = TIME_CONSTANT**2
 """Factor of a stop's acceleration in its reading [s^2]."""
 
+Acting = tuple[int, Stop]
+"""Joint that is beyond a limit, 0 for the knee and 1 for the hip, and the stop that acts on it."""
 NOTHING = (None, None, None, None)
 """Objects for which no answer has been computed."""
 Bounds = tuple[float, float, float, float]
@@ -51,10 +53,11 @@ class StopSwitches:
         "_beyond",
         "_floats",
         "_free",
-        "_known",
+        "_joints",
         "_model",
         "_pushing",
         "_range",
+        "_sets",
         "_stops",
         "clear",
         "touched",
@@ -63,70 +66,66 @@ class StopSwitches:
     def __init__(self, model: LegModel, floats: FloatLeg) -> None:
         self._model, self._stops, self._floats = model, model.stops, floats
         self._pushing, self._free = [False, False], [False, False]
-        self._known: dict[tuple[bool, ...], tuple[list[Stop | None], Bounds]] = {}
+        self._sets = tuple(self._set_of(beyond) for beyond in range(1 << len(model.stops)))
         self._asked_at: tuple[PairTerms, Pair, Pair, Pair] | tuple[None, ...] = NOTHING
         """Objects for which `_answer` has been computed."""
         self._answer: list[float] = [0.0, 0.0]
-        within = (False,) * len(model.stops)
-        self._change(within)
-        low, high, back, front = self.clear
-        margin = 2.0 * AT_LIMIT
+        self._change(0)
+        (low, high, back, front), margin = self.clear, 2.0 * AT_LIMIT
         self._range = (low + margin, high - margin, back + margin, front - margin)
+
+    def _set_of(self, beyond: int) -> tuple[tuple[Acting, ...], list[Stop | None], Bounds]:
+        """Joints at work, and angles that are clear, while some limits are exceeded."""
+        acting: list[Stop | None] = [None, None]
+        bounds = [-math.inf, math.inf, -math.inf, math.inf]
+        for index, stop in enumerate(self._stops):
+            exceeded = beyond >> index & 1
+            if exceeded:
+                acting[index // 2] = stop
+            # A lower end bounds a joint from below, and one that is exceeded from above. Either way
+            # a joint that has just crossed is clear, since levels are lower for falling.
+            place = index ^ exceeded
+            pick = min if place % 2 else max
+            bounds[place] = pick(bounds[place], stop.limit - NUDGE)
+        low, high, back, front = bounds
+        joints = tuple((joint, stop) for joint, stop in enumerate(acting) if stop is not None)
+        return joints, acting, (low, high, back, front)
 
     def find(self, q: Pair, v: Pair) -> None:
         """Determine by the law which limits a joint is beyond, for a leg set to a new state."""
         low, high, back, front = self._range
-        if low < q[1] - q[0] < high and back < q[0] < front:
-            if self.touched:
-                self._change((False,) * len(self._stops))
-            return
-        found = []
-        for stop in self._stops:
-            depth = stop.depth(q)
-            found.append(depth > AT_LIMIT or (depth > -AT_LIMIT and stop.speed(v) > 0.0))
-        self._change(tuple(found))
+        beyond = 0
+        if not (low < q[1] - q[0] < high and back < q[0] < front):
+            for index, stop in enumerate(self._stops):
+                depth = stop.depth(q)
+                if depth > AT_LIMIT or (depth > -AT_LIMIT and stop.speed(v) > 0.0):
+                    beyond |= 1 << index
+        if beyond != self._beyond:
+            self._change(beyond)
 
     def lay(self, compiled: CompiledRegime) -> None:
         """Set the four events of the limits: to go beyond each, or to come back from beyond it."""
         if compiled.beyond != self._beyond:
             compiled.beyond = self._beyond
-            for event in range(FIRST, FIRST + len(self._stops)):
-                self._lay_limit(compiled, event)
+            for index in range(len(self._stops)):
+                self._lay_limit(compiled, index)
 
-    def _lay_limit(self, compiled: CompiledRegime, event: int) -> None:
-        stop = self._stops[event - FIRST]
-        gain = stop.sign if self._beyond[event - FIRST] else -stop.sign
-        compiled.lay(event, gain, gain * stop.limit)
+    def _lay_limit(self, compiled: CompiledRegime, index: int) -> None:
+        stop = self._stops[index]
+        gain = stop.sign if self._beyond >> index & 1 else -stop.sign
+        compiled.lay(FIRST + index, gain, gain * stop.limit)
 
     def cross(self, compiled: CompiledRegime, event: int) -> None:
         """Note that a joint has gone beyond a limit, or has come back, and watch the way back."""
-        beyond = list(self._beyond)
-        beyond[event - FIRST] ^= True
-        self._change(tuple(beyond))
-        self._lay_limit(compiled, event)
+        index = event - FIRST
+        self._change(self._beyond ^ 1 << index)
+        self._lay_limit(compiled, index)
         compiled.beyond = self._beyond
 
-    def _change(self, beyond: tuple[bool, ...]) -> None:
+    def _change(self, beyond: int) -> None:
         """Set which limits a joint is beyond."""
-        if beyond not in self._known:
-            self._known[beyond] = self._within(beyond)
-        self._acting, self.clear = self._known[beyond]
-        self._beyond, self.touched, self._asked_at = beyond, True in beyond, NOTHING
-
-    def _within(self, touched: tuple[bool, ...]) -> tuple[list[Stop | None], Bounds]:
-        """Stop that acts on each joint, and the angles at which no limit is near."""
-        acting: list[Stop | None] = [None, None]
-        bounds = [-math.inf, math.inf, -math.inf, math.inf]
-        for index, (stop, beyond) in enumerate(zip(self._stops, touched, strict=True)):
-            if beyond:
-                acting[index // 2] = stop
-            # A lower end bounds a joint from below, and one that is beyond it from above. Either way
-            # a joint that has just crossed is clear, since levels are lower for falling.
-            place = index ^ beyond
-            pick = min if place % 2 else max
-            bounds[place] = pick(bounds[place], stop.limit - NUDGE)
-        low, high, back, front = bounds
-        return acting, (low, high, back, front)
+        self._joints, self._acting, self.clear = self._sets[beyond]
+        self._beyond, self.touched, self._asked_at = beyond, beyond != 0, NOTHING
 
     def decide(
         self, compiled: CompiledRegime, terms: PairTerms, motor: Pair, q: Pair, v: Pair
@@ -138,7 +137,9 @@ class StopSwitches:
             if compiled.held:
                 knee, hip = self._asked(self._model.falling, motor, q, v)
                 self._free = [knee > 0.0, hip > 0.0]
-        compiled.pushed = self.touched
+        if compiled.pushed != self._beyond:
+            self._silence(compiled)
+        compiled.pushed = self._beyond
         self._switch(compiled)
 
     def flip(self, compiled: CompiledRegime, event: int) -> None:
@@ -154,41 +155,33 @@ class StopSwitches:
     ) -> None:
         """Guard the events of the pushes, for the joints that are beyond a limit."""
         asked = self._asked(terms, motor, q, v)
-        for joint, stop in enumerate(self._acting):
-            if stop is not None:
-                compiled.guard(KNEE_PUSH + joint, stop.sign * asked[joint])
+        for joint, stop in self._joints:
+            compiled.guard(KNEE_PUSH + joint, stop.sign * asked[joint])
         if compiled.held:
             asked = self._asked(self._model.falling, motor, q, v)
-            for joint, stop in enumerate(self._acting):
-                if stop is not None:
-                    compiled.guard(KNEE_FREE + joint, stop.sign * asked[joint])
+            for joint, stop in self._joints:
+                compiled.guard(KNEE_FREE + joint, stop.sign * asked[joint])
+
+    def _silence(self, compiled: CompiledRegime) -> None:
+        """Switch off all pushes and their events."""
+        for joint in (0, 1):
+            compiled.slots[PUSHES + 2 * joint] = 0.0
+            compiled.lay(KNEE_PUSH + joint, *OFF)
+            if compiled.held:
+                compiled.slots[FREE_PUSHES + joint] = 0.0
+                compiled.lay(KNEE_FREE + joint, *OFF)
 
     def _switch(self, compiled: CompiledRegime) -> None:
-        """Set the switches in the equations, and the events in which they change."""
+        """Set the switches of the joints beyond a limit, and the events in which they change."""
         slots = compiled.slots
-        for joint, stop in enumerate(self._acting):
-            event, place = KNEE_PUSH + joint, PUSHES + 2 * joint
-            if stop is None:
-                if compiled.gain[event] != 0.0:
-                    slots[place] = 0.0
-                    compiled.lay(event, *OFF)
-            elif self._pushing[joint]:
-                slots[place], slots[place + 1] = 1.0, stop.limit
-                compiled.lay(event, -stop.sign, 0.0)
-            else:
-                slots[place], slots[place + 1] = 0.0, stop.limit
-                compiled.lay(event, stop.sign, 0.0)
+        for joint, stop in self._joints:
+            pushes, place = self._pushing[joint], PUSHES + 2 * joint
+            slots[place], slots[place + 1] = 1.0 if pushes else 0.0, stop.limit
+            compiled.lay(KNEE_PUSH + joint, -stop.sign if pushes else stop.sign, 0.0)
             if compiled.held:
-                self._switch_free(compiled, joint, stop)
-
-    def _switch_free(self, compiled: CompiledRegime, joint: int, stop: Stop | None) -> None:
-        """Set the switch and the event of a stop on the foot as if it were released."""
-        pushes, event = self._free[joint], KNEE_FREE + joint
-        compiled.slots[FREE_PUSHES + joint] = float(stop is not None and pushes)
-        if stop is None:
-            compiled.lay(event, *OFF)
-        else:
-            compiled.lay(event, -stop.sign if pushes else stop.sign, 0.0)
+                pushes = self._free[joint]
+                slots[FREE_PUSHES + joint] = 1.0 if pushes else 0.0
+                compiled.lay(KNEE_FREE + joint, -stop.sign if pushes else stop.sign, 0.0)
 
     def turns(
         self, ops: Ops, terms: PairTerms, torque: Pair, q: Pair, v: Pair, *, free: bool = False
