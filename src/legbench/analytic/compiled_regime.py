@@ -122,8 +122,9 @@ class CompiledRegime:
         """Set an event to the rise of `gain * reading` through a level."""
         self.gain[event], self.level[event] = gain, level
         self.slots[GAIN + event] = gain
-        lowered = gain < 0.0 and event <= LAST_LOWERED
-        self.slots[LEVEL + event] = level + BACK if lowered else level
+        if gain < 0.0 and event <= LAST_LOWERED:
+            level += BACK
+        self.slots[LEVEL + event] = level
 
     def lay_bounds(self, fall: int, rise: int, lower: float, upper: float) -> None:
         """Set two events: a reading falls through `lower`, and rises through `upper`.
@@ -134,14 +135,14 @@ class CompiledRegime:
         if upper < NEVER:
             gain[rise] = slots[GAIN + rise] = 1.0
             level[rise] = slots[LEVEL + rise] = upper
-        else:
+        elif gain[rise] != 0.0:
             gain[rise] = slots[GAIN + rise] = 0.0
             level[rise] = slots[LEVEL + rise] = 1.0
         if lower > -NEVER:
             gain[fall] = slots[GAIN + fall] = -1.0
             level[fall] = -lower
             slots[LEVEL + fall] = BACK - lower
-        else:
+        elif gain[fall] != 0.0:
             gain[fall] = slots[GAIN + fall] = 0.0
             level[fall] = slots[LEVEL + fall] = 1.0
 

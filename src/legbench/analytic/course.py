@@ -205,10 +205,10 @@ class Course:
         ops, model, compiled = self.model.ops, self.model, self.compiled
         arm, arm_vel = sweep_motion(ops, self.q, self.v, self._arm)
         if compiled.flies:
-            (x, _), (dx, dz) = self.centre()
+            (x, _), (dx, dz), elapsed = self.point, self.drift, self.time - self.began
             # The height is zero by definition, also if the foot went below it while unwatched.
-            self.point, self.drift = (x + arm[0], 0.0), (0.0, 0.0)
-            foot_vel = dx + arm_vel[0], dz + arm_vel[1]
+            self.point, self.drift = (x + dx * elapsed + arm[0], 0.0), (0.0, 0.0)
+            foot_vel = dx + arm_vel[0], dz - model.floating.gravity * elapsed + arm_vel[1]
             self.v, lost = touchdown(ops, model.stance, model.floating, self.q, self.v, foot_vel)
             self.lost += lost
             self._flatten()

@@ -29,6 +29,7 @@ class FloatLeg:
         floating, stance = model.floating, model.stance
         self._springs = (*model.stiffness, *model.damping)
         self._stance = (
+            *self._springs,
             *stance.inertia,
             stance.coupling,
             *stance.moment,
@@ -46,31 +47,30 @@ class FloatLeg:
     def accelerations(self, terms: PairTerms, motor: Pair, q: Pair, v: Pair) -> Pair:
         """Accelerations of q1 and q2 under the inertia `terms` [rad/s^2]."""
         k1, k2, d1, d2 = self._springs
-        (q1, q2), (v1, v2), (i1, i2), (g1, g2) = q, v, terms.inertia, terms.moment
-        mixed = terms.coupling
-        swirl, cosine = sin(q1 - q2), cos(q1 - q2)
-        right_1 = k1 * (motor[0] - q1) - d1 * v1 - (mixed * (swirl * (v2 * v2)) + g1 * sin(q1))
-        right_2 = k2 * (motor[1] - q2) - d2 * v2 - (-mixed * (swirl * (v1 * v1)) + g2 * sin(q2))
-        determinant = i1 * i2 - mixed * mixed * (cosine * cosine)
+        (m1, m2), (q1, q2), (v1, v2) = motor, q, v
+        (i1, i2), (g1, g2), mixed = terms.inertia, terms.moment, terms.coupling
+        coupled, swirl = mixed * cos(q1 - q2), mixed * sin(q1 - q2)
+        right_1 = k1 * (m1 - q1) - d1 * v1 - swirl * (v2 * v2) - g1 * sin(q1)
+        right_2 = k2 * (m2 - q2) - d2 * v2 + swirl * (v1 * v1) - g2 * sin(q2)
+        determinant = i1 * i2 - coupled * coupled
         return (
-            (i2 * right_1 - mixed * (cosine * right_2)) / determinant,
-            (i1 * right_2 - mixed * (cosine * right_1)) / determinant,
+            (i2 * right_1 - coupled * right_2) / determinant,
+            (i1 * right_2 - coupled * right_1) / determinant,
         )
 
     def force(self, motor: Pair, q: Pair, v: Pair) -> float:
         """Vertical contact force on the standing foot over the weight [-]."""
-        k1, k2, d1, d2 = self._springs
-        i1, i2, mixed, g1, g2, h1, h2, carried, weight = self._stance
-        (q1, q2), (v1, v2) = q, v
-        swirl, cosine, s1, s2 = sin(q1 - q2), cos(q1 - q2), sin(q1), sin(q2)
+        k1, k2, d1, d2, i1, i2, mixed, g1, g2, h1, h2, carried, weight = self._stance
+        (m1, m2), (q1, q2), (v1, v2) = motor, q, v
+        s1, s2 = sin(q1), sin(q2)
+        coupled, swirl = mixed * cos(q1 - q2), mixed * sin(q1 - q2)
         square_1, square_2 = v1 * v1, v2 * v2
-        right_1 = k1 * (motor[0] - q1) - d1 * v1 - (mixed * (swirl * square_2) + g1 * s1)
-        right_2 = k2 * (motor[1] - q2) - d2 * v2 - (-mixed * (swirl * square_1) + g2 * s2)
-        determinant = i1 * i2 - mixed * mixed * (cosine * cosine)
-        a1 = (i2 * right_1 - mixed * (cosine * right_2)) / determinant
-        a2 = (i1 * right_2 - mixed * (cosine * right_1)) / determinant
-        lifted = h1 * (s1 * a1 + cos(q1) * square_1) + h2 * (s2 * a2 + cos(q2) * square_2)
-        return (lifted + carried) / weight
+        right_1 = k1 * (m1 - q1) - d1 * v1 - swirl * square_2 - g1 * s1
+        right_2 = k2 * (m2 - q2) - d2 * v2 + swirl * square_1 - g2 * s2
+        turned = h1 * s1 * (i2 * right_1 - coupled * right_2)
+        turned += h2 * s2 * (i1 * right_2 - coupled * right_1)
+        lifted = turned / (i1 * i2 - coupled * coupled)
+        return (lifted + h1 * cos(q1) * square_1 + h2 * cos(q2) * square_2 + carried) / weight
 
     def released(self, motor: Pair, q: Pair, v: Pair) -> float:
         """Upward acceleration of the foot tip if nothing held it, over gravity [-]."""
