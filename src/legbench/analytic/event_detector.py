@@ -47,11 +47,9 @@ class EventDetector:
     """
 
     __slots__ = (
-        "_above",
-        "_below",
+        "_bounds",
         "_compiled",
         "_course",
-        "_most",
         "_probe",
         "_turn",
         "_turns",
@@ -63,11 +61,13 @@ class EventDetector:
         self._course, self._probe = course, course.probe
         self.levels, self.lean = SILENT, NEVER
         self._turns, self._turn = False, 0.0
-        self._below, self._above, self._most = -NEVER, NEVER, NEVER - NUDGE
+        self._bounds = (-NEVER, NEVER, NEVER)
 
     def begin(self, lean: float) -> None:
         """Begin with a leg in a new state, whose turning points are those after it."""
-        self.lean, self._most, self._turn = lean, lean - NUDGE, 0.0
+        self._turn = 0.0
+        if lean != self.lean:
+            self.lean, self._bounds = lean, (*self._bounds[:2], lean - NUDGE)
 
     def move_to(self, compiled: CompiledRegime) -> None:
         """Set all levels in another integrator."""
@@ -89,7 +89,7 @@ class EventDetector:
         upper, lower, turns = levels
         self._turns = turns
         self._compiled.lay_bounds(FALL, RISE, lower, upper)
-        self._below, self._above = lower - NUDGE, upper - NUDGE
+        self._bounds = (lower - NUDGE, upper - NUDGE, self.lean - NUDGE)
         if not turns and self._turn != 0.0:
             self._turn = 0.0
             self._compiled.lay(TURN, *OFF)
@@ -104,20 +104,21 @@ class EventDetector:
         course, compiled = self._course, self._compiled
         if compiled.moved:
             compiled.restore()
-        (p1, p2), (q1, q2) = self._probe, course.plain_q
-        switches, due = course.stop_switches, None
-        reading, lean, knee = p1 * q1 + p2 * q2, q1 + q2, q2 - q1
-        if not self._below < reading < self._above:
-            due = self._guard_two(RISE, FALL, reading)
-        if not -self._most < lean < self._most:
-            fell = self._guard_two(FELL, FELL_BACK, lean)
-            due = fell if due is None else due
+        (p1, p2), (q1, q2), switches = self._probe, course.plain_q, course.stop_switches
+        (below, above, most), due = self._bounds, None
         low, high, back, front = switches.clear
-        if not (low < knee < high and back < q1 < front):
-            self._guard_two(KNEE_LOW, KNEE_HIGH, knee)
-            self._guard_two(HIP_LOW, HIP_HIGH, q1)
-        if self._turns and self._guard_turn() and due is None:
-            due = TURN
+        if not (
+            below < p1 * q1 + p2 * q2 < above
+            and -most < q1 + q2 < most
+            and low < q2 - q1 < high
+            and back < q1 < front
+        ):
+            due = self._near(q1, q2)
+        if self._turns:
+            v1, v2 = course.plain_v
+            rate = p1 * v1 + p2 * v2
+            if not self._turn * (rate + NUDGE) < 0.0 and self._guard_turn(rate) and due is None:
+                due = TURN
         if switches.touched:
             switches.guard(
                 compiled, course.terms, course.plain_motor, course.plain_q, course.plain_v
@@ -127,6 +128,14 @@ class EventDetector:
             due = contact if due is None else due
         return due
 
+    def _near(self, q1: float, q2: float) -> int | None:
+        """Guard the events of angles, and return one whose condition holds already, or None."""
+        due = self._guard_two(RISE, FALL, self._probe[0] * q1 + self._probe[1] * q2)
+        fell = self._guard_two(FELL, FELL_BACK, q1 + q2)
+        self._guard_two(KNEE_LOW, KNEE_HIGH, q2 - q1)
+        self._guard_two(HIP_LOW, HIP_HIGH, q1)
+        return fell if due is None else due
+
     def _guard_two(self, first: int, second: int, value: float) -> int | None:
         """Guard two events of an angle, and return the one whose condition holds already."""
         compiled, due = self._compiled, None
@@ -135,23 +144,23 @@ class EventDetector:
                 due = event
         return due
 
-    def _guard_turn(self) -> bool:
+    def _guard_turn(self, rate: float) -> bool:
         """Watch the probe's next turning point, the kind of which follows from its present rate.
 
         Returns whether an impact has just turned the probe, which is a turning point, too.
         """
-        (p1, p2), (v1, v2) = self._probe, self._course.plain_v
-        rate = p1 * v1 + p2 * v2
         if self._turn == 0.0:
-            towards = rate
-            if abs(rate) <= NUDGE:
-                course = self._course
-                a = course.stop_switches.accelerations(
-                    course.terms, course.plain_motor, course.plain_q, course.plain_v
-                )
-                towards = p1 * a[0] + p2 * a[1]
-            self._turn = -1.0 if towards > 0.0 else 1.0
+            self._turn = -1.0 if self._towards(rate) > 0.0 else 1.0
             self._compiled.lay(TURN, self._turn, 0.0)
-        if self._turn * (rate + NUDGE) > 0.0:
-            self._compiled.guard(TURN, rate)
+        self._compiled.guard(TURN, rate)
         return self._turn * rate > JUMPED
+
+    def _towards(self, rate: float) -> float:
+        """Rate of the probe, or its acceleration if it is at rest."""
+        if abs(rate) > NUDGE:
+            return rate
+        course = self._course
+        a1, a2 = course.stop_switches.accelerations(
+            course.terms, course.plain_motor, course.plain_q, course.plain_v
+        )
+        return self._probe[0] * a1 + self._probe[1] * a2
