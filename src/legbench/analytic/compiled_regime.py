@@ -114,10 +114,6 @@ class CompiledRegime:
         self.integrator.time = 0.0
         self.integrator.reset_cooldowns()
 
-    def hold(self, motor: Pair) -> None:
-        """Set the motor positions [rad]."""
-        self.slots[MOTOR], self.slots[MOTOR + 1] = motor
-
     def lay(self, event: int, gain: float, level: float) -> None:
         """Set an event to the rise of `gain * reading` through a level."""
         self.gain[event], self.level[event] = gain, level

@@ -6,6 +6,7 @@ beginning all the same, because the piece then need not end there: it is only an
 early, or a reading that has no room to fall, which makes the watch deaf until that time.
 """
 
+from math import cos
 from typing import TYPE_CHECKING, final
 
 from legbench.analytic.compiled_regime import NUDGE, OFF
@@ -35,13 +36,14 @@ class ContactWatch:
         deaf: whether the event is switched off until then.
     """
 
-    __slots__ = ("_arm", "_course", "_floats", "_min_phase", "_plain", "blind", "deaf")
+    __slots__ = ("_arm", "_course", "_floats", "_half", "_min_phase", "_plain", "blind", "deaf")
 
     def __init__(
         self, course: "Course", model: LegModel, floats: FloatLeg, arm: Pair, min_phase: float
     ) -> None:
         self._course, self._plain, self._floats = course, model, floats
         self._arm, self._min_phase = arm, min_phase
+        self._half = 0.5 * model.floating.gravity
         self.blind, self.deaf = 0.0, False
 
     def enter(self, since: float) -> None:
@@ -59,8 +61,9 @@ class ContactWatch:
                 return None
             self._hear()
         if compiled.flies:
+            elapsed, (q1, q2), (arm_1, arm_2) = course.elapsed, course.plain_q, self._arm
             z, dz = float(course.point[1]), float(course.drift[1])
-            height = self._floats.height(z, dz, course.elapsed, course.plain_q)
+            height = z + (dz - self._half * elapsed) * elapsed - arm_1 * cos(q1) - arm_2 * cos(q2)
             return self._touchdown(height) if height < NUDGE else None
         if compiled.held:
             return self._held()

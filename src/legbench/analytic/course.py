@@ -39,14 +39,14 @@ from legbench.analytic.event_detector import (
 )
 from legbench.analytic.float_leg import FloatLeg
 from legbench.analytic.model import LegModel
-from legbench.analytic.parameters import HEIGHT, SPEED, Event, Kind, Watched
+from legbench.analytic.parameters import HEIGHT, MOTOR, SPEED, Event, Kind, Watched
 from legbench.analytic.state import LegState, Regime
 from legbench.analytic.stop_switches import StopSwitches
 from legbench.analytic.variation import Variation
 from legbench.errors import PlantFault
 
-MAX_EVENTS = 10_000
-"""Largest number of events that one integration may pass [-]."""
+EVENT_BUDGET = range(10_000)
+"""Events that one integration may pass at most."""
 MAX_STEPS = 100_000
 """Largest number of steps of one integration [-]; a leg takes about a hundred a second, a diverging
 one any number."""
@@ -196,7 +196,8 @@ class Course:
             self.motor = self.plain_motor = motor
             if self._variation is not None:
                 self.plain_motor = floats(motor)
-            self.compiled.hold(self.plain_motor)
+            slots = self.compiled.slots
+            slots[MOTOR], slots[MOTOR + 1] = self.plain_motor
             if self.stop_switches.touched:
                 self._decide()
 
@@ -231,7 +232,7 @@ class Course:
         detector, contact = self.detector, self.contact
         if levels is not detector.levels:
             detector.lay(levels)
-        for _ in range(MAX_EVENTS):
+        for _ in EVENT_BUDGET:
             event = detector.due()
             if event is None:
                 end = contact.blind if contact.deaf and contact.blind < until else until

@@ -78,16 +78,3 @@ class FloatLeg:
         turned = arm_1 * (sin(q[0]) * a1 + cos(q[0]) * (v[0] * v[0]))
         turned += arm_2 * (sin(q[1]) * a2 + cos(q[1]) * (v[1] * v[1]))
         return (turned - self._gravity) / GRAVITY
-
-    def height(self, z: float, dz: float, elapsed: float, q: Pair) -> float:
-        """Height of the foot tip over the ground in flight [m].
-
-        Args:
-            z: height of the centre of mass at the beginning of the piece [m].
-            dz: its upward speed then [m/s].
-            elapsed: time since then [s].
-            q: angles [rad].
-        """
-        arm_1, arm_2 = self._arm
-        centre = z + (dz - 0.5 * (self._gravity * elapsed)) * elapsed
-        return centre - arm_1 * cos(q[0]) - arm_2 * cos(q[1])

@@ -117,9 +117,8 @@ class StopSwitches:
 
     def cross(self, compiled: CompiledRegime, event: int) -> None:
         """Note that a joint has gone beyond a limit, or has come back, and watch the way back."""
-        index = event - FIRST
-        self._change(self._beyond ^ 1 << index)
-        self._lay_limit(compiled, index)
+        self._change(self._beyond ^ 1 << event - FIRST)
+        self._lay_limit(compiled, event - FIRST)
         compiled.beyond = self._beyond
 
     def _change(self, beyond: int) -> None:
@@ -137,7 +136,7 @@ class StopSwitches:
             if compiled.held:
                 knee, hip = self._asked(self._model.falling, motor, q, v)
                 self._free = [knee > 0.0, hip > 0.0]
-        if compiled.pushed != self._beyond:
+        if compiled.pushed & ~self._beyond:
             self._silence(compiled)
         compiled.pushed = self._beyond
         self._switch(compiled)
@@ -163,21 +162,24 @@ class StopSwitches:
                 compiled.guard(KNEE_FREE + joint, stop.sign * asked[joint])
 
     def _silence(self, compiled: CompiledRegime) -> None:
-        """Switch off all pushes and their events."""
-        for joint in (0, 1):
-            compiled.slots[PUSHES + 2 * joint] = 0.0
-            compiled.lay(KNEE_PUSH + joint, *OFF)
-            if compiled.held:
-                compiled.slots[FREE_PUSHES + joint] = 0.0
-                compiled.lay(KNEE_FREE + joint, *OFF)
+        """Switch off the pushes, and their events, of joints that are within their limits."""
+        for joint, stop in enumerate(self._acting):
+            if stop is None and compiled.gain[KNEE_PUSH + joint] != 0.0:
+                compiled.slots[PUSHES + 2 * joint] = 0.0
+                compiled.lay(KNEE_PUSH + joint, *OFF)
+                if compiled.held:
+                    compiled.slots[FREE_PUSHES + joint] = 0.0
+                    compiled.lay(KNEE_FREE + joint, *OFF)
 
     def _switch(self, compiled: CompiledRegime) -> None:
-        """Set the switches of the joints beyond a limit, and the events in which they change."""
+        """Set the switches of joints beyond a limit, and the events in which they change."""
         slots = compiled.slots
         for joint, stop in self._joints:
             pushes, place = self._pushing[joint], PUSHES + 2 * joint
             slots[place], slots[place + 1] = 1.0 if pushes else 0.0, stop.limit
-            compiled.lay(KNEE_PUSH + joint, -stop.sign if pushes else stop.sign, 0.0)
+            gain = -stop.sign if pushes else stop.sign
+            if compiled.gain[KNEE_PUSH + joint] != gain:
+                compiled.lay(KNEE_PUSH + joint, gain, 0.0)
             if compiled.held:
                 pushes = self._free[joint]
                 slots[FREE_PUSHES + joint] = 1.0 if pushes else 0.0
@@ -207,18 +209,18 @@ class StopSwitches:
     def _asked(self, terms: PairTerms, motor: Pair, q: Pair, v: Pair) -> list[float]:
         """Readings of the events of each joint's stop where every stop acts that would push."""
         inertia, held, angles, rates = self._asked_at
-        if q is not angles or v is not rates or motor is not held or terms is not inertia:
-            self._asked_at, self._answer = (terms, motor, q, v), self._ask(terms, motor, q, v)
+        if q is angles and v is rates and motor is held and terms is inertia:
+            return self._answer
+        self._asked_at = (terms, motor, q, v)
+        if len(self._joints) == 1:  # as `_turns`, of which only one reading is needed
+            ((joint, stop),) = self._joints
+            self._answer = [0.0, 0.0]
+            turn = stop.turn(q, v, self._floats.accelerations(terms, motor, q, v))
+            self._answer[joint] = SQUARE * turn
+        else:
+            torque = self._floats.torque(motor, q, v)
+            self._answer = self._turns(SCALAR, terms, torque, q, v, None)[0]
         return self._answer
-
-    def _ask(self, terms: PairTerms, motor: Pair, q: Pair, v: Pair) -> list[float]:
-        knee, hip = self._acting
-        if knee is not None and hip is not None:
-            return self._turns(SCALAR, terms, self._floats.torque(motor, q, v), q, v, None)[0]
-        a = self._floats.accelerations(terms, motor, q, v)
-        if knee is not None:
-            return [SQUARE * knee.turn(q, v, a), 0.0]
-        return [0.0, SQUARE * hip.turn(q, v, a) if hip is not None else 0.0]
 
     def _turns(
         self,
