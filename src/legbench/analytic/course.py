@@ -271,21 +271,21 @@ class Course:
         # max_steps is passed by position: a keyword costs a fifth of a short call.
         outcome = compiled.run(length, MAX_STEPS)[0].value
         q1, q2, v1, v2 = compiled.numbers
-        self.plain_q, self.plain_v = (q1, q2), (v1, v2)
+        q = self.plain_q = (q1, q2)
+        v = self.plain_v = (v1, v2)
         if outcome == TIME_LIMIT:
-            event, self.elapsed = None, length
+            # Exactly `until`, since a time that is short of it by rounding is never reached.
+            event, self.elapsed, time = None, length, until
         else:
             event, self.elapsed = -outcome - 1, compiled.integrator.time
+            time = self.began + self.elapsed
             if not 0 <= event < EVENTS:
-                at = self.began + self.elapsed
-                why = f"integration failed at t = {at:.6f} s: the state runs away"
+                why = f"integration failed at t = {time:.6f} s: the state runs away"
                 raise PlantFault("integration failed", why)
-        if self._variation is not None:
-            self._variation.carry(self, self.plain_q, self.plain_v, until, event)
-            return event
-        self.q, self.v = self.plain_q, self.plain_v
-        # Exactly `until`, since a time that is short of it by rounding would never be reached.
-        self.time = until if event is None else self.began + self.elapsed
+        if self._variation is None:
+            self.q, self.v, self.time = q, v, time
+        else:
+            self._variation.carry(self, q, v, until, event)
         return event
 
     def _handle(self, event: int) -> bool:

@@ -85,14 +85,14 @@ class EventDetector:
 
     def lay(self, levels: Levels) -> None:
         """Replace the levels of the probe."""
-        self.levels = self._compiled.levels = levels
-        upper, lower, turns = levels
-        self._turns = turns
-        self._compiled.lay_bounds(FALL, RISE, lower, upper)
+        compiled = self._compiled
+        self.levels = compiled.levels = levels
+        upper, lower, self._turns = levels
+        compiled.lay_bounds(FALL, RISE, lower, upper)
         self._bounds = (lower - NUDGE, upper - NUDGE, self.lean - NUDGE)
-        if not turns and self._turn != 0.0:
+        if not self._turns and self._turn != 0.0:
             self._turn = 0.0
-            self._compiled.lay(TURN, *OFF)
+            compiled.lay(TURN, *OFF)
 
     def turned(self) -> None:
         """Watch the probe's next turning point: a minimum after a maximum, or the reverse."""

@@ -43,6 +43,9 @@ class Ending(StrEnum):
     """The integration failed, or the hop has too many events."""
 
 
+APEX, FAULT = Ending.APEX, Ending.FAULT
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Apex:
     """State of a leg in flight when its centre of mass is highest."""
@@ -135,7 +138,7 @@ def hop(leg: TaylorLeg, drive: AbstractDrive, start: Apex) -> Hop:
     course, (p1, p2) = leg.course, drive.probe
     _launch(course, start)
     touchdown = liftoff = math.nan
-    apex, landed, ending = math.inf, False, Ending.FAULT
+    apex, landed, ending = math.inf, False, FAULT
     try:
         for _ in range(CALLS):
             alarm = drive.alarm
@@ -166,10 +169,10 @@ def hop(leg: TaylorLeg, drive: AbstractDrive, start: Apex) -> Hop:
                 ending = _end(drive, course.time, reached=until == apex)
                 break
     except PlantFault:
-        ending = Ending.FAULT
+        ending = FAULT
     return Hop(
         ending=ending,
-        after=_reached(course) if ending is Ending.APEX else None,
+        after=_reached(course) if ending is APEX else None,
         duration=course.time,
         touchdown=touchdown,
         liftoff=liftoff,
@@ -181,7 +184,7 @@ def _end(drive: AbstractDrive, time: float, *, reached: bool) -> Ending:
     """How a hop ends at its horizon, or at an apex that it has `reached`."""
     if not reached:
         return Ending.STANDS
-    return Ending.APEX if drive.settled(time) else Ending.FAULT
+    return APEX if drive.settled(time) else FAULT
 
 
 def _launch(course: Course, start: Apex) -> None:
