@@ -199,7 +199,7 @@ class Course:
             slots = self.compiled.slots
             slots[MOTOR], slots[MOTOR + 1] = self.plain_motor
             if self.stop_switches.touched:
-                self._decide()
+                self.stop_switches.decide(self)
 
     def switch(self) -> None:
         """Apply a touchdown or lift-off: change the regime, and the rates by eq. (12)."""
@@ -293,7 +293,7 @@ class Course:
         compiled = self.compiled
         if event <= HIP_HIGH:
             self.stop_switches.cross(compiled, event)
-            self._decide()
+            self.stop_switches.decide(self)
         elif event == RECOVER:
             self._load(self._compiled_for(self.regime))
         elif event != CONTACT:
@@ -335,13 +335,7 @@ class Course:
             compiled.slots[HEIGHT], compiled.slots[SPEED] = self.point[1], self.drift[1]
         self.detector.move_to(compiled)
         if self.stop_switches.touched or compiled.pushed:
-            self._decide()
-
-    def _decide(self) -> None:
-        """Decide which stops push, after something has jumped."""
-        self.stop_switches.decide(
-            self.compiled, self.terms, self.plain_motor, self.plain_q, self.plain_v
-        )
+            self.stop_switches.decide(self)
 
     def _compiled_for(self, regime: Regime, *, held: bool = False) -> CompiledRegime:
         found = self._regimes.get((regime, held))

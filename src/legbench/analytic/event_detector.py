@@ -77,7 +77,9 @@ class EventDetector:
         if compiled.lean != self.lean:
             compiled.lean = self.lean
             compiled.lay_bounds(FELL, FELL_BACK, -self.lean, self.lean)
-        self._course.stop_switches.lay(compiled)
+        switches = self._course.stop_switches
+        if compiled.beyond != switches.beyond:
+            switches.lay(compiled)
         if compiled.levels is not self.levels:
             self.lay(self.levels)
         if compiled.gain[TURN] != self._turn:
@@ -120,9 +122,7 @@ class EventDetector:
             if not self._turn * (rate + NUDGE) < 0.0 and self._guard_turn(rate) and due is None:
                 due = TURN
         if switches.touched:
-            switches.guard(
-                compiled, course.terms, course.plain_motor, course.plain_q, course.plain_v
-            )
+            switches.guard(course)
         if compiled.free:
             contact = course.contact.due()
             due = contact if due is None else due

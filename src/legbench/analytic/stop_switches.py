@@ -8,7 +8,7 @@ stop can pull.
 """
 
 import math
-from typing import final
+from typing import TYPE_CHECKING, final
 
 from legbench.analytic.compiled_regime import NUDGE, OFF, CompiledRegime
 from legbench.analytic.equations import SCALAR, Ops, Pair, Term, pair_acceleration, pair_share
@@ -17,6 +17,9 @@ from legbench.analytic.model import LegModel
 from legbench.analytic.parameters import FREE_PUSHES, PUSHES, Event
 from legbench.analytic.stops import TIME_CONSTANT, Stop
 from legbench.analytic.terms import PairTerms
+
+if TYPE_CHECKING:
+    from legbench.analytic.course import Course
 
 AT_LIMIT = 1e-12
 """Largest depth that may be rounding; the speed then says whether the stop is touched [rad]."""
@@ -29,8 +32,6 @@ SQUARE = TIME_CONSTANT**2
 
 Acting = tuple[int, Stop]
 """Joint that is beyond a limit, 0 for the knee and 1 for the hip, and the stop that acts on it."""
-NOTHING = (None, None, None, None)
-"""Objects for which no answer has been computed."""
 Bounds = tuple[float, float, float, float]
 
 
@@ -42,6 +43,7 @@ class StopSwitches:
 
     Attributes:
         touched: whether a joint is beyond a limit.
+        beyond: the limits that joints are beyond, as bits.
         clear: angles of knee and hip between which no event of a limit is near: lowest and highest
             of the knee, then of the hip [rad].
     """
@@ -49,9 +51,7 @@ class StopSwitches:
     __slots__ = (
         "_acting",
         "_answer",
-        "_asked_at",
-        "_beyond",
-        "_floats",
+                "_floats",
         "_free",
         "_joints",
         "_model",
@@ -59,6 +59,7 @@ class StopSwitches:
         "_range",
         "_sets",
         "_stops",
+        "beyond",
         "clear",
         "touched",
     )
@@ -67,9 +68,8 @@ class StopSwitches:
         self._model, self._stops, self._floats = model, model.stops, floats
         self._pushing, self._free = [False, False], [False, False]
         self._sets = tuple(self._set_of(beyond) for beyond in range(1 << len(model.stops)))
-        self._asked_at: tuple[PairTerms, Pair, Pair, Pair] | tuple[None, ...] = NOTHING
-        """Objects for which `_answer` has been computed."""
-        self._answer: list[float] = [0.0, 0.0]
+        self._answer: tuple[float, float] | None = None
+        """Readings on which the last decision was made, until they have been guarded."""
         self._change(0)
         (low, high, back, front), margin = self.clear, 2.0 * AT_LIMIT
         self._range = (low + margin, high - margin, back + margin, front - margin)
@@ -100,45 +100,43 @@ class StopSwitches:
                 depth = stop.depth(q)
                 if depth > AT_LIMIT or (depth > -AT_LIMIT and stop.speed(v) > 0.0):
                     beyond |= 1 << index
-        if beyond != self._beyond:
+        if beyond != self.beyond:
             self._change(beyond)
 
     def lay(self, compiled: CompiledRegime) -> None:
         """Set the four events of the limits: to go beyond each, or to come back from beyond it."""
-        if compiled.beyond != self._beyond:
-            compiled.beyond = self._beyond
-            for index in range(len(self._stops)):
-                self._lay_limit(compiled, index)
+        compiled.beyond = self.beyond
+        for index in range(len(self._stops)):
+            self._lay_limit(compiled, index)
 
     def _lay_limit(self, compiled: CompiledRegime, index: int) -> None:
         stop = self._stops[index]
-        gain = stop.sign if self._beyond >> index & 1 else -stop.sign
+        gain = stop.sign if self.beyond >> index & 1 else -stop.sign
         compiled.lay(FIRST + index, gain, gain * stop.limit)
 
     def cross(self, compiled: CompiledRegime, event: int) -> None:
         """Note that a joint has gone beyond a limit, or has come back, and watch the way back."""
-        self._change(self._beyond ^ 1 << event - FIRST)
+        self._change(self.beyond ^ 1 << event - FIRST)
         self._lay_limit(compiled, event - FIRST)
-        compiled.beyond = self._beyond
+        compiled.beyond = self.beyond
 
     def _change(self, beyond: int) -> None:
         """Set which limits a joint is beyond."""
         self._joints, self._acting, self.clear = self._sets[beyond]
-        self._beyond, self.touched, self._asked_at = beyond, beyond != 0, NOTHING
+        self.beyond, self.touched = beyond, beyond != 0
 
-    def decide(
-        self, compiled: CompiledRegime, terms: PairTerms, motor: Pair, q: Pair, v: Pair
-    ) -> None:
+    def decide(self, course: "Course") -> None:
         """Set the switches of the pushes by the law, after something has jumped."""
+        compiled = course.compiled
         if self.touched:
-            knee, hip = self._asked(terms, motor, q, v)
+            self._answer = knee, hip = self._ask(course, course.terms)
             self._pushing = [knee > 0.0, hip > 0.0]
             if compiled.held:
-                knee, hip = self._asked(self._model.falling, motor, q, v)
+                knee, hip = self._ask(course, self._model.falling)
                 self._free = [knee > 0.0, hip > 0.0]
-        if compiled.pushed & ~self._beyond:
+        if compiled.pushed & ~self.beyond:
             self._silence(compiled)
-        compiled.pushed = self._beyond
+        compiled.pushed = self.beyond
         self._switch(compiled)
 
     def flip(self, compiled: CompiledRegime, event: int) -> None:
@@ -149,15 +147,15 @@ class StopSwitches:
             self._pushing[event - KNEE_PUSH] ^= True
         self._switch(compiled)
 
-    def guard(
-        self, compiled: CompiledRegime, terms: PairTerms, motor: Pair, q: Pair, v: Pair
-    ) -> None:
+    def guard(self, course: "Course") -> None:
         """Guard the events of the pushes, for the joints that are beyond a limit."""
-        asked = self._asked(terms, motor, q, v)
+        compiled = course.compiled
+        asked = self._answer or self._ask(course, course.terms)
+        self._answer = None
         for joint, stop in self._joints:
             compiled.guard(KNEE_PUSH + joint, stop.sign * asked[joint])
         if compiled.held:
-            asked = self._asked(self._model.falling, motor, q, v)
+            asked = self._ask(course, self._model.falling)
             for joint, stop in self._joints:
                 compiled.guard(KNEE_FREE + joint, stop.sign * asked[joint])
 
@@ -206,21 +204,18 @@ class StopSwitches:
         """Accelerations of the angles where every touched stop acts that would push [rad/s^2]."""
         return self._turns(SCALAR, terms, torque, q, v, None)[1]
 
-    def _asked(self, terms: PairTerms, motor: Pair, q: Pair, v: Pair) -> list[float]:
+    def _ask(self, course: "Course", terms: PairTerms) -> tuple[float, float]:
         """Readings of the events of each joint's stop where every stop acts that would push."""
-        inertia, held, angles, rates = self._asked_at
-        if q is angles and v is rates and motor is held and terms is inertia:
-            return self._answer
-        self._asked_at = (terms, motor, q, v)
-        if len(self._joints) == 1:  # as `_turns`, of which only one reading is needed
-            ((joint, stop),) = self._joints
-            self._answer = [0.0, 0.0]
-            turn = stop.turn(q, v, self._floats.accelerations(terms, motor, q, v))
-            self._answer[joint] = SQUARE * turn
-        else:
+        motor, q, v = course.plain_motor, course.plain_q, course.plain_v
+        knee, hip = self._acting
+        if knee is not None and hip is not None:
             torque = self._floats.torque(motor, q, v)
-            self._answer = self._turns(SCALAR, terms, torque, q, v, None)[0]
-        return self._answer
+            first, second = self._turns(SCALAR, terms, torque, q, v, None)[0]
+            return first, second
+        a = self._floats.accelerations(terms, motor, q, v)
+        if knee is not None:
+            return SQUARE * knee.turn(q, v, a), 0.0
+        return 0.0, SQUARE * hip.turn(q, v, a) if hip is not None else 0.0
 
     def _turns(
         self,
