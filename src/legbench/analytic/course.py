@@ -212,7 +212,7 @@ class Course:
             foot_vel = dx + arm_vel[0], dz - model.floating.gravity * elapsed + arm_vel[1]
             self.v, lost = touchdown(ops, model.stance, model.floating, self.q, self.v, foot_vel)
             self.lost += lost
-            self._flatten()
+            self.plain_v = self.v if self._variation is None else floats(self.v)
         else:
             self.point = self.point[0] - arm[0], self.point[1] - arm[1]
             self.drift = -arm_vel[0], -arm_vel[1]

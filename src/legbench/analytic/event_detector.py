@@ -5,7 +5,7 @@ every event function that could be near zero there is made certain (`compiled_re
 that holds already, because a motor, the regime or a level has jumped, is an event at once.
 """
 
-from typing import TYPE_CHECKING, NamedTuple, final
+from typing import TYPE_CHECKING, final
 
 from legbench.analytic.compiled_regime import NEVER, NUDGE, OFF, CompiledRegime
 from legbench.analytic.parameters import Event, Kind, Watched
@@ -24,13 +24,22 @@ KINDS = {Regime.FLIGHT: Kind.FLIGHT, Regime.STANCE: Kind.STANCE}
 """Compiled equations with which a regime begins; regimes that are not listed take `Kind.FIXED`."""
 
 
-class Levels(NamedTuple):
-    """Values of the probe at which an integration stops [rad]."""
+@final
+class Levels:
+    """Values of the probe at which an integration stops.
 
-    upper: float = NEVER
-    lower: float = -NEVER
-    turns: bool = False
-    """Whether turning points of the probe stop it, too."""
+    It is no dataclass, because a hop makes several and a frozen one takes three times as long.
+
+    Attributes:
+        upper: value that stops it when the probe rises through it [rad].
+        lower: value that stops it when the probe falls through it [rad].
+        turns: whether turning points of the probe stop it, too.
+    """
+
+    __slots__ = ("lower", "turns", "upper")
+
+    def __init__(self, upper: float = NEVER, lower: float = -NEVER, turns: bool = False) -> None:
+        self.upper, self.lower, self.turns = upper, lower, turns
 
 
 SILENT = Levels()
@@ -89,7 +98,7 @@ class EventDetector:
         """Replace the levels of the probe."""
         compiled = self._compiled
         self.levels = compiled.levels = levels
-        upper, lower, self._turns = levels
+        upper, lower, self._turns = levels.upper, levels.lower, levels.turns
         compiled.lay_bounds(FALL, RISE, lower, upper)
         self._bounds = (lower - NUDGE, upper - NUDGE, self.lean - NUDGE)
         if not self._turns and self._turn != 0.0:
