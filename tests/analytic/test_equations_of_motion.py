@@ -256,7 +256,8 @@ def test_closed_form_of_touchdown_is_the_projector(design: LegDesign) -> None:
         tuple(foot.T),
     )
     assert np.max(np.abs(np.stack(closed, axis=-1) - wanted) / (1.0 + np.abs(wanted))) < 1e-12
-    inertia, after = mx.floating_mass(terms, pos), np.einsum("nij,nj->ni", mx.impact_map(terms, pos), vel)
+    inertia = mx.floating_mass(terms, pos)
+    after = np.einsum("nij,nj->ni", mx.impact_map(terms, pos), vel)
     before, left = (0.5 * np.einsum("ni,nij,nj->n", x, inertia, x) for x in (vel, after))
     assert np.max(np.abs(lost - (before - left)) / before) < 1e-12
 

@@ -11,28 +11,33 @@ until the function is `NUDGE` below zero; the event then happens that much later
 
 from typing import final
 
-from legbench.analytic.compiled import event_integrator
+from legbench.analytic.compiled import event_integrator, parameters_of, terms_of
 from legbench.analytic.equations import Pair
+from legbench.analytic.model import LegModel
 from legbench.analytic.parameters import GAIN, LEVEL, MOTOR, Event, Kind
 from legbench.analytic.state import Regime
-from legbench.analytic.terms import PairTerms
 from legbench.signals import Floats
 
 NUDGE = 1e-13
 """Distance from zero beyond which a sign is no rounding error, in units of the readings."""
 BACK = 2.0 * NUDGE
 """Distance by which the level of a falling angle is below that of a rising one [rad]."""
+CONTACT, RECOVER = int(Event.CONTACT), int(Event.RECOVER)
 LAST_LOWERED = int(Event.HIP_HIGH)
 """Number of the last event whose level is lowered for falling."""
 OFF = (0.0, 1.0)
 """Gain and level of an event that is not watched."""
+FALLS, RISES = (-1.0, 0.0), (1.0, 0.0)
+"""Gain and level of an event whose reading falls, or rises, through zero."""
+KINDS = {Regime.FLIGHT: Kind.FLIGHT, Regime.STANCE: Kind.STANCE}
+"""Compiled equations with which a regime begins; regimes that are not listed take `Kind.FIXED`."""
 NEVER = 1e6
 """Level that is never reached [rad]."""
 
 
 @final
 class CompiledRegime:
-    """A compiled regime with the parameters of one leg.
+    """A compiled regime with the parameters of one leg, given in plain floats.
 
     Attributes:
         kind: set of equations and events.
@@ -81,29 +86,29 @@ class CompiledRegime:
     )
 
     def __init__(
-        self,
-        kind: Kind,
-        regime: Regime,
-        terms: PairTerms,
-        values: list[float],
-        tolerance: float,
+        self, model: LegModel, regime: Regime, probe: Pair, tolerance: float, *, held: bool
     ) -> None:
-        self.kind, self.regime, self.terms = kind, regime, terms
+        kind = self.kind = Kind.HELD if held else KINDS.get(regime, Kind.FIXED)
+        self.regime, self.terms = regime, terms_of(model, regime)
         self.free = kind is not Kind.FIXED
         self.opposite: CompiledRegime | None = None
-        self.held = kind is Kind.HELD
+        self.held = held
         self.flies = kind is Kind.FLIGHT
         self.pushed = 0
         self.integrator = event_integrator(kind, tolerance)
         self.run = self.integrator.propagate_until
         self.state: Floats = self.integrator.state
         self.pars: Floats = self.integrator.pars
-        self.pars[:] = values[: len(self.pars)]
+        self.pars[:] = parameters_of(model, regime, probe)[: len(self.pars)]
         self.numbers, self.slots = _slots(self.state), _slots(self.pars)
         self.gain, self.level = [0.0] * len(Event), [1.0] * len(Event)
         self.moved: list[int] = []
         self.beyond = -1
         self.lean, self.levels = 0.0, None
+        if self.free:
+            self.lay(CONTACT, *(RISES if held else FALLS))
+        if held:
+            self.lay(RECOVER, *RISES)
 
     def put(self, q: Pair, v: Pair, motor: Pair) -> None:
         """Set angles [rad], rates [rad/s] and motors [rad] at time zero of the integrator."""

@@ -2,18 +2,17 @@
 
 After an event the new regime lasts a shortest time at least, at the end of which a foot that sinks
 below the ground lands, and a force that pulls lifts the foot off. The event is watched from the
-beginning all the same, because the piece then need not end there: it is only an event that comes too
-early, or a reading that has no room to fall, which makes the watch deaf until that time.
+beginning all the same, because a piece of the integration then need not end at that time. It is
+masked until then if it comes too early, or if its reading is negative from the beginning.
 """
 
 from math import cos
 from typing import TYPE_CHECKING, final
 
-from legbench.analytic.compiled_regime import NUDGE, OFF
+from legbench.analytic.compiled_regime import CONTACT, FALLS, NUDGE, OFF, RECOVER
 from legbench.analytic.equations import Pair, contact_force, free_foot_acceleration, sweep_rate
 from legbench.analytic.float_leg import FloatLeg
 from legbench.analytic.model import LegModel
-from legbench.analytic.parameters import Event
 from legbench.design.statics import GRAVITY
 
 if TYPE_CHECKING:
@@ -22,9 +21,6 @@ if TYPE_CHECKING:
 TIE = 1e-7
 """Tolerance of acceleration over gravity and of force over weight when the foot is released [-]: on
 the radial mode both vanish together, and rounding decides their signs."""
-CONTACT, RECOVER = int(Event.CONTACT), int(Event.RECOVER)
-FALLS, RISES = (-1.0, 0.0), (1.0, 0.0)
-"""Gain and level of an event whose reading falls, or rises, through zero."""
 
 
 @final
@@ -32,11 +28,20 @@ class ContactWatch:
     """Touchdown and lift-off of one course.
 
     Attributes:
-        blind: time before which the regime cannot end [s].
-        deaf: whether the event is switched off until then.
+        earliest: time before which the regime cannot end [s].
+        masked: whether the event is switched off until then.
     """
 
-    __slots__ = ("_arm", "_course", "_floats", "_half", "_min_phase", "_plain", "blind", "deaf")
+    __slots__ = (
+        "_arm",
+        "_course",
+        "_floats",
+        "_half",
+        "_min_phase",
+        "_plain",
+        "earliest",
+        "masked",
+    )
 
     def __init__(
         self, course: "Course", model: LegModel, floats: FloatLeg, arm: Pair, min_phase: float
@@ -44,22 +49,22 @@ class ContactWatch:
         self._course, self._plain, self._floats = course, model, floats
         self._arm, self._min_phase = arm, min_phase
         self._half = 0.5 * model.floating.gravity
-        self.blind, self.deaf = 0.0, False
+        self.earliest, self.masked = 0.0, False
 
     def enter(self, since: float) -> None:
         """Begin a regime."""
-        if self.deaf:
-            self._hear()
-        self.blind = since + self._min_phase
+        if self.masked:
+            self._unmask()
+        self.earliest = since + self._min_phase
 
     def due(self) -> int | None:
         """Guard touchdown or lift-off; return the event if the leg cannot stay in its regime."""
         course = self._course
         compiled = course.compiled
-        if self.deaf:
-            if course.time < self.blind:
+        if self.masked:
+            if course.time < self.earliest:
                 return None
-            self._hear()
+            self._unmask()
         if compiled.flies:
             elapsed, (q1, q2), (arm_1, arm_2) = course.elapsed, course.plain_q, self._arm
             z, dz = float(course.point[1]), float(course.drift[1])
@@ -73,10 +78,13 @@ class ContactWatch:
             force = self._floats.force(course.plain_motor, course.plain_q, course.plain_v)
         return self._liftoff(force) if force < NUDGE else None
 
-    def happens(self) -> bool:
-        """Whether the event that has been met ends the regime, or else is too early or no release."""
-        if self._course.time < self.blind:
-            self._deafen()
+    def ends_regime(self) -> bool:
+        """Whether the event that has been met ends the regime.
+
+        It does not if it is too early, which masks it, or if a foot without load would go down.
+        """
+        if self._course.time < self.earliest:
+            self._mask()
             return False
         compiled = self._course.compiled
         return compiled.flies or compiled.held or self.released() > -TIE
@@ -91,14 +99,14 @@ class ContactWatch:
             return free_foot_acceleration(plain.ops, plain.floating, q, v, a)[1] / GRAVITY
         return self._floats.released(motor, q, v)
 
-    def _deafen(self) -> None:
+    def _mask(self) -> None:
         """Switch the event off until the regime may end."""
-        self.deaf = True
+        self.masked = True
         self._course.compiled.lay(CONTACT, *OFF)
 
-    def _hear(self) -> None:
+    def _unmask(self) -> None:
         """Switch the event on again."""
-        self.deaf = False
+        self.masked = False
         self._course.compiled.lay(CONTACT, *FALLS)
 
     def _force(self) -> float:
@@ -112,7 +120,7 @@ class ContactWatch:
     def _touchdown(self, height: float) -> int | None:
         """Guard a touchdown that is near; it is due if the foot is below the ground and sinking."""
         course, compiled = self._course, self._course.compiled
-        early = course.time < self.blind
+        early = course.time < self.earliest
         if height > (-NUDGE if early else 0.0):
             compiled.guard(CONTACT, height)
             return None
@@ -121,8 +129,8 @@ class ContactWatch:
             fallen = self._plain.floating.gravity * course.elapsed
             if course.drift[1] - fallen + arm_vel[1] < 0.0:
                 return CONTACT
-            self.blind = course.time + self._min_phase
-        self._deafen()
+            self.earliest = course.time + self._min_phase
+        self._mask()
         return None
 
     def _liftoff(self, force: float) -> int | None:
@@ -130,9 +138,9 @@ class ContactWatch:
         if force >= 0.0:
             self._course.compiled.guard(CONTACT, force)
             return None
-        if self._course.time >= self.blind:
+        if self._course.time >= self.earliest:
             return CONTACT
-        self._deafen()
+        self._mask()
         return None
 
     def _held(self) -> int | None:

@@ -1,7 +1,7 @@
 """Integration of one compiled leg from event to event, each in its order and once.
 
     course = Course(model, probe=(-0.7, 0.7))
-    course.start(state)
+    course.fly(q, v, centre, velocity)
     course.hold(motor)
     what = course.go(until, Levels(upper=0.5))   # Watched, or None at `until`
     if what is Watched.CONTACT:
@@ -15,22 +15,15 @@ angles and rates are dual: the variational equations then follow piece by piece 
 from typing import final
 
 from legbench.analytic._heyoka import heyoka as hy
-from legbench.analytic.compiled import (
-    TOLERANCE,
-    foot_from_centre,
-    parameters_of,
-    steady_point,
-    terms_of,
-)
-from legbench.analytic.compiled_regime import NEVER, CompiledRegime
+from legbench.analytic.compiled import TOLERANCE, foot_from_centre
+from legbench.analytic.compiled_regime import CONTACT, NEVER, RECOVER, CompiledRegime
 from legbench.analytic.contact import MIN_PHASE
-from legbench.analytic.contact_watch import CONTACT, FALLS, RECOVER, RISES, ContactWatch
+from legbench.analytic.contact_watch import ContactWatch
 from legbench.analytic.dual import DUAL, floats, without_gradients
-from legbench.analytic.equations import Pair, sweep, sweep_height, sweep_motion, sweep_rate, touchdown
+from legbench.analytic.equations import Pair, sweep_height, sweep_motion, touchdown
 from legbench.analytic.event_detector import (
     FELL_BACK,
     HIP_HIGH,
-    KINDS,
     SEEN,
     SILENT,
     TURN,
@@ -39,7 +32,7 @@ from legbench.analytic.event_detector import (
 )
 from legbench.analytic.float_leg import FloatLeg
 from legbench.analytic.model import LegModel
-from legbench.analytic.parameters import HEIGHT, MOTOR, SPEED, Event, Kind, Watched
+from legbench.analytic.parameters import HEIGHT, MOTOR, SPEED, Event, Watched
 from legbench.analytic.state import LegState, Regime
 from legbench.analytic.stop_switches import StopSwitches
 from legbench.analytic.variation import Variation
@@ -79,7 +72,7 @@ class Course:
         stop_switches: the joint stops.
         contact: the watch over touchdown and lift-off.
         detector: the events that are watched.
-        told: the state that `state` last returned; None once the leg has moved on.
+        told: the state that was last made of this leg; None once the leg has moved on.
     """
 
     __slots__ = (
@@ -138,17 +131,9 @@ class Course:
         self.motor: Pair = (0.0, 0.0)
         self.told: LegState | None = None
 
-    def start(self, state: LegState) -> None:
-        """Set the state of the leg."""
-        ops, along = self.model.ops, steady_point(self.model, state.regime)
-        x, z = sweep(ops, state.q, along)
-        height = 0.0 if state.regime.stands else state.trunk_pos[1] + z
-        point, drift = (state.trunk_pos[0] + x, height), (0.0, 0.0)
-        if state.regime is Regime.FLIGHT:
-            x, z = sweep_rate(ops, state.q, state.v, along)
-            drift = state.trunk_vel[0] + x, state.trunk_vel[1] + z
-        self.time, self.since = state.time, state.since
-        self._put(self._compiled_for(state.regime), state.q, state.v, point, drift)
+    def begin(self, regime: Regime, q: Pair, v: Pair, point: Pair, drift: Pair) -> None:
+        """Set angles and rates, and the steady point with its velocity, at the present `time`."""
+        self._put(self._compiled_for(regime), q, v, point, drift, NEVER)
 
     def fly(self, q: Pair, v: Pair, centre: Pair, velocity: Pair, lean: float = NEVER) -> None:
         """Begin a flight at time zero, from the place and velocity of the centre of mass.
@@ -158,22 +143,6 @@ class Course:
         self.time, self.since = 0.0, -self._min_phase
         air = self._air = self._air or self._compiled_for(Regime.FLIGHT)
         self._put(air, q, v, centre, velocity, lean)
-
-    def state(self) -> LegState:
-        """State of the leg at the present time."""
-        ops, along = self.model.ops, steady_point(self.model, self.regime)
-        (x, z), (dx, dz) = self.centre() if self.compiled.flies else (self.point, self.drift)
-        inner, inner_vel = sweep(ops, self.q, along), sweep_rate(ops, self.q, self.v, along)
-        self.told = LegState(
-            time=self.time,
-            regime=self.regime,
-            q=self.q,
-            v=self.v,
-            trunk_pos=(x - inner[0], z - inner[1]),
-            trunk_vel=(dx - inner_vel[0], dz - inner_vel[1]),
-            since=self.since,
-        )
-        return self.told
 
     def centre(self) -> tuple[Pair, Pair]:
         """Place [m] and velocity [m/s] of the centre of mass in flight."""
@@ -235,7 +204,7 @@ class Course:
         for _ in EVENT_BUDGET:
             event = detector.due()
             if event is None:
-                end = contact.blind if contact.deaf and contact.blind < until else until
+                end = contact.earliest if contact.masked and contact.earliest < until else until
                 if end > self.time:
                     event = self._piece(end)
                 if event is None:
@@ -254,15 +223,6 @@ class Course:
     def compiled_regimes(self) -> list[CompiledRegime]:
         """Compiled regimes in which the leg has been so far."""
         return list(self._regimes.values())
-
-    def march(self, step: float, count: int) -> None:
-        """Take `count` steps of a fixed length, without error control and without events."""
-        for _ in range(count):
-            self.compiled.integrator.step(step)
-        self.time = self.began + count * step
-        q1, q2, v1, v2 = self.compiled.state.tolist()
-        self.q = self.plain_q = (q1, q2)
-        self.v = self.plain_v = (v1, v2)
 
     def _piece(self, until: float) -> int | None:
         """Integrate to `until` or to the next event."""
@@ -298,27 +258,22 @@ class Course:
             self._load(self._compiled_for(self.regime))
         elif event != CONTACT:
             self.stop_switches.flip(compiled, event)
-        elif self.contact.happens():
+        elif self.contact.ends_regime():
             return True
-        elif not self.contact.deaf:
+        elif not self.contact.masked:
             self._load(self._compiled_for(self.regime, held=True))
         return False
 
     def _put(
-        self, compiled: CompiledRegime, q: Pair, v: Pair, point: Pair, drift: Pair, lean: float = NEVER
+        self, compiled: CompiledRegime, q: Pair, v: Pair, point: Pair, drift: Pair, lean: float
     ) -> None:
         self.q, self.v, self.point, self.drift, self.lost = q, v, point, drift, 0.0
+        self.plain_q, self.plain_v, self.plain_motor = q, v, self.motor
+        if self._variation is not None:
+            self.plain_q, self.plain_v, self.plain_motor = floats(q), floats(v), floats(self.motor)
         self.detector.begin(lean)
-        self._flatten()
         self.stop_switches.find(self.plain_q, self.plain_v)
         self._enter(compiled)
-
-    def _flatten(self) -> None:
-        """Take the values of angles, rates and motors, on which decisions are made."""
-        self.plain_q, self.plain_v, self.plain_motor = self.q, self.v, self.motor
-        if self._variation is not None:
-            self.plain_q, self.plain_v = floats(self.q), floats(self.v)
-            self.plain_motor = floats(self.motor)
 
     def _enter(self, compiled: CompiledRegime) -> None:
         """Begin a regime at the present time."""
@@ -340,13 +295,6 @@ class Course:
     def _compiled_for(self, regime: Regime, *, held: bool = False) -> CompiledRegime:
         found = self._regimes.get((regime, held))
         if found is None:
-            kind = Kind.HELD if held else KINDS.get(regime, Kind.FIXED)
-            values = parameters_of(self.plain, regime, self.probe)
-            terms = terms_of(self.plain, regime)
-            found = CompiledRegime(kind, regime, terms, values, self._tolerance)
-            if held:
-                found.lay(RECOVER, *RISES)
-            if found.free:
-                found.lay(CONTACT, *(RISES if held else FALLS))
+            found = CompiledRegime(self.plain, regime, self.probe, self._tolerance, held=held)
             self._regimes[regime, held] = found
         return found

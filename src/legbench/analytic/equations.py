@@ -185,8 +185,10 @@ def touchdown(
     """Eq. (12) in closed form: joint rates after the foot, at `foot_vel` before, has stopped.
 
     The impulse acts on the foot alone, so in coordinates (foot, q) the momentum of q stays:
-    `M qdot+ = M qdot- + B v_foot`, `B_i = (first_i - m l2) dir'(q_i)^T`, M of Appendix I. The second
-    result is the energy that is lost, `(m v_foot^2 - (qdot+ - qdot-) . B v_foot) / 2` [J].
+    `M qdot+ = M qdot- + B v_foot`, `B_i = (first_i - m l2) dir'(q_i)^T`, M of Appendix I.
+
+    Returns the rates and the energy that is lost, `(m v_foot^2 - (qdot+ - qdot-) . B v_foot) / 2`,
+    in rad/s and J.
     """
     h1, h2 = terms.above_foot
     forward, up = foot_vel

@@ -8,8 +8,7 @@ that holds already, because a motor, the regime or a level has jumped, is an eve
 from typing import TYPE_CHECKING, final
 
 from legbench.analytic.compiled_regime import NEVER, NUDGE, OFF, CompiledRegime
-from legbench.analytic.parameters import Event, Kind, Watched
-from legbench.analytic.state import Regime
+from legbench.analytic.parameters import Event, Watched
 
 if TYPE_CHECKING:
     from legbench.analytic.course import Course
@@ -20,8 +19,6 @@ RISE, FALL, TURN, FELL, FELL_BACK = range(Event.RISE, Event.FELL_BACK + 1)
 KNEE_LOW, KNEE_HIGH, HIP_LOW, HIP_HIGH = range(Event.KNEE_LOW, Event.HIP_HIGH + 1)
 SEEN = (Watched.RISE, Watched.FALL, Watched.TURN, Watched.FELL, Watched.FELL)
 """Events of angles as the caller sees them, in their order, which are the first ones."""
-KINDS = {Regime.FLIGHT: Kind.FLIGHT, Regime.STANCE: Kind.STANCE}
-"""Compiled equations with which a regime begins; regimes that are not listed take `Kind.FIXED`."""
 
 
 @final

@@ -1,8 +1,7 @@
 """Readings of one leg on plain floats, each formula written out in one piece.
 
 They are asked for at every event of a hop, where calls and attributes of the general equations
-(`analytic.equations`) would take longer than the arithmetic. Results are equal to theirs to the last
-bit.
+(`analytic.equations`) take longer than the arithmetic.
 """
 
 from math import cos, sin

@@ -51,7 +51,7 @@ class StopSwitches:
     __slots__ = (
         "_acting",
         "_answer",
-                "_floats",
+        "_floats",
         "_free",
         "_joints",
         "_model",

@@ -36,7 +36,7 @@ class AbstractDrive(ABC):
     levels: Levels
     """Probe values at which `on_event` is to be called; the same object as long as they stay."""
     stands: bool = False
-    """Whether the foot is on the ground, which is a hint at what comes next: the law is the same."""
+    """Whether the foot is on the ground: a hint at what comes next, the law is the same."""
 
     @abstractmethod
     def restart(self) -> None:
@@ -87,8 +87,8 @@ class JumpLaw(AbstractDrive):
     Fold and load are both `y = s (k2 q2 - k1 q1) / k`, shifted by the motor position, so every
     threshold of the controller is a level of y, and every extreme one of its turning points.
 
-    A time that only has to pass is no alarm as long as nothing can depend on it: the law passes over
-    it in silence, and an event before it sets the alarm.
+    A time that only has to pass is no alarm as long as nothing can depend on it: the law passes
+    over it in silence, and an event before it sets the alarm.
 
     Attributes:
         phase: phase of the controller, which may have changed at `lapse` without notice.
