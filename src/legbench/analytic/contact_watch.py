@@ -4,6 +4,10 @@ After an event the new regime lasts a shortest time at least, at the end of whic
 below the ground lands, and a force that pulls lifts the foot off. The event is watched from the
 beginning all the same, because a piece of the integration then need not end at that time. It is
 masked until then if it comes too early, or if its reading is negative from the beginning.
+
+A foot lifts off at height zero, where its event is guarded (`compiled_regime`), so that it lands
+below the ground by the guard's distance. If it lands so slowly that this takes a noticeable time, the
+piece is taken again with the event masked at first.
 """
 
 from math import cos
@@ -23,6 +27,12 @@ TIE = 1e-7
 the radial mode both vanish together, and rounding decides their signs."""
 
 
+SLOW = 0.01
+"""Landing speed below which a guarded height is noticeable: it delays landing by 1e-11 s [m/s]."""
+Beginning = tuple[float, Pair, Pair, Pair, Pair]
+"""Time, angles, rates, and steady point with its velocity."""
+
+
 @final
 class ContactWatch:
     """Touchdown and lift-off of one course.
@@ -37,6 +47,7 @@ class ContactWatch:
         "_course",
         "_floats",
         "_half",
+        "_lifted",
         "_min_phase",
         "_plain",
         "earliest",
@@ -50,12 +61,14 @@ class ContactWatch:
         self._arm, self._min_phase = arm, min_phase
         self._half = 0.5 * model.floating.gravity
         self.earliest, self.masked = 0.0, False
+        self._lifted: Beginning | None = None
+        """Beginning of the present piece if that is a lift-off whose height is guarded."""
 
     def enter(self, since: float) -> None:
         """Begin a regime."""
         if self.masked:
             self._unmask()
-        self.earliest = since + self._min_phase
+        self.earliest, self._lifted = since + self._min_phase, None
 
     def due(self) -> int | None:
         """Guard touchdown or lift-off; return the event if the leg cannot stay in its regime."""
@@ -67,7 +80,7 @@ class ContactWatch:
             self._unmask()
         if compiled.flies:
             elapsed, (q1, q2), (arm_1, arm_2) = course.elapsed, course.plain_q, self._arm
-            z, dz = float(course.point[1]), float(course.drift[1])
+            z, dz, self._lifted = float(course.point[1]), float(course.drift[1]), None
             height = z + (dz - self._half * elapsed) * elapsed - arm_1 * cos(q1) - arm_2 * cos(q2)
             return self._touchdown(height) if height < NUDGE else None
         if compiled.held:
@@ -81,12 +94,17 @@ class ContactWatch:
     def ends_regime(self) -> bool:
         """Whether the event that has been met ends the regime.
 
-        It does not if it is too early, which masks it, or if a foot without load would go down.
+        It does not if it is too early or not exact, which masks it, or if a foot without load would
+        go down.
         """
-        if self._course.time < self.earliest:
+        course, compiled = self._course, self._course.compiled
+        if course.time < self.earliest:
             self._mask()
             return False
-        compiled = self._course.compiled
+        if self._lifted is not None and self._foot_speed() > -SLOW:
+            course.go_back(*self._lifted)
+            self._mask()
+            return False
         return compiled.flies or compiled.held or self.released() > -TIE
 
     def released(self) -> float:
@@ -123,15 +141,22 @@ class ContactWatch:
         early = course.time < self.earliest
         if height > (-NUDGE if early else 0.0):
             compiled.guard(CONTACT, height)
+            if early and course.time == course.since:
+                self._lifted = (course.time, course.q, course.v, course.point, course.drift)
             return None
         if not early:
-            arm_vel = sweep_rate(self._plain.ops, course.plain_q, course.plain_v, self._arm)
-            fallen = self._plain.floating.gravity * course.elapsed
-            if course.drift[1] - fallen + arm_vel[1] < 0.0:
+            if self._foot_speed() < 0.0:
                 return CONTACT
             self.earliest = course.time + self._min_phase
         self._mask()
         return None
+
+    def _foot_speed(self) -> float:
+        """Upward speed of the foot in flight [m/s]."""
+        course, plain = self._course, self._plain
+        arm_vel = sweep_rate(plain.ops, course.plain_q, course.plain_v, self._arm)
+        drift = float(course.drift[1]) - plain.floating.gravity * course.elapsed
+        return drift + arm_vel[1]
 
     def _liftoff(self, force: float) -> int | None:
         """Guard a lift-off that is near; it is due if the ground would have to pull."""

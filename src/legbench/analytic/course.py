@@ -264,6 +264,12 @@ class Course:
             self._load(self._compiled_for(self.regime, held=True))
         return False
 
+    def go_back(self, time: float, q: Pair, v: Pair, point: Pair, drift: Pair) -> None:
+        """Go back to the beginning of the last piece, which is to be taken again."""
+        self.time, self.q, self.v, self.point, self.drift = time, q, v, point, drift
+        self.plain_q, self.plain_v = floats(q), floats(v)
+        self._load(self.compiled)
+
     def _put(
         self, compiled: CompiledRegime, q: Pair, v: Pair, point: Pair, drift: Pair, lean: float
     ) -> None:
