@@ -150,8 +150,9 @@ class CompiledRegime:
     def restore(self) -> None:
         """Restore the levels that the guard has moved."""
         for event in self.moved:
-            self.lay(event, self.gain[event], self.level[event])
-        self.moved.clear()
+            lowered = self.gain[event] < 0.0 and event <= LAST_LOWERED
+            self.slots[LEVEL + event] = self.level[event] + (BACK if lowered else 0.0)
+        self.moved = []
 
     def guard(self, event: int, reading: float) -> bool:
         """Make an event's function negative; true if it was positive by more than rounding."""

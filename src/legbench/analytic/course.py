@@ -189,7 +189,8 @@ class Course:
         if compiled.opposite is None:
             regime = Regime.STANCE if compiled.flies else Regime.FLIGHT
             compiled.opposite = self._compiled_for(regime)
-        self._enter(compiled.opposite)
+        self.contact.enter(self.since)
+        self._load(compiled.opposite)
 
     def go(self, until: float, levels: Levels = SILENT) -> Watched | None:
         """Integrate to `until`, or to the first watched event, which is not yet applied.
@@ -279,18 +280,13 @@ class Course:
             self.plain_q, self.plain_v, self.plain_motor = floats(q), floats(v), floats(self.motor)
         self.detector.begin(lean)
         self.stop_switches.find(self.plain_q, self.plain_v)
-        self._enter(compiled)
-
-    def _enter(self, compiled: CompiledRegime) -> None:
-        """Begin a regime at the present time."""
-        self.regime, self.terms, self.told = compiled.regime, compiled.terms, None
         self.contact.enter(self.since)
         self._load(compiled)
 
     def _load(self, compiled: CompiledRegime) -> None:
         """Load the present state into a compiled regime."""
-        self.compiled = compiled
-        self.began, self.elapsed = self.time, 0.0
+        self.compiled, self.regime, self.terms = compiled, compiled.regime, compiled.terms
+        self.began, self.elapsed, self.told = self.time, 0.0, None
         compiled.put(self.plain_q, self.plain_v, self.plain_motor)
         if compiled.flies:
             compiled.slots[HEIGHT], compiled.slots[SPEED] = self.point[1], self.drift[1]

@@ -190,13 +190,10 @@ def touchdown(
     Returns the rates and the energy that is lost, `(m v_foot^2 - (qdot+ - qdot-) . B v_foot) / 2`,
     in rad/s and J.
     """
-    h1, h2 = terms.above_foot
-    forward, up = foot_vel
-    kick = (
-        h1 * (ops.cos(q[0]) * forward + ops.sin(q[0]) * up),
-        h2 * (ops.cos(q[1]) * forward + ops.sin(q[1]) * up),
-    )
-    change = pair_solve(ops, stance, q, kick)
+    (h1, h2), (q1, q2), (forward, up) = terms.above_foot, q, foot_vel
+    kick_1 = h1 * (ops.cos(q1) * forward + ops.sin(q1) * up)
+    kick_2 = h2 * (ops.cos(q2) * forward + ops.sin(q2) * up)
+    change_1, change_2 = pair_solve(ops, stance, q, (kick_1, kick_2))
     whole = terms.mass * (forward * forward + up * up)
-    lost = 0.5 * (whole - change[0] * kick[0] - change[1] * kick[1])
-    return (v[0] + change[0], v[1] + change[1]), lost
+    lost = 0.5 * (whole - change_1 * kick_1 - change_2 * kick_2)
+    return (v[0] + change_1, v[1] + change_2), lost

@@ -135,12 +135,12 @@ class JumpLaw(AbstractDrive):
         """Advance the phase after an event of the probe."""
         if what is TURN:
             self._turned(value, time)
+        elif self.phase is PUSH:
+            self._release(time)
         elif self.phase is COMPRESS:
             self._leave(value)
             if value < self._unloaded:
                 self._release(time)
-        elif self.phase is PUSH:
-            self._release(time)
         elif what is FALL:
             self._enter(FLIGHT)
         elif self.phase is RELEASE and time < self.lapse:
