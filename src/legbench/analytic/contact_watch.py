@@ -80,7 +80,7 @@ class ContactWatch:
             self._unmask()
         if compiled.flies:
             elapsed, (q1, q2), (arm_1, arm_2) = course.elapsed, course.plain_q, self._arm
-            z, dz, self._lifted = float(course.point[1]), float(course.drift[1]), None
+            (_, z), (_, dz), self._lifted = course.point, course.drift, None
             height = z + (dz - self._half * elapsed) * elapsed - arm_1 * cos(q1) - arm_2 * cos(q2)
             return self._touchdown(height) if height < NUDGE else None
         if compiled.held:

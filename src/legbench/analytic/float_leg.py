@@ -73,7 +73,8 @@ class FloatLeg:
 
     def released(self, motor: Pair, q: Pair, v: Pair) -> float:
         """Upward acceleration of the foot tip if nothing held it, over gravity [-]."""
-        (a1, a2), (arm_1, arm_2) = self.accelerations(self._falling, motor, q, v), self._arm
-        turned = arm_1 * (sin(q[0]) * a1 + cos(q[0]) * (v[0] * v[0]))
-        turned += arm_2 * (sin(q[1]) * a2 + cos(q[1]) * (v[1] * v[1]))
+        a1, a2 = self.accelerations(self._falling, motor, q, v)
+        (q1, q2), (v1, v2), (arm_1, arm_2) = q, v, self._arm
+        turned = arm_1 * (sin(q1) * a1 + cos(q1) * (v1 * v1))
+        turned += arm_2 * (sin(q2) * a2 + cos(q2) * (v2 * v2))
         return (turned - self._gravity) / GRAVITY

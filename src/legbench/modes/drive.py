@@ -15,7 +15,7 @@ from legbench.design import LegDesign
 from legbench.design.statics import Support
 from legbench.kinematics import ModalConvention
 
-SCALE = math.sqrt(0.5)
+SCALE, INF = math.sqrt(0.5), math.inf
 CROSSED = 1e-9
 """Largest reading beyond a level that has been crossed and not jumped over [rad]."""
 FLIGHT, COMPRESS = JumpPhase.FLIGHT, JumpPhase.COMPRESS
@@ -60,7 +60,7 @@ class Passive(AbstractDrive):
     """Motors that are held in place."""
 
     probe = (-SCALE, SCALE)
-    alarm = math.inf
+    alarm = INF
     levels = SILENT
 
     def __init__(self, motor: Pair) -> None:
@@ -144,7 +144,7 @@ class JumpLaw(AbstractDrive):
         elif what is FALL:
             self._enter(FLIGHT)
         elif self.phase is RELEASE and time < self.lapse:
-            self.levels, self.alarm, self.lapse = SILENT, self.lapse, math.inf
+            self.levels, self.alarm, self.lapse = SILENT, self.lapse, INF
         else:
             self._enter(FLIGHT)
             self._load(time, rises=self.stands and value - self._loaded < CROSSED)
@@ -173,7 +173,7 @@ class JumpLaw(AbstractDrive):
         elif time >= self.lapse:
             self._leave(value)
         else:
-            self.levels, self.alarm, self.lapse = self._in_doubt, self.lapse, math.inf
+            self.levels, self.alarm, self.lapse = self._in_doubt, self.lapse, INF
 
     def _load(self, time: float, *, rises: bool) -> None:
         """Wait for a load to last; one that rises can only fall after a turn."""
@@ -203,7 +203,7 @@ class JumpLaw(AbstractDrive):
 
     def _enter(self, phase: JumpPhase) -> None:
         self.phase, self.levels = phase, self._in_flight
-        self.alarm = self.lapse = math.inf
+        self.alarm = self.lapse = INF
         self.motor = self._stretched if phase is PUSH else self._folded
 
     def _load_level(self, load: float, motor: Pair) -> float:
