@@ -17,9 +17,8 @@ from random_hops import random_case, told, tools_of
 from reference.verdicts import judge
 
 from legbench.analytic.course import Course
-from legbench.analytic.event_detector import Levels
 from legbench.analytic.parameters import PUSHES, Event
-from legbench.analytic.taylor import MAP_TOLERANCE, TaylorLeg, Watched
+from legbench.analytic.taylor import MAP_TOLERANCE, Levels, TaylorLeg, Watched
 from legbench.modes.drive import JumpLaw, Passive
 from legbench.modes.hop import FALLEN, Apex, Ending, return_map, settle
 

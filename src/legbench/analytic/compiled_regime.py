@@ -22,6 +22,7 @@ NUDGE = 1e-13
 """Distance from zero beyond which a sign is no rounding error, in units of the readings."""
 BACK = 2.0 * NUDGE
 """Distance by which the level of a falling angle is below that of a rising one [rad]."""
+RISE, FALL, TURN, FELL, FELL_BACK = range(Event.RISE, Event.FELL_BACK + 1)
 CONTACT, RECOVER = int(Event.CONTACT), int(Event.RECOVER)
 LAST_LOWERED = int(Event.HIP_HIGH)
 """Number of the last event whose level is lowered for falling."""
@@ -33,6 +34,28 @@ KINDS = {Regime.FLIGHT: Kind.FLIGHT, Regime.STANCE: Kind.STANCE}
 """Compiled equations with which a regime begins; regimes that are not listed take `Kind.FIXED`."""
 NEVER = 1e6
 """Level that is never reached [rad]."""
+
+
+@final
+class Levels:
+    """Values of the probe at which an integration stops.
+
+    It is no dataclass, because a hop makes several and a frozen one takes three times as long.
+
+    Attributes:
+        upper: value that stops it when the probe rises through it [rad].
+        lower: value that stops it when the probe falls through it [rad].
+        turns: whether turning points of the probe stop it, too.
+    """
+
+    __slots__ = ("lower", "turns", "upper")
+
+    def __init__(self, upper: float = NEVER, lower: float = -NEVER, turns: bool = False) -> None:
+        self.upper, self.lower, self.turns = upper, lower, turns
+
+
+SILENT = Levels()
+"""Levels that are never reached, so that no value of the probe stops an integration."""
 
 
 @final
@@ -104,7 +127,7 @@ class CompiledRegime:
         self.gain, self.level = [0.0] * len(Event), [1.0] * len(Event)
         self.moved: list[int] = []
         self.beyond = -1
-        self.lean, self.levels = 0.0, None
+        self.lean, self.levels = 0.0, SILENT
         if self.free:
             self.lay(CONTACT, *(RISES if held else FALLS))
         if held:
@@ -127,25 +150,30 @@ class CompiledRegime:
             level += BACK
         self.slots[LEVEL + event] = level
 
-    def lay_bounds(self, fall: int, rise: int, lower: float, upper: float) -> None:
-        """Set two events: a reading falls through `lower`, and rises through `upper`.
+    def lay_levels(self, levels: Levels) -> None:
+        """Set the levels of the probe: it rises through `upper`, and falls through `lower`.
 
-        A bound as far from zero as `NEVER` switches its event off.
+        A level as far from zero as `NEVER` switches its event off.
         """
+        self.levels, upper, lower = levels, levels.upper, levels.lower
         gain, level, slots = self.gain, self.level, self.slots
         if upper < NEVER:
-            gain[rise] = slots[GAIN + rise] = 1.0
-            level[rise] = slots[LEVEL + rise] = upper
-        elif gain[rise] != 0.0:
-            gain[rise] = slots[GAIN + rise] = 0.0
-            level[rise] = slots[LEVEL + rise] = 1.0
+            gain[RISE] = slots[GAIN + RISE] = 1.0
+            level[RISE] = slots[LEVEL + RISE] = upper
+        elif gain[RISE] != 0.0:
+            self.lay(RISE, *OFF)
         if lower > -NEVER:
-            gain[fall] = slots[GAIN + fall] = -1.0
-            level[fall] = -lower
-            slots[LEVEL + fall] = BACK - lower
-        elif gain[fall] != 0.0:
-            gain[fall] = slots[GAIN + fall] = 0.0
-            level[fall] = slots[LEVEL + fall] = 1.0
+            gain[FALL] = slots[GAIN + FALL] = -1.0
+            level[FALL] = -lower
+            slots[LEVEL + FALL] = BACK - lower
+        elif gain[FALL] != 0.0:
+            self.lay(FALL, *OFF)
+
+    def lay_lean(self, lean: float) -> None:
+        """Set the largest |q1 + q2| of a leg that has not fallen [rad]; `NEVER` for none."""
+        self.lean = lean
+        for event, gain in ((FELL, 1.0), (FELL_BACK, -1.0)):
+            self.lay(event, *((gain, lean) if lean < NEVER else OFF))
 
     def restore(self) -> None:
         """Restore the levels that the guard has moved."""

@@ -16,20 +16,21 @@ from typing import final
 
 from legbench.analytic._heyoka import heyoka as hy
 from legbench.analytic.compiled import TOLERANCE, foot_from_centre
-from legbench.analytic.compiled_regime import CONTACT, NEVER, RECOVER, CompiledRegime
+from legbench.analytic.compiled_regime import (
+    CONTACT,
+    FELL_BACK,
+    NEVER,
+    RECOVER,
+    SILENT,
+    TURN,
+    CompiledRegime,
+    Levels,
+)
 from legbench.analytic.contact import MIN_PHASE
 from legbench.analytic.contact_watch import ContactWatch
 from legbench.analytic.dual import DUAL, floats, without_gradients
 from legbench.analytic.equations import Pair, sweep_height, sweep_motion, touchdown
-from legbench.analytic.event_detector import (
-    FELL_BACK,
-    HIP_HIGH,
-    SEEN,
-    SILENT,
-    TURN,
-    EventDetector,
-    Levels,
-)
+from legbench.analytic.event_detector import HIP_HIGH, SEEN, EventDetector
 from legbench.analytic.float_leg import FloatLeg
 from legbench.analytic.model import LegModel
 from legbench.analytic.parameters import HEIGHT, MOTOR, SPEED, Event, Watched

@@ -7,7 +7,19 @@ that holds already, because a motor, the regime or a level has jumped, is an eve
 
 from typing import TYPE_CHECKING, final
 
-from legbench.analytic.compiled_regime import NEVER, NUDGE, OFF, CompiledRegime
+from legbench.analytic.compiled_regime import (
+    FALL,
+    FELL,
+    FELL_BACK,
+    NEVER,
+    NUDGE,
+    OFF,
+    RISE,
+    SILENT,
+    TURN,
+    CompiledRegime,
+    Levels,
+)
 from legbench.analytic.parameters import Event, Watched
 
 if TYPE_CHECKING:
@@ -15,32 +27,9 @@ if TYPE_CHECKING:
 
 JUMPED = 1e-9
 """Rate beyond zero that a turning point cannot leave by rounding, only an impact [rad/s]."""
-RISE, FALL, TURN, FELL, FELL_BACK = range(Event.RISE, Event.FELL_BACK + 1)
 KNEE_LOW, KNEE_HIGH, HIP_LOW, HIP_HIGH = range(Event.KNEE_LOW, Event.HIP_HIGH + 1)
 SEEN = (Watched.RISE, Watched.FALL, Watched.TURN, Watched.FELL, Watched.FELL)
 """Events of angles as the caller sees them, in their order, which are the first ones."""
-
-
-@final
-class Levels:
-    """Values of the probe at which an integration stops.
-
-    It is no dataclass, because a hop makes several and a frozen one takes three times as long.
-
-    Attributes:
-        upper: value that stops it when the probe rises through it [rad].
-        lower: value that stops it when the probe falls through it [rad].
-        turns: whether turning points of the probe stop it, too.
-    """
-
-    __slots__ = ("lower", "turns", "upper")
-
-    def __init__(self, upper: float = NEVER, lower: float = -NEVER, turns: bool = False) -> None:
-        self.upper, self.lower, self.turns = upper, lower, turns
-
-
-SILENT = Levels()
-"""Levels that are never reached, so that no value of the probe stops an integration."""
 
 
 @final
@@ -81,8 +70,7 @@ class EventDetector:
         if compiled.moved:
             compiled.restore()
         if compiled.lean != self.lean:
-            compiled.lean = self.lean
-            compiled.lay_bounds(FELL, FELL_BACK, -self.lean, self.lean)
+            compiled.lay_lean(self.lean)
         switches = self._course.stop_switches
         if compiled.beyond != switches.beyond:
             switches.lay(compiled)
@@ -93,14 +81,12 @@ class EventDetector:
 
     def lay(self, levels: Levels) -> None:
         """Replace the levels of the probe."""
-        compiled = self._compiled
-        self.levels = compiled.levels = levels
-        upper, lower, self._turns = levels.upper, levels.lower, levels.turns
-        compiled.lay_bounds(FALL, RISE, lower, upper)
-        self._bounds = (lower - NUDGE, upper - NUDGE, self.lean - NUDGE)
-        if not self._turns and self._turn != 0.0:
+        self._compiled.lay_levels(levels)
+        self.levels, self._turns = levels, levels.turns
+        self._bounds = (levels.lower - NUDGE, levels.upper - NUDGE, self.lean - NUDGE)
+        if self._turn != 0.0 and not self._turns:
             self._turn = 0.0
-            compiled.lay(TURN, *OFF)
+            self._compiled.lay(TURN, *OFF)
 
     def turned(self) -> None:
         """Watch the probe's next turning point: a minimum after a maximum, or the reverse."""

@@ -116,8 +116,9 @@ class StopSwitches:
 
     def cross(self, compiled: CompiledRegime, event: int) -> None:
         """Note that a joint has gone beyond a limit, or has come back, and watch the way back."""
-        self._change(self.beyond ^ 1 << event - FIRST)
-        self._lay_limit(compiled, event - FIRST)
+        index = event - FIRST
+        self._change(self.beyond ^ 1 << index)
+        self._lay_limit(compiled, index)
         compiled.beyond = self.beyond
 
     def _change(self, beyond: int) -> None:

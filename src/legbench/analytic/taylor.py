@@ -9,12 +9,11 @@ from dataclasses import replace
 from typing import final
 
 from legbench.analytic.compiled import TOLERANCE, event_integrator, steady_point
-from legbench.analytic.compiled_regime import KINDS
+from legbench.analytic.compiled_regime import KINDS, SILENT, Levels
 from legbench.analytic.contact import MIN_PHASE
 from legbench.analytic.course import Course
 from legbench.analytic.dual import DUAL
 from legbench.analytic.equations import Pair, sweep_motion
-from legbench.analytic.event_detector import SILENT, Levels
 from legbench.analytic.model import LegModel
 from legbench.analytic.parameters import Kind, Watched
 from legbench.analytic.state import LegState, Regime, Transition

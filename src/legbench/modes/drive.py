@@ -6,9 +6,9 @@ from typing import final
 
 import numpy as np
 
-from legbench.analytic.compiled_regime import NEVER
+from legbench.analytic.compiled_regime import NEVER, SILENT, Levels
 from legbench.analytic.equations import Pair
-from legbench.analytic.taylor import SILENT, Levels, Watched
+from legbench.analytic.parameters import Watched
 from legbench.control import JumpConfig, LegTargets
 from legbench.control.jump_rules import JumpPhase, phase_exits
 from legbench.design import LegDesign
@@ -146,7 +146,7 @@ class JumpLaw(AbstractDrive):
         elif self.phase is RELEASE and time < self.lapse:
             self.levels, self.alarm, self.lapse = SILENT, self.lapse, INF
         else:
-            self._enter(FLIGHT)
+            self.phase = FLIGHT
             self._load(time, rises=self.stands and value - self._loaded < CROSSED)
 
     def on_alarm(self, value: float, time: float) -> None:
@@ -179,9 +179,9 @@ class JumpLaw(AbstractDrive):
         """Wait for a load to last; one that rises can only fall after a turn."""
         lasted = time + self._dwell[FLIGHT]
         if rises:
-            self.levels, self.lapse = self._rising, lasted
+            self.levels, self.alarm, self.lapse = self._rising, INF, lasted
         else:
-            self.levels, self.alarm = self._in_doubt, lasted
+            self.levels, self.alarm, self.lapse = self._in_doubt, lasted, INF
 
     def _release(self, time: float) -> None:
         """Let the motors go back, and watch for a load, which counts after some time only."""
@@ -190,7 +190,11 @@ class JumpLaw(AbstractDrive):
 
     def _leave(self, value: float) -> None:
         """Go on to the next phase, whose extreme is searched from `value` on."""
-        self._enter(COMPRESS if self.phase is FLIGHT else PUSH)
+        self.alarm = self.lapse = INF
+        if self.phase is FLIGHT:
+            self.phase = COMPRESS
+        else:
+            self.phase, self.motor = PUSH, self._stretched
         self._search(value)
 
     def _search(self, extreme: float) -> None:
@@ -202,9 +206,9 @@ class JumpLaw(AbstractDrive):
             self.levels = Levels(extreme + self._turn, self._unloaded, True)
 
     def _enter(self, phase: JumpPhase) -> None:
-        self.phase, self.levels = phase, self._in_flight
+        """Enter a phase in which the leg is in the air, or about to be."""
+        self.phase, self.motor, self.levels = phase, self._folded, self._in_flight
         self.alarm = self.lapse = INF
-        self.motor = self._stretched if phase is PUSH else self._folded
 
     def _load_level(self, load: float, motor: Pair) -> float:
         """The y of a load [N m] at a motor position."""
