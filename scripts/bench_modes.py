@@ -14,6 +14,7 @@ from the start of Python to the first hop of a new leg, nothing compiled yet and
 """
 
 import argparse
+import copy
 import os
 import subprocess
 import sys
@@ -45,6 +46,10 @@ from legbench.signals import Floats
 DESIGN = Path(__file__).parents[1] / "models" / "optimal.toml"
 SECONDS = 0.58
 BOUND = 50.0
+OVER_BARE = 1.5
+"""Largest time of a hop over that of heyoka alone on the same pieces [-]."""
+ROUNDS = (40, 50)
+"""Times in which hops and pieces are measured in turn, and repetitions in each [-]."""
 MAPS = f"fast, {MAP_TOLERANCE:g}"
 Motor = tuple[float, float]
 
@@ -145,31 +150,38 @@ def over_bare(name: str, tolerance: float) -> tuple[float, float]:
     """A hop [s], and heyoka's own share of it [s].
 
     The share is that of the same calls in their order, each from the same state to the same event,
-    without what lies between them and without setting the state.
+    without what lies between them and without setting the state. It is the sum of each call's least
+    time, and the hop the least of whole hops; both are measured in turn.
     """
     design = load_design(DESIGN.parent / f"{name}.toml")
     law = JumpLaw(JumpConfig(), design)
     leg = TaylorLeg(LegModel.of(design), probe=law.probe, tolerance=tolerance)
     start = Apex(height=0.27, speed=0.0, z1=0.0, z2=0.6, dz1=0.0, dz2=0.0)
     apex = settle(leg, law, start, 30)[-1]
-    hop = best({"hop": (lambda: return_map(leg, law, apex), 1)}, 500)["hop"]
     pieces: list[tuple[Any, Floats, Floats, float, tuple[Any, ...]]] = []
-    for compiled in leg.course.compiled_regimes():
+    return_map(leg, law, apex)
+    regimes = leg.course.compiled_regimes()
+    for compiled in regimes:
+        real, alone = compiled.integrator, copy.deepcopy(compiled.integrator)
 
-        def noted(*until: Any, real: Any = compiled.integrator) -> Any:
-            pieces.append((real, real.state.copy(), real.pars.copy(), real.time, until))
+        def noted(*until: Any, real: Any = real, alone: Any = alone) -> Any:
+            pieces.append((alone, real.state.copy(), real.pars.copy(), real.time, until))
             return real.propagate_until(*until)
 
         compiled.run = noted
     return_map(leg, law, apex)
-    least = [float("inf")] * len(pieces)
-    for _ in range(500):
-        for index, (real, state, pars, begin, until) in enumerate(pieces):
-            real.state[:], real.pars[:], real.time = state, pars, begin
-            real.reset_cooldowns()
-            began = time.perf_counter()
-            real.propagate_until(*until)
-            least[index] = min(least[index], time.perf_counter() - began)
+    for compiled in regimes:
+        compiled.run = compiled.integrator.propagate_until
+    hop, least = float("inf"), [float("inf")] * len(pieces)
+    for _ in range(ROUNDS[0]):
+        hop = min(hop, best({"hop": (lambda: return_map(leg, law, apex), 1)}, ROUNDS[1])["hop"])
+        for _ in range(ROUNDS[1]):
+            for index, (real, state, pars, begin, until) in enumerate(pieces):
+                real.state[:], real.pars[:], real.time = state, pars, begin
+                real.reset_cooldowns()
+                began = time.perf_counter()
+                real.propagate_until(*until)
+                least[index] = min(least[index], time.perf_counter() - began)
     return hop, sum(least)
 
 
@@ -219,13 +231,15 @@ def basin(points: int) -> tuple[float, float]:
         return time.perf_counter() - began, sum(os.times()[:4]) - busy
 
 
-def figures(points: int) -> None:
-    """Print what has no bound here."""
+def figures(points: int) -> float:
+    """Print what stands beside the first table; return the largest ratio of a hop to heyoka."""
+    worst = 0.0
     for name, rate in legs_a_second().items():
         print(f"2 s of FFS, {name}: {rate:.0f} legs a second")
     for name in ("prototype", "optimal"):
         for tolerance in (MAP_TOLERANCE, TOLERANCE):
             hop, bare = over_bare(name, tolerance)
+            worst = max(worst, hop / bare)
             print(
                 f"hop of {name} at {tolerance:g}: {1e6 * hop:.0f} us, heyoka alone on its pieces "
                 f"{1e6 * bare:.0f} us, ratio {hop / bare:.2f}"
@@ -239,6 +253,7 @@ def figures(points: int) -> None:
         print(
             f"basin, {points} x {points}, two processes: {wall:.1f} s, processor time {busy:.1f} s"
         )
+    return worst
 
 
 def main() -> int:
@@ -286,11 +301,15 @@ def main() -> int:
         print(
             f"{name:<16}{1e3 * seconds:10.3f}{wrong[name]:12.1e}{ratios[0]:12.1f}{ratios[1]:12.1f}"
         )
-    figures(flags.basin)
+    worst = figures(flags.basin)
     ratio = taken["RK45, matrices"] / taken[MAPS]
-    good = ratio >= BOUND and wrong[MAPS] < min(wrong[other] for other in slow)
-    print("ok" if good else f"below the bound of {BOUND:g} times at a smaller error")
-    return 0 if good else 1
+    faults = []
+    if not (ratio >= BOUND and wrong[MAPS] < min(wrong[other] for other in slow)):
+        faults.append(f"below the bound of {BOUND:g} times at a smaller error")
+    if worst > OVER_BARE:
+        faults.append(f"a hop takes {worst:.3f} times as long as heyoka, bound {OVER_BARE:g}")
+    print("; ".join(faults) or "ok")
+    return 1 if faults else 0
 
 
 if __name__ == "__main__":

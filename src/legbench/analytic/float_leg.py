@@ -26,15 +26,15 @@ class FloatLeg:
 
     def __init__(self, model: LegModel, arm: Pair) -> None:
         floating, stance = model.floating, model.stance
+        weight = floating.mass * GRAVITY
         self._springs = (*model.stiffness, *model.damping)
         self._stance = (
             *self._springs,
             *stance.inertia,
             stance.coupling,
             *stance.moment,
-            *floating.above_foot,
-            floating.mass * floating.gravity,
-            floating.mass * GRAVITY,
+            *(moment / weight for moment in floating.above_foot),
+            floating.gravity / GRAVITY,
         )
         self._arm, self._falling, self._gravity = arm, model.falling, floating.gravity
 
@@ -59,7 +59,7 @@ class FloatLeg:
 
     def force(self, motor: Pair, q: Pair, v: Pair) -> float:
         """Vertical contact force on the standing foot over the weight [-]."""
-        k1, k2, d1, d2, i1, i2, mixed, g1, g2, h1, h2, carried, weight = self._stance
+        k1, k2, d1, d2, i1, i2, mixed, g1, g2, h1, h2, carried = self._stance
         (m1, m2), (q1, q2), (v1, v2) = motor, q, v
         s1, s2 = sin(q1), sin(q2)
         coupled, swirl = mixed * cos(q1 - q2), mixed * sin(q1 - q2)
@@ -68,8 +68,8 @@ class FloatLeg:
         right_2 = k2 * (m2 - q2) - d2 * v2 + swirl * square_1 - g2 * s2
         turned = h1 * s1 * (i2 * right_1 - coupled * right_2)
         turned += h2 * s2 * (i1 * right_2 - coupled * right_1)
-        lifted = turned / (i1 * i2 - coupled * coupled)
-        return (lifted + h1 * cos(q1) * square_1 + h2 * cos(q2) * square_2 + carried) / weight
+        lifted = turned / (i1 * i2 - coupled * coupled) + carried
+        return lifted + h1 * cos(q1) * square_1 + h2 * cos(q2) * square_2
 
     def released(self, motor: Pair, q: Pair, v: Pair) -> float:
         """Upward acceleration of the foot tip if nothing held it, over gravity [-]."""

@@ -26,6 +26,7 @@ FALLEN = 1.2
 """Polar angle |x1| at which the leg counts as fallen [rad]."""
 CALLS = 400
 """Largest number of events in one hop [-]."""
+BUDGET = range(CALLS)
 NAMES = ("height", "speed", "z1", "z2", "dz1", "dz2")
 SCALE = math.sqrt(0.5)
 CONTACT, FELL = Watched.CONTACT, Watched.FELL
@@ -140,7 +141,7 @@ def hop(leg: TaylorLeg, drive: AbstractDrive, start: Apex) -> Hop:
     touchdown = liftoff = math.nan
     apex, landed, ending = math.inf, False, FAULT
     try:
-        for _ in range(CALLS):
+        for _ in BUDGET:
             alarm = drive.alarm
             until = alarm if alarm < HORIZON else HORIZON
             if course.time <= apex <= until:
