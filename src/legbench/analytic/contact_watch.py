@@ -6,8 +6,8 @@ beginning all the same, because a piece of the integration then need not end at 
 masked until then if it comes too early, or if its reading is negative from the beginning.
 
 A foot lifts off at height zero, where its event is guarded (`compiled_regime`), so that it lands
-below the ground by the guard's distance. If it lands so slowly that this takes a noticeable time, the
-piece is taken again with the event masked at first.
+below the ground by the guard's distance. If it lands so slowly that this takes a noticeable time,
+the piece is taken again with the event masked at first.
 """
 
 from math import cos
@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, final
 from legbench.analytic.compiled_regime import CONTACT, FALLS, NUDGE, OFF, RECOVER
 from legbench.analytic.equations import Pair, contact_force, free_foot_acceleration, sweep_rate
 from legbench.analytic.float_leg import FloatLeg
-from legbench.analytic.model import LegModel
 from legbench.design.statics import GRAVITY
 
 if TYPE_CHECKING:
@@ -54,12 +53,10 @@ class ContactWatch:
         "masked",
     )
 
-    def __init__(
-        self, course: "Course", model: LegModel, floats: FloatLeg, arm: Pair, min_phase: float
-    ) -> None:
-        self._course, self._plain, self._floats = course, model, floats
+    def __init__(self, course: "Course", floats: FloatLeg, arm: Pair, min_phase: float) -> None:
+        self._course, self._plain, self._floats = course, course.plain, floats
         self._arm, self._min_phase = arm, min_phase
-        self._half = 0.5 * model.floating.gravity
+        self._half = 0.5 * course.plain.floating.gravity
         self.earliest, self.masked = 0.0, False
         self._lifted: Beginning | None = None
         """Beginning of the present piece if that is a lift-off whose height is guarded."""

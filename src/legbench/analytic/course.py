@@ -47,7 +47,7 @@ one any number."""
 TIME_LIMIT = int(hy.taylor_outcome.time_limit)
 EVENTS = len(Event)
 """Number of events that an integrator may watch [-]."""
-TOUCHED = Watched.CONTACT
+TOUCHED, FLIGHT, STANCE = Watched.CONTACT, Regime.FLIGHT, Regime.STANCE
 
 
 @final
@@ -124,10 +124,9 @@ class Course:
         self._regimes: dict[tuple[Regime, bool], CompiledRegime] = {}
         self._air: CompiledRegime | None = None
         self._variation = Variation(tolerance) if model.ops is DUAL else None
-        arm = floats(self._arm)
-        quick = FloatLeg(self.plain, arm)
+        quick = FloatLeg(self.plain, floats(self._arm))
         self.stop_switches = StopSwitches(self.plain, quick)
-        self.contact = ContactWatch(self, self.plain, quick, arm, min_phase)
+        self.contact = ContactWatch(self, quick, floats(self._arm), min_phase)
         self.detector = EventDetector(self)
         self.motor: Pair = (0.0, 0.0)
         self.told: LegState | None = None
@@ -142,7 +141,7 @@ class Course:
         `lean` is the largest |q1 + q2|, twice the polar angle, of a leg that has not fallen [rad].
         """
         self.time, self.since = 0.0, -self._min_phase
-        air = self._air = self._air or self._compiled_for(Regime.FLIGHT)
+        air = self._air = self._air or self._compiled_for(FLIGHT)
         self._put(air, q, v, centre, velocity, lean)
 
     def centre(self) -> tuple[Pair, Pair]:
@@ -188,8 +187,7 @@ class Course:
             self.drift = -arm_vel[0], -arm_vel[1]
         self.since = self.time
         if compiled.opposite is None:
-            regime = Regime.STANCE if compiled.flies else Regime.FLIGHT
-            compiled.opposite = self._compiled_for(regime)
+            compiled.opposite = self._compiled_for(STANCE if compiled.flies else FLIGHT)
         self.contact.enter(self.since)
         self._load(compiled.opposite)
 
@@ -209,15 +207,14 @@ class Course:
                 end = contact.earliest if contact.masked and contact.earliest < until else until
                 if end > self.time:
                     event = self._piece(end)
-                if event is None:
-                    if self.time >= until:
-                        return None
-                    continue
-            if event <= FELL_BACK:
+            if event is None:
+                if self.time >= until:
+                    return None
+            elif event <= FELL_BACK:
                 if event == TURN:
                     detector.turned()
                 return SEEN[event]
-            if self._handle(event):
+            elif self._handle(event):
                 return TOUCHED
         why = f"integration failed at t = {self.time:.6f} s: the leg chatters"
         raise PlantFault("integration failed", why)
