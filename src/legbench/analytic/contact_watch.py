@@ -76,6 +76,9 @@ class ContactWatch:
                 return None
             self._unmask()
         if compiled.flies:
+            if course.time == course.since:
+                self._lift()
+                return None
             elapsed, (q1, q2), (arm_1, arm_2) = course.elapsed, course.plain_q, self._arm
             (_, z), (_, dz), self._lifted = course.point, course.drift, None
             height = z + (dz - self._half * elapsed) * elapsed - arm_1 * cos(q1) - arm_2 * cos(q2)
@@ -132,14 +135,18 @@ class ContactWatch:
         weight = plain.floating.mass * GRAVITY
         return contact_force(plain.ops, plain.floating, q, v, a)[1] / weight
 
+    def _lift(self) -> None:
+        """Guard a foot that lifts off, which is at height zero."""
+        course = self._course
+        course.compiled.guard(CONTACT, 0.0)
+        self._lifted = (course.time, course.q, course.v, course.point, course.drift)
+
     def _touchdown(self, height: float) -> int | None:
         """Guard a touchdown that is near; it is due if the foot is below the ground and sinking."""
         course, compiled = self._course, self._course.compiled
         early = course.time < self.earliest
         if height > (-NUDGE if early else 0.0):
             compiled.guard(CONTACT, height)
-            if early and course.time == course.since:
-                self._lifted = (course.time, course.q, course.v, course.point, course.drift)
             return None
         if not early:
             if self._foot_speed() < 0.0:

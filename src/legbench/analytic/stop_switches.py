@@ -15,7 +15,7 @@ from legbench.analytic.equations import SCALAR, Ops, Pair, Term, pair_accelerati
 from legbench.analytic.float_leg import FloatLeg
 from legbench.analytic.model import LegModel
 from legbench.analytic.parameters import FREE_PUSHES, PUSHES, Event
-from legbench.analytic.stops import TIME_CONSTANT, Stop
+from legbench.analytic.stops import SQUARE, Stop
 from legbench.analytic.terms import PairTerms
 
 if TYPE_CHECKING:
@@ -27,8 +27,6 @@ FIRST = int(Event.KNEE_LOW)
 """Number of the first of the four events in which a joint meets or leaves a limit."""
 KNEE_PUSH, KNEE_FREE = int(Event.KNEE_PUSH), int(Event.KNEE_FREE)
 """Numbers of the events of the knee's stop; those of the hip's come next."""
-SQUARE = TIME_CONSTANT**2
-"""Factor of a stop's acceleration in its reading [s^2]."""
 
 Acting = tuple[int, Stop]
 """Joint that is beyond a limit, 0 for the knee and 1 for the hip, and the stop that acts on it."""
