@@ -45,7 +45,7 @@ class Variation:
             event: the event that ended it, if one did.
         """
         compiled, plain = course.compiled, course.plain
-        time = float(compiled.integrator.time)
+        time = float(course.elapsed)
         varied = parameters_of(course.model, course.regime, course.probe)[:MOTOR]
         start = [*course.q, *course.v]
         moved = self._moved(start, compiled.pars, time, [*varied, *course.motor])
@@ -68,7 +68,7 @@ class Variation:
             course.point, course.drift = course.centre()
             compiled.pars[HEIGHT], compiled.pars[SPEED] = course.point[1], course.drift[1]
         course.began = course.time
-        compiled.integrator.time = 0.0
+        compiled.integrator.time = course.elapsed = 0.0
 
     def _moved(self, start: list[float], pars: Floats, time: float, varied: list[float]) -> Floats:
         """Derivative of the state at a fixed time by the seeds (4, m).
