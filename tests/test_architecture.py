@@ -5,8 +5,10 @@ import re
 import subprocess
 import sys
 import tomllib
+from graphlib import TopologicalSorter
 from pathlib import Path
 
+import grimp
 import pytest
 
 ROOT = Path(__file__).parents[1]
@@ -53,6 +55,18 @@ KEEP_STOPPING = ("stop.py", "sdo_stop.py", "port.py", "link_end.py", "can.py", "
 """On the way to rest one failure must not prevent the next step, whatever a driver raises."""
 GUESTS = ("loop.py", "onlooker.py", "each_leg.py")
 """Controllers, plants and onlookers of others may raise anything; it is told as their failure."""
+
+
+def test_no_module_needs_itself_through_others() -> None:
+    """Imports run one way, those for the type checker and those inside functions too."""
+    graph = grimp.build_graph("legbench")
+    face = {"legbench"}  # It names for type checkers what it loads only when it is asked for.
+    TopologicalSorter(
+        {
+            module: graph.find_modules_directly_imported_by(module) - face
+            for module in graph.modules - face
+        }
+    ).prepare()
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.stem)

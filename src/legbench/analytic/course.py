@@ -15,7 +15,7 @@ angles and rates are dual: the variational equations then follow piece by piece 
 from typing import final
 
 from legbench.analytic._heyoka import heyoka as hy
-from legbench.analytic.compiled import TOLERANCE, foot_from_centre
+from legbench.analytic.compiled import TOLERANCE
 from legbench.analytic.compiled_regime import (
     CONTACT,
     FELL_BACK,
@@ -28,14 +28,13 @@ from legbench.analytic.compiled_regime import (
 )
 from legbench.analytic.contact import MIN_PHASE
 from legbench.analytic.contact_watch import ContactWatch
-from legbench.analytic.dual import DUAL, floats, without_gradients
+from legbench.analytic.dual import DUAL, floats
 from legbench.analytic.equations import Pair, sweep_height, sweep_motion, touchdown
 from legbench.analytic.event_detector import HIP_HIGH, SEEN, EventDetector
-from legbench.analytic.float_leg import FloatLeg
 from legbench.analytic.model import LegModel
+from legbench.analytic.moving_leg import MovingLeg
 from legbench.analytic.parameters import HEIGHT, MOTOR, SPEED, Event, Watched
-from legbench.analytic.state import LegState, Regime
-from legbench.analytic.stop_switches import StopSwitches
+from legbench.analytic.state import Regime
 from legbench.analytic.variation import Variation
 from legbench.errors import PlantFault
 
@@ -51,61 +50,22 @@ TOUCHED, FLIGHT, STANCE = Watched.CONTACT, Regime.FLIGHT, Regime.STANCE
 
 
 @final
-class Course:
+class Course(MovingLeg):
     """Leg that is integrated through its regimes.
 
     Attributes:
-        model: the leg.
-        plain: the leg without derivatives, on which decisions are made; so are `plain_q`, `plain_v`
-            and `plain_motor`.
-        time: present time [s].
-        began: time at which the present regime or piece began, zero for its integrator [s].
-        elapsed: time since then [s].
-        regime: regime whose equations hold.
-        q: angles [rad].
-        v: rates [rad/s].
-        motor: motor positions [rad].
-        since: time at which the regime began [s].
-        point: steady point of the angles at the beginning of the piece (forward, up) [m].
-        drift: velocity of the steady point then [m/s].
-        lost: energy lost in impacts with the ground since the leg was set to a state [J].
-        compiled: the compiled regime.
-        stop_switches: the joint stops.
         contact: the watch over touchdown and lift-off.
         detector: the events that are watched.
-        told: the state that was last made of this leg; None once the leg has moved on.
     """
 
     __slots__ = (
         "_air",
-        "_arm",
         "_min_phase",
         "_regimes",
         "_tolerance",
         "_variation",
-        "began",
-        "compiled",
         "contact",
         "detector",
-        "drift",
-        "elapsed",
-        "lost",
-        "model",
-        "motor",
-        "plain",
-        "plain_motor",
-        "plain_q",
-        "plain_v",
-        "point",
-        "probe",
-        "q",
-        "regime",
-        "since",
-        "stop_switches",
-        "terms",
-        "time",
-        "told",
-        "v",
     )
 
     def __init__(
@@ -116,20 +76,13 @@ class Course:
         tolerance: float = TOLERANCE,
         min_phase: float = MIN_PHASE,
     ) -> None:
-        self.model: LegModel = model
-        self.plain: LegModel = without_gradients(model)
-        self.probe: Pair = probe or (0.0, 0.0)
+        super().__init__(model, probe)
         self._tolerance, self._min_phase = tolerance, min_phase
-        self._arm = foot_from_centre(model)
         self._regimes: dict[tuple[Regime, bool], CompiledRegime] = {}
         self._air: CompiledRegime | None = None
         self._variation = Variation(tolerance) if model.ops is DUAL else None
-        quick = FloatLeg(self.plain, floats(self._arm))
-        self.stop_switches = StopSwitches(self.plain, quick)
-        self.contact = ContactWatch(self, quick, floats(self._arm), min_phase)
-        self.detector = EventDetector(self)
-        self.motor: Pair = (0.0, 0.0)
-        self.told: LegState | None = None
+        self.contact = ContactWatch(self, min_phase)
+        self.detector = EventDetector(self, self.contact)
 
     def begin(self, regime: Regime, q: Pair, v: Pair, point: Pair, drift: Pair) -> None:
         """Set angles and rates, and the steady point with its velocity, at the present `time`."""
@@ -144,20 +97,13 @@ class Course:
         air = self._air = self._air or self._compiled_for(FLIGHT)
         self._put(air, q, v, centre, velocity, lean)
 
-    def centre(self) -> tuple[Pair, Pair]:
-        """Place [m] and velocity [m/s] of the centre of mass in flight."""
-        (x, z), (dx, dz) = self.point, self.drift
-        elapsed = self.time - self.began
-        fallen = self.model.floating.gravity * elapsed
-        return (x + dx * elapsed, z + (dz - 0.5 * fallen) * elapsed), (dx, dz - fallen)
-
     def apex_time(self) -> float:
         """Time at which the centre of mass is highest in this flight [s]."""
         return self.began + self.drift[1] / self.model.floating.gravity
 
     def foot_height(self, q: Pair) -> float:
         """Height of the foot tip over the centre of mass [m]."""
-        return sweep_height(self.model.ops, q, self._arm)
+        return sweep_height(self.model.ops, q, self.arm)
 
     def hold(self, motor: Pair) -> None:
         """Set the motor positions, which are held until the next call [rad]."""
@@ -168,12 +114,12 @@ class Course:
             slots = self.compiled.slots
             slots[MOTOR], slots[MOTOR + 1] = self.plain_motor
             if self.stop_switches.touched:
-                self.stop_switches.decide(self)
+                self._decide()
 
     def switch(self) -> None:
         """Apply a touchdown or lift-off: change the regime, and the rates by eq. (12)."""
         ops, model, compiled = self.model.ops, self.model, self.compiled
-        arm, arm_vel = sweep_motion(ops, self.q, self.v, self._arm)
+        arm, arm_vel = sweep_motion(ops, self.q, self.v, self.arm)
         if compiled.flies:
             (x, _), (dx, dz), elapsed = self.point, self.drift, self.time - self.began
             # The height is zero by definition, also if the foot went below it while unwatched.
@@ -252,18 +198,21 @@ class Course:
         compiled = self.compiled
         if event <= HIP_HIGH:
             self.stop_switches.cross(compiled, event)
-            self.stop_switches.decide(self)
+            self._decide()
         elif event == RECOVER:
             self._load(self._compiled_for(self.regime))
         elif event != CONTACT:
             self.stop_switches.flip(compiled, event)
+        elif (beginning := self.contact.repeats()) is not None:
+            self._go_back(*beginning)
+            self.contact.mask()
         elif self.contact.ends_regime():
             return True
         elif not self.contact.masked:
             self._load(self._compiled_for(self.regime, held=True))
         return False
 
-    def go_back(self, time: float, q: Pair, v: Pair, point: Pair, drift: Pair) -> None:
+    def _go_back(self, time: float, q: Pair, v: Pair, point: Pair, drift: Pair) -> None:
         """Go back to the beginning of the last piece, which is to be taken again."""
         self.time, self.q, self.v, self.point, self.drift = time, q, v, point, drift
         self.plain_q, self.plain_v = floats(q), floats(v)
@@ -290,7 +239,11 @@ class Course:
             compiled.slots[HEIGHT], compiled.slots[SPEED] = self.point[1], self.drift[1]
         self.detector.move_to(compiled)
         if self.stop_switches.touched or compiled.pushed:
-            self.stop_switches.decide(self)
+            self._decide()
+
+    def _decide(self) -> None:
+        """Set which stops push, after something has jumped."""
+        self.stop_switches.decide(self.compiled, self.plain_motor, self.plain_q, self.plain_v)
 
     def _compiled_for(self, regime: Regime, *, held: bool = False) -> CompiledRegime:
         found = self._regimes.get((regime, held))

@@ -5,7 +5,7 @@ every event function that could be near zero there is made certain (`compiled_re
 that holds already, because a motor, the regime or a level has jumped, is an event at once.
 """
 
-from typing import TYPE_CHECKING, final
+from typing import final
 
 from legbench.analytic.compiled_regime import (
     FALL,
@@ -20,10 +20,9 @@ from legbench.analytic.compiled_regime import (
     CompiledRegime,
     Levels,
 )
+from legbench.analytic.contact_watch import ContactWatch
+from legbench.analytic.moving_leg import MovingLeg
 from legbench.analytic.parameters import Event, Watched
-
-if TYPE_CHECKING:
-    from legbench.analytic.course import Course
 
 JUMPED = 1e-9
 """Rate beyond zero that a turning point cannot leave by rounding, only an impact [rad/s]."""
@@ -44,7 +43,8 @@ class EventDetector:
     __slots__ = (
         "_bounds",
         "_compiled",
-        "_course",
+        "_contact",
+        "_leg",
         "_probe",
         "_turn",
         "_turns",
@@ -52,8 +52,8 @@ class EventDetector:
         "levels",
     )
 
-    def __init__(self, course: "Course") -> None:
-        self._course, self._probe = course, course.probe
+    def __init__(self, leg: MovingLeg, contact: ContactWatch) -> None:
+        self._leg, self._contact, self._probe = leg, contact, leg.probe
         self.levels, self.lean = SILENT, NEVER
         self._turns, self._turn = False, 0.0
         self._bounds = (-NEVER, NEVER, NEVER)
@@ -71,7 +71,7 @@ class EventDetector:
             compiled.restore()
         if compiled.lean != self.lean:
             compiled.lay_lean(self.lean)
-        switches = self._course.stop_switches
+        switches = self._leg.stop_switches
         if compiled.beyond != switches.beyond:
             switches.lay(compiled)
         if compiled.levels is not self.levels:
@@ -95,10 +95,10 @@ class EventDetector:
 
     def due(self) -> int | None:
         """Guard every event, and return one whose condition holds already, if there is one."""
-        course, compiled = self._course, self._compiled
+        leg, compiled = self._leg, self._compiled
         if compiled.moved:
             compiled.restore()
-        (p1, p2), (q1, q2), switches = self._probe, course.plain_q, course.stop_switches
+        (p1, p2), (q1, q2), switches = self._probe, leg.plain_q, leg.stop_switches
         (below, above, most), due = self._bounds, None
         low, high, back, front = switches.clear
         if not (
@@ -109,14 +109,14 @@ class EventDetector:
         ):
             due = self._near(q1, q2)
         if self._turns:
-            v1, v2 = course.plain_v
+            v1, v2 = leg.plain_v
             rate = p1 * v1 + p2 * v2
             if not self._turn * (rate + NUDGE) < 0.0 and self._guard_turn(rate) and due is None:
                 due = TURN
         if switches.touched:
-            switches.guard(course)
+            switches.guard(compiled, leg.plain_motor, leg.plain_q, leg.plain_v)
         if compiled.free:
-            contact = course.contact.due()
+            contact = self._contact.due()
             due = contact if due is None else due
         return due
 
@@ -151,8 +151,8 @@ class EventDetector:
         """Rate of the probe, or its acceleration if it is at rest."""
         if abs(rate) > NUDGE:
             return rate
-        course = self._course
-        a1, a2 = course.stop_switches.accelerations(
-            course.terms, course.plain_motor, course.plain_q, course.plain_v
+        leg = self._leg
+        a1, a2 = leg.stop_switches.accelerations(
+            leg.terms, leg.plain_motor, leg.plain_q, leg.plain_v
         )
         return self._probe[0] * a1 + self._probe[1] * a2

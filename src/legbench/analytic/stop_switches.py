@@ -8,7 +8,7 @@ stop can pull.
 """
 
 import math
-from typing import TYPE_CHECKING, final
+from typing import final
 
 from legbench.analytic.compiled_regime import NUDGE, OFF, CompiledRegime
 from legbench.analytic.equations import SCALAR, Ops, Pair, Term, pair_acceleration, pair_share
@@ -17,9 +17,6 @@ from legbench.analytic.model import LegModel
 from legbench.analytic.parameters import FREE_PUSHES, PUSHES, Event
 from legbench.analytic.stops import SQUARE, Stop
 from legbench.analytic.terms import PairTerms
-
-if TYPE_CHECKING:
-    from legbench.analytic.course import Course
 
 AT_LIMIT = 1e-12
 """Largest depth that may be rounding; the speed then says whether the stop is touched [rad]."""
@@ -124,14 +121,13 @@ class StopSwitches:
         self._joints, self._acting, self.clear = self._sets[beyond]
         self.beyond, self.touched = beyond, beyond != 0
 
-    def decide(self, course: "Course") -> None:
+    def decide(self, compiled: CompiledRegime, motor: Pair, q: Pair, v: Pair) -> None:
         """Set the switches of the pushes by the law, after something has jumped."""
-        compiled = course.compiled
         if self.touched:
-            self._answer = knee, hip = self._ask(course, course.terms)
+            self._answer = knee, hip = self._ask(compiled.terms, motor, q, v)
             self._pushing = [knee > 0.0, hip > 0.0]
             if compiled.held:
-                knee, hip = self._ask(course, self._model.falling)
+                knee, hip = self._ask(self._model.falling, motor, q, v)
                 self._free = [knee > 0.0, hip > 0.0]
         if compiled.pushed & ~self.beyond:
             self._silence(compiled)
@@ -146,15 +142,14 @@ class StopSwitches:
             self._pushing[event - KNEE_PUSH] ^= True
         self._switch(compiled)
 
-    def guard(self, course: "Course") -> None:
+    def guard(self, compiled: CompiledRegime, motor: Pair, q: Pair, v: Pair) -> None:
         """Guard the events of the pushes, for the joints that are beyond a limit."""
-        compiled = course.compiled
-        asked = self._answer or self._ask(course, course.terms)
+        asked = self._answer or self._ask(compiled.terms, motor, q, v)
         self._answer = None
         for joint, stop in self._joints:
             compiled.guard(KNEE_PUSH + joint, stop.sign * asked[joint])
         if compiled.held:
-            asked = self._ask(course, self._model.falling)
+            asked = self._ask(self._model.falling, motor, q, v)
             for joint, stop in self._joints:
                 compiled.guard(KNEE_FREE + joint, stop.sign * asked[joint])
 
@@ -203,9 +198,8 @@ class StopSwitches:
         """Accelerations of the angles where every touched stop acts that would push [rad/s^2]."""
         return self._turns(SCALAR, terms, torque, q, v, None)[1]
 
-    def _ask(self, course: "Course", terms: PairTerms) -> tuple[float, float]:
+    def _ask(self, terms: PairTerms, motor: Pair, q: Pair, v: Pair) -> tuple[float, float]:
         """Readings of the events of each joint's stop where every stop acts that would push."""
-        motor, q, v = course.plain_motor, course.plain_q, course.plain_v
         knee, hip = self._acting
         if knee is not None and hip is not None:
             torque = self._floats.torque(motor, q, v)
