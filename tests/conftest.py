@@ -3,6 +3,7 @@ import os
 import signal
 import subprocess
 import sys
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -28,6 +29,20 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
 MODELS = Path(__file__).parents[1] / "models"
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--part", metavar="I/N", help="collect the Ith of N shares of the files only")
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Leave a file of tests to the process whose share it is in; a name's share is always one."""
+    part = config.getoption("--part")
+    if part is None or not collection_path.name.startswith("test_") or collection_path.is_dir():
+        return None
+    number, count = map(int, part.split("/"))
+    name = collection_path.relative_to(config.rootpath).as_posix()
+    return True if zlib.crc32(name.encode()) % count != number - 1 else None
 
 
 def pytest_collection_finish() -> None:

@@ -59,6 +59,16 @@ drives check --bus X
 drives check --eds X
 """
 """A line a file that a command reads, X; RUN, LOG and GOOD are a run, a bus log and a campaign."""
+GOOD = f"""
+format = 1
+name = "good"
+base.design = "{MODELS / "prototype.toml"}"
+
+[[cells]]
+name = "step, fixed trunk"
+set."controller.kind" = "position-jump"
+set.duration = 0.5
+"""
 KINDS = {
     "missing": None,
     "folder": None,
@@ -83,7 +93,8 @@ def places(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     (folder / "bus.log").write_text("(0.000000) leg 080#\n", encoding="utf-8")
     assert main(["run", "jump", "--duration", "0.05", "--out", str(folder / "runs")]) == 0
     (run,) = (folder / "runs").iterdir()
-    good = MODELS / "campaigns" / "paper.toml"
+    good = folder / "good.toml"
+    good.write_text(GOOD, encoding="utf-8")
     return {"RUN": run, "RUNS": run.parent, "LOG": folder / "bus.log", "GOOD": good, "X": folder}
 
 
