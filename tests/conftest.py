@@ -36,12 +36,18 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
-    """Leave a file of tests to the process whose share it is in; a name's share is always one."""
+    """Leave a file of tests to the process whose share it is in.
+
+    Files of a folder stay together, so that what a session makes once is made once. Only those of
+    the drives, which are a third of all, and those of no folder are dealt out singly.
+    """
     part = config.getoption("--part")
     if part is None or not collection_path.name.startswith("test_") or collection_path.is_dir():
         return None
     number, count = map(int, part.split("/"))
-    name = collection_path.relative_to(config.rootpath).as_posix()
+    kept = collection_path.parent
+    place = kept if kept.name not in ("drives", "tests") else collection_path
+    name = place.relative_to(config.rootpath).as_posix()
     return True if zlib.crc32(name.encode()) % count != number - 1 else None
 
 
