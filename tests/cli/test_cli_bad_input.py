@@ -262,13 +262,14 @@ def test_no_display_is_no_reason_to_lose_a_run(
 
 def test_extras_that_are_not_installed(run_folder: Path, tmp_path: Path) -> None:
     """A run goes on without rerun; who asks for a file that needs an extra is told its name."""
-    view, *files = started_together(
+    view, *files, report = started_together(
         [
             ("run", "jump", *DESIGN, "--duration", "0.1", "--out", "runs", "--view", "--json"),
             ("replay", run_folder, "--rrd", "view.rrd"),
             ("replay", run_folder, "--figure", "phase.png"),
+            ("report", "nowhere"),
         ],
-        before="sys.modules['rerun'] = sys.modules['matplotlib'] = None",
+        before="sys.modules.update(dict.fromkeys(['rerun', 'matplotlib', 'jinja2']))",
         cwd=tmp_path,
     )
     said = of_a_whole_run(view)
@@ -279,4 +280,8 @@ def test_extras_that_are_not_installed(run_folder: Path, tmp_path: Path) -> None
         assert f"legbench: {missing} is not installed" in done.err
         assert "legbench[viz]" in done.err
         assert done.err.count("\n") == 1
+    assert report.status == 1
+    assert report.err.startswith("legbench: jinja2 is not installed; a report needs it: ")
+    assert "pip install 'legbench[report]'" in report.err
+    assert report.err.count("\n") == 1
     assert list(tmp_path.iterdir()) == [tmp_path / "runs"]
