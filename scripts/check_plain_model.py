@@ -9,8 +9,8 @@
 Both bring a MuJoCo of their own, so that they live in an environment beside the project's; nothing
 of legbench is needed there. The last MJX asks for a MuJoCo before 4, hence `--no-deps`. Warp
 compiles its kernels at the first call, half a minute of processor time. MJX is not compiled, which
-takes longer than all steps: its operations are called one by one, some seconds a step. Exit status
-1 if an engine ends further from MuJoCo than its bound.
+may take longer than all steps: its operations are called one by one, 5 s a step. Exit status 1 if
+an engine ends further from MuJoCo than its bound.
 """
 
 import argparse
