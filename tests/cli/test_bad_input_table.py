@@ -78,7 +78,7 @@ KINDS = {
     "other": b'[project]\nname = "x"\n',
 }
 """Kinds of a wrong file, and what they hold."""
-LINES = [line for line in FILES.splitlines() if line]
+LINES: list[str] = [line for line in FILES.splitlines() if line]
 ROWS = [line.rsplit(" | ", 2) for line in VALUES.splitlines() if line]
 
 
