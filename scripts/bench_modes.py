@@ -107,20 +107,20 @@ def matrix_hop(model: LegModel, start: LegState, motor: Motor) -> LegState:
             atol=1e-6,
             events=event,
         )
-        end = solved.y[:, -1].tolist()
+        end: list[float] = solved.y[:, -1].tolist()
         if flies:
-            q, v, trunk, speed = end[2:4], end[6:], end[:2], end[4:6]
+            trunk, q, speed, v = zip(end[::2], end[1::2], strict=True)
         else:
-            q, v = end[:2], end[2:]
+            q, v = zip(end[::2], end[1::2], strict=True)
             foot, moved = model.foot_from_hip(q), model.foot_vel_from_hip(q, v)
             trunk, speed = (-foot[0], -foot[1]), (-moved[0], -moved[1])
         state = LegState(
             time=float(solved.t[-1]),
             regime=state.regime,
-            q=tuple(q),
-            v=tuple(v),
-            trunk_pos=tuple(trunk),
-            trunk_vel=tuple(speed),
+            q=q,
+            v=v,
+            trunk_pos=trunk,
+            trunk_vel=speed,
             since=state.since,
         )
         if solved.status == 1:
