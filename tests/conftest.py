@@ -3,7 +3,6 @@ import os
 import signal
 import subprocess
 import sys
-import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -29,26 +28,6 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
 MODELS = Path(__file__).parents[1] / "models"
-
-
-def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--part", metavar="I/N", help="collect the Ith of N shares of the files only")
-
-
-def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
-    """Leave a file of tests to the process whose share it is in.
-
-    Files of a folder stay together, so that what a session makes once is made once. Only those of
-    the drives, which are a third of all, and those of no folder are dealt out singly.
-    """
-    part = config.getoption("--part")
-    if part is None or not collection_path.name.startswith("test_") or collection_path.is_dir():
-        return None
-    number, count = map(int, part.split("/"))
-    kept = collection_path.parent
-    place = kept if kept.name not in ("drives", "tests") else collection_path
-    name = place.relative_to(config.rootpath).as_posix()
-    return True if zlib.crc32(name.encode()) % count != number - 1 else None
 
 
 # What is imported and collected stays: searching it for garbage finds none.
