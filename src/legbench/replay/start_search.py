@@ -22,7 +22,8 @@ LONGEST_REST: Final = 2.0
 """Longest time for which a leg that was on drives stands before its first row [s]: it is put to
 rest by its equations, from which bars and encoders keep it some counts away, and swings out."""
 SHORT_REST: Final = 0.3
-"""The same where its swing is estimated [s], which holds what is left of that."""
+"""Longest time before the first row of a leg whose swing is sought [s]: the search makes up for the
+rest, and repeats this time in each of its trials."""
 WINDOWS: Final = (0.0, 0.1, 0.2, 0.35, 0.6, 1.0, 1.4, 2.0)
 """Time after the rest whose rows count in one least-squares estimate after the other [s]."""
 STEPS: Final = 2
