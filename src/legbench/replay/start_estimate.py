@@ -52,7 +52,7 @@ class StartEstimate:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Followed:
+class FollowedRows:
     """Rows of a leg up to where it is lost."""
 
     links: Floats
@@ -83,7 +83,7 @@ class StartTrials:
         self._plant, self._moved, self._steps, self._count = plant, moved, steps, count
         self.rows = len(steps) + 1
 
-    def follow(self, start: StartEstimate, rows: int | None = None) -> Followed:
+    def follow(self, start: StartEstimate, rows: int | None = None) -> FollowedRows:
         """Move the leg from a start, over a number of rows or until it is lost."""
         recorded, lost = self._moved.joint_pos, LOST * self._count
         links: list[Floats] = []
@@ -94,7 +94,7 @@ class StartTrials:
                 break
         found = np.array(links).reshape(-1, 2)
         away = np.abs(found - recorded[: len(found)]).max(axis=1) > BESIDE * self._count
-        return Followed(links=found, beside=int(np.argmax(away)) if away.any() else len(found))
+        return FollowedRows(links=found, beside=int(np.argmax(away)) if away.any() else len(found))
 
     def _observed(self, start: StartEstimate) -> Iterator[Floats]:
         """Link angles row by row, as far as the leg comes (2,) [rad]."""
