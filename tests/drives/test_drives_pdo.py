@@ -70,7 +70,7 @@ def test_maps_that_cannot_be_are_refused() -> None:
 def test_the_object_whose_value_does_not_fit_is_named_among_those_that_do() -> None:
     layout = PdoMap([Mapped(0x6040, 0, DataType.UNSIGNED16), Mapped(0x607A, 0, DataType.INTEGER32)])
     for fits in (0, 0xFFFF):
-        with pytest.raises(CodecError, match="^2147483648 does not fit 607Ah:00; it holds -2"):
+        with pytest.raises(CodecError, match=r"^2147483648 does not fit 607Ah:00; it holds -2"):
             layout.pack([fits, 1 << 31])
 
 
