@@ -171,11 +171,14 @@ def test_a_log_that_cannot_be_made_is_refused(tmp_path: Path, realtime: bool) ->
 def test_a_loop_that_writes_its_own_log_loses_no_line_of_it(tmp_path: Path) -> None:
     writer = RunWriter.create(tmp_path, {})
     log = writer.log("lines.log")
-    for line in lines(LINES_AT_ONCE + 1):
+    path = writer.path / "lines.log"
+    for number, line in enumerate(lines(LINES_AT_ONCE + 1), start=1):
         log.write(line)
+        assert path.stat().st_size == (40 * 500 if number >= 500 else 0)
     writer.close()
     log.close()
     log.write(b"too late\n")
+    log.close()
     assert (writer.path / "lines.log").read_bytes() == b"".join(lines(LINES_AT_ONCE + 1))
     assert log.error is None
 
