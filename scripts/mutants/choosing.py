@@ -1,0 +1,86 @@
+"""Choice of the tests that a fault is tried with: those that run its line, the fastest first."""
+
+import ast
+import itertools
+import re
+from collections.abc import Collection, Iterable, Sequence
+from pathlib import Path
+
+from tracing import ROOT, Passed, Timed
+
+BUDGET = 4.0
+"""Tests that run a changed line are tried for so long, timed under the trace [s]."""
+IMPORTING_FILES = 24
+"""A fault that an import runs is tried with the tests of so many files."""
+
+
+def span(tree: ast.Module, line: int) -> tuple[int, int]:
+    """First and last line of the statement at a line; of one that holds others, its head."""
+    first, last = line, line
+    for node in ast.walk(tree):
+        if isinstance(node, ast.stmt) and node.lineno <= line <= (node.end_lineno or 0):
+            body = getattr(node, "body", None)
+            end = body[0].lineno - 1 if body else node.end_lineno
+            if end is not None and end >= line and node.lineno >= first - 30:
+                first, last = node.lineno, max(end, node.lineno)
+    return first, last
+
+
+def _affordable(tests: Iterable[Timed], budget: float, before: Collection[str] = ()) -> list[Timed]:
+    """The fastest of some tests, those of some files before all others, for a budget's time."""
+    reached = sorted(tests, key=lambda test: (file_of(test) not in before, test.seconds))
+    spent = itertools.accumulate(test.seconds for test in reached)
+    kept = [test for test, so_far in zip(reached, spent, strict=True) if so_far <= budget]
+    # Tests of one speed and file stay together, so that their fixtures are made once.
+    return sorted(
+        kept, key=lambda test: (sum(test.seconds > s for s in (0.03, 0.3, 1.0)), test.name)
+    )
+
+
+def in_function(
+    tests: Sequence[Passed], budget: float, module: str, first: int, last: int
+) -> list[Timed]:
+    """Tests that run one of the lines from `first` to `last` of a module."""
+    return _affordable((test.test for test in tests if test.runs(module, first, last)), budget)
+
+
+def at_import(
+    tests: Sequence[Passed], budget: float, module: str, name: str, holder: str
+) -> list[Timed]:
+    """Tests of a module, those files first that say the name that is changed, or import it.
+
+    A table of a standard's numbers is often compared as a whole, by the name of what holds it.
+    """
+    seconds: dict[str, float] = {}
+    for passed in tests:
+        if module in passed.lines:
+            file = file_of(passed.test)
+            seconds[file] = seconds.get(file, 0.0) + passed.test.seconds
+    every = {file_of(passed.test) for passed in tests}
+    near = {file for file in every if imports(ROOT / file, module)}
+    named = {file for file in near | seconds.keys() if _says(ROOT / file, name)}
+    held = {file for file in near if holder and _says(ROOT / file, holder)}
+
+    def order(file: str) -> tuple[bool, bool, float]:
+        return file not in named | held, file not in near, seconds.get(file, 0.0)
+
+    chosen = sorted(near | seconds.keys(), key=order)[:IMPORTING_FILES]
+    some = (passed.test for passed in tests if file_of(passed.test) in chosen)
+    return _affordable(some, budget, named | held)
+
+
+def _says(file: Path, name: str) -> bool:
+    return re.search(rf"\b{re.escape(name)}\b", file.read_text()) is not None
+
+
+def file_of(test: Timed) -> str:
+    """File of a test, as pytest names it."""
+    return test.name.split("::")[0]
+
+
+def imports(file: Path, module: str) -> bool:
+    """Whether a file of tests imports a module of the package by its name."""
+    name = "legbench." + module.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+    room, _, last = name.rpartition(".")
+    text = file.read_text()
+    return bool(re.search(rf"\b{name}\b|from {room} import .*\b{last}\b", text))
