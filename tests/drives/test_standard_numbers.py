@@ -13,7 +13,7 @@ from legbench.drives.emulated.alarms import register_of
 from legbench.drives.emulated.power import POWERED as POWERED_INSIDE
 from legbench.drives.emulated.power import PowerStage
 from legbench.drives.errors import CodecError
-from legbench.drives.protocol import emcy, frame, nmt, sdo
+from legbench.drives.protocol import emcy, frame, lss, memory, nmt, sdo
 from legbench.drives.protocol.cia402 import (
     HOLD,
     POWERED,
@@ -396,6 +396,56 @@ def test_an_emergency_has_eight_bytes_code_register_vendor() -> None:
         assert emcy.decode_emcy(5, bytes(length)) is None
     bare = emcy.Emergency(node_id=127, code=0x1000, register=1)
     assert emcy.emcy_frame(bare) == frame.Frame(0x0FF, bytes.fromhex("0010010000000000"))
+
+
+def test_storing_has_the_objects_signatures_and_parts_of_the_standard() -> None:
+    # CiA 301, 7.5.2.13 and .14: "save" and "load", least significant byte first.
+    assert (memory.STORE, memory.RESTORE) == (0x1010, 0x1011)
+    assert (memory.SAVE_SIGNATURE, memory.LOAD_SIGNATURE) == (0x65766173, 0x64616F6C)
+    assert (memory.ON_COMMAND, memory.BY_ITSELF) == (0b01, 0b10)
+    # Sub-index 1 is everything, 2 communication (1000h to 1FFFh), 3 the profile (6000h to 9FFFh).
+    parts = {1: (0x1000, 0xFFFF), 2: (0x1000, 0x1FFF), 3: (0x6000, 0x9FFF)}
+    for part in range(6):
+        first, last = parts.get(part, (0, -1))
+        for index in (0, 0xFFF, 0x1000, 0x1FFF, 0x2000, 0x5FFF, 0x6000, 0x9FFF, 0xA000, 0xFFFF):
+            assert memory.in_part((index, 3), part) is (first <= index <= last)
+        assert not memory.in_part((0x10000, 0), part)
+
+
+def test_layer_setting_services_have_the_numbers_of_cia_305() -> None:
+    assert (lss.REQUEST_ID, lss.ANSWER_ID) == (0x7E5, 0x7E4)
+    assert (lss.FRAME, lss.UNCONFIGURED, lss.WORDS, lss.RESET_SCAN) == (8, 0xFF, 4, 0x80)
+    assert {specifier.name: int(specifier) for specifier in lss.Lss} == {
+        "SWITCH_GLOBAL": 4,
+        "CONFIGURE_NODE_ID": 17,
+        "CONFIGURE_BIT_TIMING": 19,
+        "ACTIVATE_BIT_TIMING": 21,
+        "STORE": 23,
+        "SELECT_VENDOR": 64,
+        "SELECT_SERIAL": 67,
+        "SELECTED": 68,
+        "IDENTIFY_VENDOR": 70,
+        "IDENTIFY_SERIAL_HIGH": 75,
+        "IDENTIFY_UNCONFIGURED": 76,
+        "IDENTIFIED": 79,
+        "UNCONFIGURED_IDENTIFIED": 80,
+        "FAST_SCAN": 81,
+        "INQUIRE_VENDOR": 90,
+        "INQUIRE_SERIAL": 93,
+        "INQUIRE_NODE_ID": 94,
+    }
+    assert [int(mode) for mode in (lss.LssMode.WAITING, lss.LssMode.CONFIGURATION)] == [0, 1]
+    errors = lss.LssError
+    assert [int(e) for e in (errors.NONE, errors.OUT_OF_RANGE, errors.STORE_FAILED)] == [0, 1, 2]
+    words = (0x11223344, 0x55667788, 0x99AABBCC, 0xDDEEFF00)
+    assert [frame.hex() for frame in lss.select_frames(words)] == [
+        "4044332211000000",
+        "4188776655000000",
+        "42ccbbaa99000000",
+        "4300ffeedd000000",
+    ]
+    assert lss.scan_frame(0x11223344, 31, 2, 3).hex() == "51443322111f0203"
+    assert lss.lss_frame(lss.Lss.INQUIRE_NODE_ID).hex() == "5e00000000000000"
 
 
 EMERGENCIES = {
