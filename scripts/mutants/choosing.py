@@ -26,6 +26,20 @@ def span(tree: ast.Module, line: int) -> tuple[int, int]:
     return first, last
 
 
+def runs_at_import(tree: ast.Module, tests: Sequence[Passed], module: str, line: int) -> bool:
+    """Whether the function around a line is run by no test itself, as one that makes a table."""
+    around = [
+        node
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef) and node.lineno <= line <= (node.end_lineno or 0)
+    ]
+    outermost = min(around, key=lambda node: node.lineno, default=None)
+    if outermost is None:
+        return False
+    first, last = outermost.body[0].lineno, outermost.end_lineno or line
+    return not any(passed.runs(module, first, last) for passed in tests)
+
+
 def _affordable(tests: Iterable[Timed], budget: float, before: Collection[str] = ()) -> list[Timed]:
     """The fastest of some tests, those of some files before all others, for a budget's time."""
     reached = sorted(tests, key=lambda test: (file_of(test) not in before, test.seconds))

@@ -25,7 +25,7 @@ from dataclasses import replace
 from pathlib import Path
 
 os.environ.update(OPENBLAS_NUM_THREADS="1", OMP_NUM_THREADS="1")
-from choosing import BUDGET, at_import, file_of, imports, in_function, span
+from choosing import BUDGET, at_import, file_of, imports, in_function, runs_at_import, span
 from edits import Mutation, mutations
 from tracing import CACHE, PACKAGE, ROOT, Passed, digest
 from trial import Fault, Trials, prepare
@@ -86,7 +86,8 @@ def _faults(
     for edit in edits:
         line = edit.line_number(source)
         before, after = edit.lines(source)
-        if edit.at_import:
+        importing = edit.at_import or runs_at_import(tree, tests, module, line)
+        if importing:
             # The constant, field or member that a line begins with.
             name = before.split(maxsplit=1)[0].rstrip(":,")
             chosen = at_import(tests, budget, module, name, edit.scope)
@@ -96,7 +97,7 @@ def _faults(
         fault = Fault(
             path=path,
             changed=edit.apply(source),
-            scope="" if edit.at_import else edit.scope,
+            scope="" if importing else edit.scope,
             line=line,
             text=f"{place}\n  - {before}\n  + {after}",
             tests=chosen,

@@ -13,7 +13,7 @@ from legbench.drives.emulated.alarms import register_of
 from legbench.drives.emulated.power import POWERED as POWERED_INSIDE
 from legbench.drives.emulated.power import PowerStage
 from legbench.drives.errors import CodecError
-from legbench.drives.protocol import emcy, frame, lss, memory, nmt, sdo
+from legbench.drives.protocol import emcy, frame, lss, memory, nmt, objects, sdo
 from legbench.drives.protocol.cia402 import (
     HOLD,
     POWERED,
@@ -29,6 +29,7 @@ from legbench.drives.protocol.cia402 import (
     next_controlword,
 )
 from legbench.drives.protocol.datatypes import DataType, pack, range_of, size_of, unpack
+from legbench.drives.protocol.objects import OBJECTS
 from legbench.drives.setup.config import (
     CONTROLWORD,
     LINK_POSITION,
@@ -531,3 +532,62 @@ def test_process_data_map_the_objects_of_the_profile() -> None:
     signed = (POSITION_ACTUAL, TARGET_POSITION, LINK_POSITION, LINK_POSITION_SHORT)
     assert {entry.kind.name[:3] for entry in signed} == {"INT"}
     assert {entry.kind.name[:3] for entry in (CONTROLWORD, STATUSWORD)} == {"UNS"}
+
+
+def test_a_drive_has_four_command_and_four_answer_frames_of_eight_objects_each() -> None:
+    # CiA 301, 7.5.2.33 to .38 and table 38: all switched off, sent at events, and mapping nothing.
+    expected: dict[tuple[int, int], tuple[str, DataType, str, int]] = {}
+    for base, first in ((0x1400, 0x200), (0x1800, 0x180)):
+        for number in range(4):
+            sender = "TPDO" if base == 0x1800 else "RPDO"
+            inhibited = "rw" if base == 0x1800 else "ro"
+            name, comm, mapped = f"{sender}{number + 1}", base + number, base + 0x200 + number
+            cob_id = (1 << 31) + first + 0x100 * number
+            u8, u16, u32 = DataType.UNSIGNED8, DataType.UNSIGNED16, DataType.UNSIGNED32
+            expected[comm, 0] = (f"{name} parameter count", u8, "const", 5)
+            expected[comm, 1] = (f"{name} COB-ID", u32, "rw", cob_id)
+            expected[comm, 2] = (f"{name} transmission type", u8, "rw", 255)
+            expected[comm, 3] = (f"{name} inhibit time [100 us]", u16, inhibited, 0)
+            expected[comm, 5] = (f"{name} event timer [ms]", u16, "rw", 0)
+            expected[mapped, 0] = (f"{name} mapped objects", u8, "rw", 0)
+            for sub in range(1, 9):
+                expected[mapped, sub] = (f"{name} mapping {sub}", u32, "rw", 0)
+    found = {
+        key: (entry.name, entry.kind, entry.access.value, entry.default)
+        for key, entry in OBJECTS.items()
+        if 0x1400 <= key[0] < 0x1C00
+    }
+    assert found == expected
+    assert list(OBJECTS) == sorted(OBJECTS)
+    assert (objects.PDO_COUNT, objects.LAST_PDO, objects.MAX_MAPPED) == (4, 512, 8)
+    assert (objects.LINK_SHORT, objects.TEMPERATURE) == (0x2064, 0x2070)
+
+
+@pytest.mark.parametrize(
+    ("key", "name", "kind", "access", "default", "mappable"),
+    [
+        ((0x1000, 0), "Device type", "UNSIGNED32", "const", 0x00020192, False),
+        ((0x1001, 0), "Error register", "UNSIGNED8", "ro", 0, True),
+        (
+            (0x1008, 0),
+            "Manufacturer device name",
+            "VISIBLE_STRING",
+            "const",
+            "legbench-drive",
+            False,
+        ),
+        ((0x6040, 0), "Controlword", "UNSIGNED16", "rw", 0, True),
+        ((0x6065, 0), "Following error window", "UNSIGNED32", "rw", 0xFFFFFFFF, False),
+        ((0x607A, 0), "Target position", "INTEGER32", "rw", 0, True),
+        ((0x60C2, 2), "Interpolation time index", "INTEGER8", "rw", -2, False),
+        ((0x6502, 0), "Supported drive modes", "UNSIGNED32", "const", 0xA0, False),
+    ],
+)
+def test_a_row_of_the_table_is_read_as_it_stands(
+    key: tuple[int, int], name: str, kind: str, access: str, default: int | str, mappable: bool
+) -> None:
+    entry = OBJECTS[key]
+    assert (entry.key, entry.name, entry.kind.name) == (key, name, kind)
+    assert (entry.access.value, entry.default, entry.mappable) == (access, default, mappable)
+    assert objects.name_of(*key) == f"{key[0]:04X}h:{key[1]:02X} {name}"
+    assert objects.name_of(0x5FFF, 3) == "5FFFh:03"
