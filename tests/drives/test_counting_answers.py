@@ -1,13 +1,15 @@
-"""Two drives with one node id: how many answers a question gets, and how long they are awaited."""
+"""How many answers a question gets, over SDO and over LSS, and how long they are awaited."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, cast
 
 import can
 import pytest
 from drives_rig import MS
 
+from legbench.drives.errors import DriveError
 from legbench.drives.master.doubles import count_answers
+from legbench.drives.master.lss_port import LssPort
 from legbench.drives.master.port import Port
 
 NODE = 5
@@ -111,3 +113,95 @@ def test_answers_that_collide_destroy_frames_and_count_as_a_second_one() -> None
     assert counted([(2.0, ERROR)], [], [])[0] == 0
     shown = can.Message(arbitration_id=0x585, data=ANSWER, is_error_frame=True)
     assert counted([(2.0, shown)], [], [])[0] == 0
+
+
+# --- layer setting services ------------------------------------------------------------------
+
+SELECTED = bytes.fromhex("4400000000000000")
+
+
+def lss(data: bytes = SELECTED, cob_id: int = 0x7E4) -> can.Message:
+    return reply(data, cob_id)
+
+
+def test_all_answers_right_after_the_first_are_taken_and_nothing_else() -> None:
+    other = bytes.fromhex("4f00000000000000")
+    for wait_ms in (500, 25):
+        script = [
+            (1.0, lss(SELECTED, 0x585)),
+            (1.5, can.Message(arbitration_id=0x7E4, data=SELECTED, is_error_frame=True)),
+            (2.0, lss(SELECTED[:7])),
+            (4.0, lss()),
+            (9.0, lss(other)),
+            # 15 ms after the first answer nobody is waited for any more.
+            (19.5, lss()),
+        ]
+        bus = Scripted(script)
+        port = LssPort(Port(cast(Any, bus), bus))
+        asked = bytes.fromhex("5e00000000000000")
+        answers = port.ask(asked) if wait_ms == 500 else port.ask(asked, wait_ms * MS)
+        assert bus.sent == [(0x7E5, asked)]
+        assert answers == [SELECTED, other]
+        assert bus.time_ns == 19 * MS
+    for wait_ms in (500, 25):
+        bus = Scripted([])
+        port = LssPort(Port(cast(Any, bus), bus))
+        assert (port.ask(asked) if wait_ms == 500 else port.ask(asked, wait_ms * MS)) == []
+        assert bus.time_ns == wait_ms * MS
+
+
+def test_a_late_answer_to_an_earlier_request_is_none_to_this_one() -> None:
+    bus = Scripted([(0.0, lss()), (0.0, lss())], [(3.0, lss())])
+    port = Port(cast(Any, bus), bus)
+    port.send(0x7E5, SELECTED)
+    assert LssPort(port).ask(SELECTED) == [SELECTED]
+
+
+def test_drives_are_released_before_an_interface_can_be_closed() -> None:
+    bus = Scripted([])
+    LssPort(Port(cast(Any, bus), bus)).release()
+    # Back to waiting, and 2 ms for the frame.
+    assert bus.sent == [(0x7E5, bytes.fromhex("0400000000000000"))]
+    assert bus.time_ns == 2 * MS
+
+
+def test_a_fast_scan_begins_with_a_reset_and_asks_for_nothing_where_nobody_answers() -> None:
+    bus = Scripted([])
+    assert LssPort(Port(cast(Any, bus), bus)).find_unconfigured() is None
+    assert bus.sent == [(0x7E5, bytes.fromhex("5100000000800000"))]
+    assert bus.time_ns == 25 * MS
+    bus = Scripted([])
+    assert not LssPort(Port(cast(Any, bus), bus)).any_unconfigured()
+    assert bus.sent == [(0x7E5, bytes.fromhex("4c00000000000000"))]
+    assert bus.time_ns == 100 * MS
+
+
+@pytest.mark.parametrize(
+    ("act", "asked", "wait_ms", "answer", "found"),
+    [
+        (LssPort.node_id, "5e", 500, "5e05", 5),
+        (LssPort.store, "17", 5000, "1700", 0),
+        (LssPort.store, "17", 5000, "1702", 2),
+        (LssPort.store, "17", 5000, "17ff", None),
+        (LssPort.any_unconfigured, "4c", 100, "50", True),
+        (LssPort.any_unconfigured, "4c", 100, "4f", False),
+    ],
+)
+def test_each_service_has_its_own_answer_and_patience(
+    act: Callable[[LssPort], object], asked: str, wait_ms: int, answer: str, found: object
+) -> None:
+    data = bytes.fromhex(answer).ljust(8, b"\0")
+    bus = Scripted([(wait_ms - 1.0, lss(data))])
+    assert act(LssPort(Port(cast(Any, bus), bus))) == found
+    assert bus.sent == [(0x7E5, bytes.fromhex(asked).ljust(8, b"\0"))]
+    if act is LssPort.any_unconfigured:
+        return
+    wrong = bytes((data[0] + 1, *data[1:]))
+    for script, error in (
+        ([(wait_ms + 1.0, lss(data))], "no drive answers over LSS"),
+        ([(1.0, lss(wrong))], "no drive answers over LSS"),
+        ([(1.0, lss(data)), (2.0, lss(data))], "2 drives answer over LSS"),
+    ):
+        bus = Scripted(script)
+        with pytest.raises(DriveError, match=error):
+            act(LssPort(Port(cast(Any, bus), bus)))

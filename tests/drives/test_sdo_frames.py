@@ -300,3 +300,9 @@ def test_four_bytes_for_a_shorter_number_repeat_its_sign_or_are_zero() -> None:
                     transfer.value(kind)
             else:
                 assert transfer.value(kind) == value
+
+
+def test_a_segment_before_any_object_is_aborted_for_no_object() -> None:
+    nothing = bytes(3)
+    for request in (b"\x00" + EMPTY, b"\x60" + EMPTY):
+        assert Object().server.feed(request) == abort(Abort.COMMAND, nothing)
