@@ -1,16 +1,19 @@
 """How many answers a question gets, over SDO and over LSS, and how long they are awaited."""
 
 from collections.abc import Callable, Sequence
+from types import SimpleNamespace
 from typing import Any, cast
 
 import can
 import pytest
-from drives_rig import MS
+from drives_rig import MS, config
 
+from legbench.commissioning.node_id import _restart
 from legbench.drives.errors import DriveError
 from legbench.drives.master.doubles import count_answers
 from legbench.drives.master.lss_port import LssPort
 from legbench.drives.master.port import Port
+from legbench.drives.protocol.nmt import NmtCommand
 
 NODE = 5
 QUESTION = bytes.fromhex("4018100400000000")
@@ -42,7 +45,7 @@ class Scripted:
 
     def send(self, message: can.Message) -> None:
         self.sent.append((message.arbitration_id, bytes(message.data)))
-        for after_ms, answer in self._scripts.pop(0):
+        for after_ms, answer in self._scripts.pop(0) if self._scripts else ():
             self._due.append((self.time_ns + round(after_ms * MS), answer))
 
     def recv(self, timeout: float | None = None) -> can.Message | None:
@@ -205,3 +208,60 @@ def test_each_service_has_its_own_answer_and_patience(
         bus = Scripted(script)
         with pytest.raises(DriveError, match=error):
             act(LssPort(Port(cast(Any, bus), bus)))
+
+
+# --- a new node id in use --------------------------------------------------------------------
+
+IDENTITY = (0x123, 0x402, 5, 0xA5A50F01)
+BOOT_UP = reply(b"\x00", 0x700 + 42)
+
+
+def identity_scripts() -> list[list[tuple[float, can.Message]]]:
+    """Answers of node 42 to 1018h:01 to :04."""
+    return [
+        [(1.0, reply(bytes((0x43, 0x18, 0x10, sub)) + word.to_bytes(4, "little"), 0x580 + 42))]
+        for sub, word in enumerate(IDENTITY, start=1)
+    ]
+
+
+def restarted(before: int | None, *scripts: Sequence[tuple[float, can.Message]]) -> Scripted:
+    """The bus after a drive that was node `before` has become node 42, or has not."""
+    bus = Scripted(*scripts)
+    port = Port(cast(Any, bus), bus)
+    session = cast(Any, SimpleNamespace(port=lambda: port, config=config()))
+    _restart(session, before, 42, IDENTITY, NmtCommand.RESET_NODE)
+    return bus
+
+
+def test_a_drive_that_was_reset_is_asked_as_soon_as_it_boots_under_its_new_id() -> None:
+    others = [(1.0, reply(b"\x05", 0x702)), (2.0, reply(b"\x00", 0x701)), (3.0, BOOT_UP)]
+    bus = restarted(1, others, *identity_scripts())
+    question, given_up = bytes.fromhex("4000100000000000"), bytes.fromhex("8000100000000405")
+    assert bus.sent == [
+        (0x000, b"\x81\x01"),
+        *[(0x62A, bytes((0x40, 0x18, 0x10, sub)) + bytes(4)) for sub in (1, 2, 3, 4)],
+        # The old node id is asked twice, and nobody answers.
+        *[(0x601, question), (0x601, given_up)] * 2,
+    ]
+    assert bus.time_ns == 3 * MS + 4 * MS + 2 * 15 * MS
+
+
+def test_a_second_drive_under_the_old_node_id_is_noticed() -> None:
+    device = reply(bytes.fromhex("4300100092010200"), 0x581)
+    with pytest.raises(DriveError, match="node 1 still answers after its drive has become node 42"):
+        restarted(1, [(3.0, BOOT_UP)], *identity_scripts(), [(1.0, device)])
+
+
+def test_another_drive_under_the_new_node_id_is_noticed() -> None:
+    scripts = identity_scripts()
+    scripts[3] = [(1.0, reply(bytes.fromhex("4318100409000000"), 0x580 + 42))]
+    with pytest.raises(DriveError, match="node 42 is another drive, serial 9, than the one"):
+        restarted(1, [(3.0, BOOT_UP)], *scripts)
+
+
+def test_a_drive_that_does_not_boot_is_asked_after_5_s_all_the_same() -> None:
+    bus = restarted(42, [], *identity_scripts())
+    assert bus.sent[0] == (0x000, b"\x81\x2a")
+    # It has the node id that it had, so nobody else is asked.
+    assert {cob_id for cob_id, _ in bus.sent[1:]} == {0x62A}
+    assert bus.time_ns == 5000 * MS + 4 * MS
