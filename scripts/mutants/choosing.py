@@ -5,11 +5,12 @@ import itertools
 import re
 from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
+from functools import cache
 from pathlib import Path
 
 from tracing import ROOT, Passed, Timed
 
-BUDGET = 4.0
+BUDGET = 6.0
 """Tests that run a changed line are tried for so long, timed under the trace [s]."""
 IMPORTING_FILES = 24
 """A fault that an import runs is tried with the tests of so many files."""
@@ -66,7 +67,9 @@ def in_function(
     tests: Sequence[Passed], budget: float, module: str, first: int, last: int
 ) -> list[Timed]:
     """Tests that run one of the lines from `first` to `last` of a module."""
-    return _affordable((test.test for test in tests if test.runs(module, first, last)), budget)
+    running = [test.test for test in tests if test.runs(module, first, last)]
+    near = {file for file in map(file_of, running) if imports(ROOT / file, module)}
+    return _affordable(running, budget, near)
 
 
 def at_import(
@@ -94,8 +97,14 @@ def at_import(
     return _affordable(some, budget, named | held)
 
 
+@cache
+def _text(file: Path) -> str:
+    return file.read_text()
+
+
+@cache
 def _says(file: Path, name: str) -> bool:
-    return re.search(rf"\b{re.escape(name)}\b", file.read_text()) is not None
+    return re.search(rf"\b{re.escape(name)}\b", _text(file)) is not None
 
 
 def file_of(test: Timed) -> str:
@@ -103,9 +112,9 @@ def file_of(test: Timed) -> str:
     return test.name.split("::")[0]
 
 
+@cache
 def imports(file: Path, module: str) -> bool:
     """Whether a file of tests imports a module of the package by its name."""
     name = "legbench." + module.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
     room, _, last = name.rpartition(".")
-    text = file.read_text()
-    return bool(re.search(rf"\b{name}\b|from {room} import .*\b{last}\b", text))
+    return bool(re.search(rf"\b{name}\b|from {room} import .*\b{last}\b", _text(file)))
