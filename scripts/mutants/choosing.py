@@ -42,25 +42,34 @@ def runs_at_import(tree: ast.Module, tests: Sequence[Passed], module: str, line:
     return not any(passed.runs(module, first, last) for passed in tests)
 
 
-def _affordable(tests: Iterable[Timed], budget: float, before: Collection[str] = ()) -> list[Timed]:
+def _affordable(tests: Iterable[Timed], budget: float, near: Collection[str] = ()) -> list[Timed]:
     """Tests for a budget's time: the fastest of each file, then each file's second fastest.
 
-    Those of some files come before all others. Files differ in what they look at, so that many of
-    them find more than all tests of a few.
+    Files differ in what they look at, so that many of them find more than all tests of a few.
+    Those of some near files get half of the time for themselves.
     """
     taken: Counter[str] = Counter()
-    ranked: list[tuple[bool, int, float, Timed]] = []
+    ranked: list[tuple[int, float, Timed]] = []
     for test in sorted(tests, key=lambda test: test.seconds):
         file = file_of(test)
-        ranked.append((file not in before, taken[file], test.seconds, test))
+        ranked.append((taken[file], test.seconds, test))
         taken[file] += 1
-    reached = [test for *_, test in sorted(ranked, key=lambda entry: entry[:3])]
-    spent = itertools.accumulate(test.seconds for test in reached)
-    kept = [test for test, so_far in zip(reached, spent, strict=True) if so_far <= budget]
+    reached = [test for *_, test in sorted(ranked, key=lambda entry: entry[:2])]
+    kept = _within(budget / 2, (test for test in reached if file_of(test) in near))
+    known = {test.name for test in kept}
+    left = budget - sum(test.seconds for test in kept)
+    kept += _within(left, (test for test in reached if test.name not in known))
     # Tests of one speed and file stay together, so that their fixtures are made once.
     return sorted(
         kept, key=lambda test: (sum(test.seconds > s for s in (0.03, 0.3, 1.0)), test.name)
     )
+
+
+def _within(budget: float, tests: Iterable[Timed]) -> list[Timed]:
+    """The first of some tests that fit into a time."""
+    kept = list(tests)
+    spent = itertools.accumulate(test.seconds for test in kept)
+    return [test for test, so_far in zip(kept, spent, strict=True) if so_far <= budget]
 
 
 def in_function(
