@@ -2,7 +2,11 @@
 
 from pathlib import Path
 
+import pytest
+
+from legbench.drives.errors import BusError
 from legbench.drives.master.channel_hold import ChannelHold
+from legbench.drives.transport import lock as lock_module
 from legbench.drives.transport.lock import ChannelLock
 
 
@@ -22,4 +26,21 @@ def test_a_hold_gives_back_what_it_has_taken_and_nothing_else(tmp_path: Path) ->
     hold.take()
     assert lock.held
     hold.release()
+    assert not lock.held
+
+
+def test_a_lock_that_excludes_a_second_master_needs_linux_and_a_private_one_does_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(what: str) -> None:
+        raise BusError(f"{what} needs Linux")
+
+    monkeypatch.setattr(lock_module, "require_linux", refuse)
+    private = ChannelLock.private("leg")
+    private.acquire()
+    assert private.held
+    private.release()
+    lock = ChannelLock("leg", tmp_path)
+    with pytest.raises(BusError, match="locking a channel against a second master needs Linux"):
+        lock.acquire()
     assert not lock.held

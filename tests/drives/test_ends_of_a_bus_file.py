@@ -1,22 +1,28 @@
 """Ends of the numbers of a bus file, written down once more; and what a file may leave out."""
 
 from dataclasses import replace
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
-from can_rig import BUS
+from can_rig import BUS, LIMITS
 from drives_rig import config
 
-from legbench.drives.setup import asking, bus_numbers
+from legbench.drives.setup import asking, bus_numbers, checks
 from legbench.drives.setup.asking import latest_request_us
 from legbench.drives.setup.building import finite
 from legbench.drives.setup.bus_file import (
     bus_from_mapping,
     format_object,
     limits_from_mapping,
+    load_bus,
+    load_limits,
     parse_object,
 )
 from legbench.drives.setup.bus_numbers import check_bus_numbers, check_start_speed
+from legbench.drives.setup.checks import _check_cycles, check_together
+from legbench.drives.setup.cob_ids import check_cob_id
+from legbench.drives.setup.config import BusConfig
 from legbench.drives.setup.pdos import PdoConfig
 from legbench.errors import ConfigError
 from legbench.reading import read_toml
@@ -113,6 +119,70 @@ def test_commands_that_are_not_given_hold_the_target_of_the_drive() -> None:
         (pdo,) = node.rpdos
         assert [format_object(entry) for entry in pdo.objects] == ["6040:00 u16", target]
         assert (pdo.number, pdo.deadline_ms) == (1, 20)
+
+
+# --- both files together ---------------------------------------------------------------------
+
+
+def with_deadlines(place: int, number: int, deadline_ms: int, period_us: int) -> BusConfig:
+    """The bench's bus with a second command frame, one of them with another deadline."""
+    bus = load_bus(BUS)
+    second = PdoConfig(number=2, objects=(parse_object("60B1:00 i32"),), deadline_ms=20)
+    nodes = [replace(node, rpdos=(*node.rpdos, second)) for node in bus.nodes]
+    rpdos = list(nodes[place].rpdos)
+    rpdos[number] = replace(rpdos[number], deadline_ms=deadline_ms)
+    nodes[place] = replace(nodes[place], rpdos=tuple(rpdos))
+    return replace(bus, nodes=tuple(nodes), period_us=period_us, tpdo_deadline_us=None)
+
+
+@pytest.mark.parametrize("place", [0, 1])
+@pytest.mark.parametrize("number", [0, 1])
+def test_every_deadline_of_every_drive_has_room_for_three_periods(place: int, number: int) -> None:
+    limits = load_limits(LIMITS)
+    for deadline_ms, period_us, most_ms in ((2, 667, 3), (11, 4000, 12)):
+        words = rf"RPDO{number + 1} of 'motor{place + 1}' is {deadline_ms} ms.*to {most_ms} or more"
+        with pytest.raises(ConfigError, match=words):
+            _check_cycles(with_deadlines(place, number, deadline_ms, period_us), limits)
+    for deadline_ms, period_us in ((0, 4000), (12, 4000), (3, 667)):
+        _check_cycles(with_deadlines(place, number, deadline_ms, period_us), limits)
+
+
+@pytest.mark.parametrize("name", ["following_cycles", "overrun_cycles", "lost_frames"])
+def test_no_limit_in_cycles_lasts_longer_than_50_ms(name: str) -> None:
+    few = {"following_cycles": 1, "overrun_cycles": 1, "lost_frames": 1}
+    for period_us, most in ((1000, 50), (2000, 25), (667, 74)):
+        bus = replace(load_bus(BUS), period_us=period_us, tpdo_deadline_us=None)
+
+        def judge(cycles: int, *waive: str, bus: BusConfig = bus) -> None:
+            # Limits of a file have an end of their own, which no period is part of.
+            _check_cycles(bus, cast(Any, SimpleNamespace(**few | {name: cycles}, waive=waive)))
+
+        judge(most)
+        judge(most + 1, name)
+        words = rf"{name} is {most + 1} cycles.* upper end is 50 ms: lower it to {most},"
+        with pytest.raises(ConfigError, match=words):
+            judge(most + 1)
+
+
+def test_drives_that_are_led_have_to_notice_the_death_of_their_master(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[tuple[str, float | None]] = []
+    monkeypatch.setattr(checks, "check_springs", lambda config: asked.append(("springs", None)))
+    monkeypatch.setattr(
+        checks, "check_master_watch", lambda config, speed: asked.append(("master", speed))
+    )
+    bus, limits = load_bus(BUS), load_limits(LIMITS)
+    check_together(bus, limits, leads=False)
+    assert asked == []
+    check_together(bus, limits)
+    assert asked == [("springs", None), ("master", limits.command_speed)]
+
+
+def test_an_identifier_is_named_in_hexadecimal_or_as_it_is() -> None:
+    for cob_id, words in ((0, "cob_id 000h is NMT"), (-1, "cob_id -1 has no 11 bits")):
+        with pytest.raises(ConfigError, match=words):
+            check_cob_id(cob_id)
 
 
 # --- requests beside the cycle ---------------------------------------------------------------
