@@ -273,12 +273,13 @@ class Trials:
         if status == NOT_SO:
             seconds = COLLECTING + TIMES * sum(test.seconds for test in fault.tests)
             status = in_fork(lambda: self._import_and_run(fault), seconds)
-        if status in UNUSABLE:
-            sys.exit(f"{fault.path}: pytest ended with {status} under {fault.text}")
         if status in UNNOTICED:
             return None
+        # What a test leaves may fail, too, when it is taken down.
         if self._failed.exists():
             return self._failed.read_text()
+        if status in UNUSABLE:
+            sys.exit(f"{fault.path}: pytest ended with {status} under {fault.text}")
         return TIME if status is None else IMPORT
 
     def _import_and_run(self, fault: Fault) -> int:
