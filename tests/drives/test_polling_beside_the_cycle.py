@@ -1,17 +1,22 @@
 """Requests for a mode and for a temperature, cycle by cycle, with every answer that may come."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 from drives_rig import config, node
 
+from legbench.drives.errors import BusError
 from legbench.drives.master import mode_poll, temperature
 from legbench.drives.master.axis_link import AxisLink
 from legbench.drives.master.mode_poll import ModePoll, mode_polls
+from legbench.drives.master.requests import Requests
 from legbench.drives.master.temperature import TemperaturePoll, temperature_polls
 from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.frame import Frame
 from legbench.drives.protocol.pdo import Mapped
+from legbench.drives.setup.asking import latest_request_us
 from legbench.drives.setup.quirks import ModeShown, Quirks
 
 MODE_QUESTION = bytes.fromhex("4061600000000000")
@@ -125,3 +130,100 @@ def test_a_drive_without_a_temperature_is_not_asked() -> None:
     assert asked(poll, 400) == []
     poll.feed(warmth_answer(50))
     assert (poll.celsius, poll.unanswered) == (None, 0)
+
+
+# --- turns -----------------------------------------------------------------------------------
+
+
+class Due:
+    """A poll whose requests are due every so many cycles."""
+
+    def __init__(self, name: int, every: int) -> None:
+        self.name, self.every = name, every
+        self.asked: list[int] = []
+
+    def due(self, cycle: int) -> Frame | None:
+        self.asked.append(cycle)
+        return None if cycle % self.every else Frame(0x600 + self.name, bytes([cycle % 251]))
+
+
+class Turns:
+    """Requests of some polls, cycle by cycle, and the frames that leave."""
+
+    def __init__(self, *every: int, period_us: int = 1000) -> None:
+        self.polls = [Due(name, cycles) for name, cycles in enumerate(every, start=1)]
+        self.sent: list[tuple[int, int]] = []
+        self.failed: list[BusError] = []
+        self.refuses = False
+        self.cycle = 0
+        port = cast(Any, SimpleNamespace(send_frame=self._send))
+        self._bus = config(period_us=period_us)
+        self.requests = Requests(port, self._bus, self.polls, self.failed.append)
+
+    def _send(self, frame: Frame) -> None:
+        if self.refuses:
+            raise BusError("full")
+        self.sent.append((self.cycle, frame.cob_id - 0x600))
+
+    def run(self, cycles: int, after_us: float | None = 0.0) -> None:
+        for _ in range(cycles):
+            self.cycle += 1
+            self.requests.turn(None if after_us is None else round(1000 * after_us))
+
+
+def test_requests_take_turns_a_cycle_apart() -> None:
+    it = Turns(20, 20, 20)
+    it.run(60)
+    # A poll is asked for the cycle in which its turn is, as many cycles ahead as there are before.
+    assert it.sent == [(20 * turn - place, place + 1) for turn in (1, 2, 3) for place in (2, 1, 0)]
+
+
+def test_polls_of_different_intervals_are_all_asked() -> None:
+    it = Turns(20, 50)
+    it.run(200)
+    assert [cycle for cycle, name in it.sent if name == 1] == list(range(20, 201, 20))
+    # Every 50 cycles, one ahead; one that is due with another waits for it.
+    assert [name for _, name in it.sent].count(2) == 4
+    assert len({cycle for cycle, _ in it.sent}) == len(it.sent)
+    # Few cycles are looked at in vain.
+    assert len(it.polls[0].asked) <= 2 * 200 / 10 + 2
+
+
+def test_a_request_waits_for_room_up_to_100_ms() -> None:
+    latest = latest_request_us(config())
+    for after_us, waits in ((latest, False), (latest + 1, True)):
+        it = Turns(200)
+        it.run(200, after_us)
+        assert it.sent == ([] if waits else [(200, 1)])
+        if waits:
+            it.run(99, after_us)
+            assert it.sent == []
+            it.run(1, after_us)
+            assert it.sent == [(300, 1)]
+    slow = Turns(50, period_us=4000)
+    slow.run(74, 4000.0)
+    assert slow.sent == []
+    slow.run(1, 4000.0)
+    assert slow.sent == [(75, 1)]
+
+
+def test_nothing_is_asked_in_a_cycle_in_which_nothing_may_be() -> None:
+    it = Turns(20)
+    it.run(19)
+    it.run(200, None)
+    assert it.sent == []
+    it.run(1)
+    # It is asked once, however long it has waited.
+    assert it.sent == [(220, 1)]
+    it.run(20)
+    assert it.sent == [(220, 1), (240, 1)]
+
+
+def test_a_request_that_cannot_be_sent_is_told_and_is_not_repeated() -> None:
+    it = Turns(20)
+    it.refuses = True
+    it.run(25)
+    assert [str(error) for error in it.failed] == ["full"]
+    it.refuses = False
+    it.run(15)
+    assert it.sent == [(40, 1)]

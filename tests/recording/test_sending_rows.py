@@ -13,6 +13,7 @@ import pytest
 from recorded_rows import cycle
 
 from legbench.recording import process_disk
+from legbench.recording.abstract_disk import Kept
 from legbench.recording.files import append_to
 from legbench.recording.process_disk import (
     END,
@@ -171,3 +172,9 @@ def test_a_closed_disk_holds_no_file_open(played: Played) -> None:
             os.fstat(file.fd)
     # The fixture closes once more what it can.
     played.files[0].fd, played.files[1].fd = os.dup(2), os.dup(2)
+
+
+def test_of_a_run_that_has_no_row_nothing_is_kept() -> None:
+    kept = Kept()
+    assert (kept.rows, kept.first, kept.last) == (0, 0.0, 0.0)
+    assert (kept.error, kept.events_error) == (None, None)
