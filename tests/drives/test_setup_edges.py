@@ -1,17 +1,28 @@
-"""Edges of what a bus file may say: laps of an encoder, bits of a home, tables that are added."""
+"""Edges of what a bus file may say, and of the session that uses it."""
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
-from drives_rig import node
+from drives_rig import config, node
 
+from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.bus import LockstepBus
+from legbench.drives.master import session as session_module
+from legbench.drives.master.session import Session
+from legbench.drives.master.stop_report import DriveLeader, StopReport
 from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.pdo import Mapped
+from legbench.drives.setup.config import Identity
+from legbench.drives.setup.configuration import configuration
 from legbench.drives.setup.field_ranges import _check_lap
 from legbench.drives.setup.file_edit import edited
 from legbench.drives.setup.homed import HomedCondition
+from legbench.drives.setup.master_watch import check_master_watch
 from legbench.drives.setup.units import AxisUnits
+from legbench.drives.transport.timebase import SystemTime
 from legbench.errors import ConfigError
 from legbench.reading import UnreadableError
 
@@ -58,3 +69,143 @@ def test_a_table_on_the_way_to_a_value_is_added() -> None:
     for place in (("node", 0, "id"), ("node", "id", "x"), ("more", 0, "id")):
         with pytest.raises(UnreadableError, match="there is no "):
             edited(text, {place: 1})
+
+
+@pytest.mark.parametrize("name", ["vendor", "product", "serial", "revision"])
+def test_every_part_of_an_identity_has_32_bits(name: str) -> None:
+    for value in (0, (1 << 32) - 1):
+        given: dict[str, int] = {"vendor": 1, name: value}
+        assert getattr(Identity(**given), name) == value
+    for value in (-1, 1 << 32):
+        given = {"vendor": 1, name: value}
+        with pytest.raises(ConfigError, match=f"{name} is {value}; it must be 0 to"):
+            Identity(**given)
+
+
+@pytest.mark.parametrize("place", [0, 1])
+def test_either_drive_that_would_go_on_without_its_master_is_named(place: int) -> None:
+    nodes = list(config().nodes)
+    nodes[place] = replace(
+        nodes[place],
+        heartbeat_consumer=False,
+        rpdos=tuple(replace(pdo, deadline_ms=0) for pdo in nodes[place].rpdos),
+    )
+    bus = config(nodes=tuple(nodes))
+    words = rf"drive '{nodes[place].name}' would not stand within 100 ms .*: it has no means"
+    with pytest.raises(ConfigError, match=words):
+        check_master_watch(bus)
+    check_master_watch(replace(bus, waive=("master watch",)))
+    check_master_watch(config())
+    # One that is not known to hold anything is not looked at.
+    other = nodes[1 - place]
+    told = {entry.key: entry.value for entry in configuration(bus, other)}
+    check_master_watch(bus, held={other.name: told})
+    with pytest.raises(ConfigError, match=words):
+        check_master_watch(bus, held={other.name: told, nodes[place].name: {}})
+
+
+# --- a session -------------------------------------------------------------------------------
+
+
+class Surroundings:
+    """A bus, a lock, a log and leaders of a session, which note what is done with them."""
+
+    channel, channel_info = "can7", "socketcan can7"
+
+    def __init__(self, *, shutdown: BaseException | None = None) -> None:
+        self.asked: list[str] = []
+        self._shutdown = shutdown
+        self.held = False
+
+    def shutdown(self) -> None:
+        self.asked.append("shutdown")
+        if self._shutdown is not None:
+            raise self._shutdown
+
+    def acquire(self) -> None:
+        self.asked.append("acquire")
+        self.held = True
+
+    def release(self) -> None:
+        self.asked.append("release")
+
+    def session(self) -> Session:
+        return Session(cast(Any, self), config(), cast(Any, self), lock=cast(Any, self))
+
+    def leader(
+        self, name: str, stopped: StopReport | None = None, error: BaseException | None = None
+    ) -> DriveLeader:
+        def close() -> None:
+            self.asked.append(f"close {name}")
+            if error is not None:
+                raise error
+
+        return cast(Any, SimpleNamespace(close=close, stopped=stopped))
+
+
+def test_a_session_stops_its_drives_then_shuts_the_bus_then_gives_the_channel_back() -> None:
+    it = Surroundings()
+    session = it.session()
+    for _ in range(2):
+        session.hold()
+    assert it.asked == ["acquire"]
+    report = StopReport(silent=("hip",))
+    session.register(it.leader("first", report))
+    session.register(it.leader("second"))
+    session.log = cast(Any, SimpleNamespace(close=lambda: it.asked.append("log")))
+    assert session.stopped == (report,)
+    for _ in range(2):
+        session.close()
+    assert it.asked[1:] == ["close first", "close second", "shutdown", "release", "log"]
+
+
+@pytest.mark.parametrize("error", [ValueError("garbled"), KeyboardInterrupt()])
+def test_nothing_that_is_raised_keeps_a_session_from_its_end(error: BaseException) -> None:
+    for where in ("leader", "bus"):
+        it = Surroundings(shutdown=error if where == "bus" else None)
+        session = it.session()
+        session.register(it.leader("first", error=error if where == "leader" else None))
+        session.register(it.leader("second"))
+        session.log = cast(Any, SimpleNamespace(close=lambda it=it: it.asked.append("log")))
+        if isinstance(error, KeyboardInterrupt):
+            with pytest.raises(KeyboardInterrupt):
+                session.close()
+        else:
+            session.close()
+        assert it.asked == ["close first", "close second", "shutdown", "release", "log"]
+
+
+def test_an_error_on_its_way_says_which_drive_keeps_its_power() -> None:
+    it = Surroundings()
+    session = it.session()
+    session.register(it.leader("first", StopReport(silent=("hip",))))
+    with pytest.raises(ValueError, match="wrong") as caught, session:
+        raise ValueError("wrong")
+    assert any("'hip' no longer answers" in note for note in caught.value.__notes__)
+    assert it.asked == ["close first", "shutdown", "release"]
+
+
+def test_a_session_names_its_channel_and_asks_no_system_in_virtual_time() -> None:
+    it = Surroundings()
+    session = it.session()
+    assert (session.channel, session.virtual) == ("can7", False)
+    network = emulate(config())
+    virtual = Session(LockstepBus("leg", network=network), config())
+    assert virtual.virtual
+    assert virtual.request_realtime() is None
+    virtual.close()
+
+
+@pytest.mark.parametrize("spin_us", [0, 100])
+def test_a_system_that_grants_it_is_waited_for_awake(
+    spin_us: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[Any] = []
+    monkeypatch.setattr(
+        session_module, "ask", lambda cpu: asked.append(cpu) or SimpleNamespace(spin_us=spin_us)
+    )
+    session = Surroundings().session()
+    granted: Any = session.request_realtime(3)
+    assert (asked, granted.spin_us) == ([3], spin_us)
+    assert isinstance(session.timebase, SystemTime)
+    assert session.timebase._spin_ns == 1000 * spin_us
