@@ -28,10 +28,10 @@ HEAVY = (
     *("can", "canopen", "durand", "serial", "numpy", "scipy.integrate", "pyarrow.parquet"),
     *("mujoco", "tyro", "hypothesis", "_hypothesis_pytestplugin", "unittest.mock", "pdb"),
 )
-TIMES, GRACE = 1.5, 3.0
+TIMES, GRACE = 1.0, 2.0
 """A child may take this many times the time of its tests without faults, and this long more [s].
 That time was taken under the trace, which makes it two to four times as long."""
-COLLECTING = 12.0
+COLLECTING = 8.0
 """The time that it may take to import and to collect the files of a few tests [s]."""
 UNNOTICED = (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED)
 NOT_SO = 71
