@@ -8,7 +8,15 @@ from drives_rig import MS, node
 
 from legbench.drives.emulated import error_frames, rules, warmth
 from legbench.drives.emulated.emergencies import EmergencyOutlet
+from legbench.drives.emulated.faults import (
+    Babble,
+    FrameFault,
+    FrameFaultKind,
+    NodeFault,
+    NodeFaultKind,
+)
 from legbench.drives.emulated.heartbeats import HeartbeatConsumer, HeartbeatProducer
+from legbench.drives.emulated.injector import Injector
 from legbench.drives.emulated.rules import objection, usable, watched
 from legbench.drives.emulated.send_queue import SendQueue
 from legbench.drives.emulated.sensors import Encoder, SensorFault, Sensors
@@ -384,3 +392,124 @@ def test_events_of_all_channels_come_in_the_order_of_their_times() -> None:
     assert log[4:] == [("b", 40, 40)]
     together.advance(38)
     assert together.now_ns() == 40
+
+
+# --- faults ----------------------------------------------------------------------------------
+
+
+def window(kind: FrameFaultKind, cob_id: int | None = 0x181, **how: int) -> FrameFault:
+    return FrameFault(kind=kind, cob_id=cob_id, start_ns=100, end_ns=200, **how)
+
+
+F = FrameFaultKind
+ANSWER = Frame(0x181, b"abcd")
+
+
+@pytest.mark.parametrize(
+    ("fault", "arrives"),
+    [
+        (window(F.DROP), ()),
+        (window(F.DROP, None), ()),
+        (window(F.DROP, 0x182), ((0, ANSWER),)),
+        (window(F.DELAY, delay_ns=30), ((30, ANSWER),)),
+        (window(F.DELAY), ((1, ANSWER),)),
+        (window(F.DUPLICATE, delay_ns=30), ((0, ANSWER), (30, ANSWER))),
+        (window(F.DUPLICATE), ((0, ANSWER), (1, ANSWER))),
+        (window(F.WRONG_LENGTH, length=3), ((0, Frame(0x181, b"abc")),)),
+        (window(F.WRONG_LENGTH, length=6), ((0, Frame(0x181, b"abcd\0\0")),)),
+        (window(F.BAD_BITS), ((0, ANSWER),)),
+    ],
+)
+def test_a_frame_has_its_fate_within_the_window_of_a_fault(
+    fault: FrameFault, arrives: tuple[tuple[int, Frame], ...]
+) -> None:
+    injector = Injector([fault])
+    for now_ns, struck in ((99, False), (100, True), (199, True), (200, False)):
+        assert injector.fate(ANSWER, now_ns) == (arrives if struck else ((0, ANSWER),))
+        broken = struck and fault.kind is F.BAD_BITS
+        assert injector.breaks(ANSWER, now_ns) is broken
+    assert Injector([]).fate(ANSWER, 150) == ((0, ANSWER),)
+
+
+def test_a_fault_of_a_node_begins_once_and_ends_once() -> None:
+    first = NodeFault(kind=NodeFaultKind.SILENT, node_id=1, start_ns=100, end_ns=200)
+    second = NodeFault(kind=NodeFaultKind.RESET, node_id=2, start_ns=150)
+    injector = Injector([first])
+    injector.add(second)
+    seen = {now: list(injector.node_events(now)) for now in (99, 100, 149, 150, 199, 200, 300)}
+    assert {now: events for now, events in seen.items() if events} == {
+        100: [(first, True)],
+        150: [(second, True)],
+        200: [(first, False)],
+    }
+    injector = Injector([first])
+    assert not injector.silent(1, 100)
+    list(injector.node_events(100))
+    assert (injector.silent(1, 100), injector.silent(2, 100)) == (True, False)
+    list(injector.node_events(200))
+    assert not injector.silent(1, 200)
+
+
+def test_a_babbling_node_sends_all_the_time() -> None:
+    babble = Babble(cob_id=1, start_ns=100, end_ns=200, every_ns=10)
+    injector = Injector([babble])
+    for now_ns, span_ns, count in ((99, 35, 0), (100, 35, 3), (199, 5, 1), (200, 35, 0)):
+        assert list(injector.babble(now_ns, span_ns)) == [Frame(1, bytes(8))] * count
+
+
+class Struck:
+    """A drive that notes what strikes it."""
+
+    def __init__(self) -> None:
+        self.log: list[Any] = []
+        note = self.log.append
+        self.axis: Any = SimpleNamespace(
+            warning=None,
+            motion=SimpleNamespace(jammed=None),
+            sensors=SimpleNamespace(
+                motor=SimpleNamespace(fail=lambda *how: note(("motor", *how))),
+                link=SimpleNamespace(fail=lambda *how: note(("link", *how))),
+            ),
+        )
+        self.trip = lambda code, now_ns: note(("trip", code, now_ns))
+        self.clear_trip = lambda code: note(("clear", code))
+        self.mute_heartbeat = lambda mute: note(("mute", mute))
+        self.reset = lambda now_ns: note(("reset", now_ns))
+        self.bus_off = lambda now_ns: note(("off", now_ns))
+        self.repeat_process_data = lambda repeats: note(("repeats", repeats))
+
+
+K = NodeFaultKind
+STRIKES: dict[NodeFaultKind, tuple[list[Any], list[Any]]] = {
+    K.UNDER_VOLTAGE: ([("trip", 0x3220, 7)], [("clear", 0x3220)]),
+    K.OVER_TEMPERATURE: ([("trip", 0x4310, 7)], [("clear", 0x4310)]),
+    K.HEARTBEAT_LOSS: ([("mute", True)], [("mute", False)]),
+    K.RESET: ([("reset", 7)], []),
+    K.BUS_OFF: ([("off", 7)], []),
+    K.REPEATING: ([("repeats", True)], [("repeats", False)]),
+    K.MOTOR_FROZEN: ([("motor", SensorFault.FROZEN, 0.5)], [("motor", None, 0.5)]),
+    K.MOTOR_STEP: ([("motor", SensorFault.STEP, 0.5)], [("motor", None, 0.5)]),
+    K.MOTOR_DRIFT: ([("motor", SensorFault.DRIFT, 0.5)], [("motor", None, 0.5)]),
+    K.LINK_FROZEN: ([("link", SensorFault.FROZEN, 0.5)], [("link", None, 0.5)]),
+    K.LINK_STEP: ([("link", SensorFault.STEP, 0.5)], [("link", None, 0.5)]),
+    K.LINK_DRIFT: ([("link", SensorFault.DRIFT, 0.5)], [("link", None, 0.5)]),
+    K.SILENT: ([], []),
+    K.WARNING: ([], []),
+    K.JAMMED: ([], []),
+}
+
+
+@pytest.mark.parametrize("kind", list(NodeFaultKind))
+def test_each_fault_strikes_its_part_of_a_drive_and_leaves_it(kind: NodeFaultKind) -> None:
+    drive = Struck()
+    fault = NodeFault(kind=kind, node_id=1, start_ns=0, size=0.5)
+    for begins, wanted in zip((True, False), STRIKES[kind], strict=True):
+        drive.log.clear()
+        Injector.strike(cast(Any, drive), fault, 7, begins=begins)
+        assert drive.log == wanted
+        shown = (drive.axis.warning, drive.axis.motion.jammed)
+        assert shown == (
+            begins if kind is K.WARNING else None,
+            begins if kind is K.JAMMED else None,
+        )
+    assert Injector.cuts_off(fault) is (kind is K.BUS_OFF)
