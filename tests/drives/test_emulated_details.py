@@ -2,12 +2,15 @@
 
 import pytest
 from drive_bench import OE, Bench, counts
+from drives_rig import MS, config
 
 from legbench.drives.emulated.behaviour import Behaviour
+from legbench.drives.emulated.build import emulate
 from legbench.drives.emulated.homing import START, Homing, HomingState
 from legbench.drives.emulated.motion import Motion
 from legbench.drives.emulated.switches import Switches
 from legbench.drives.errors import SdoAbortError
+from legbench.drives.protocol.frame import Frame
 from legbench.drives.protocol.objects import Key
 from legbench.drives.protocol.sdo import Abort
 from legbench.drives.setup.units import AxisUnits
@@ -129,3 +132,24 @@ def test_a_mapping_is_as_long_as_its_count_whatever_stands_behind_it() -> None:
     assert refusal(bench, 0x1A00, 0, 3) == Abort.PDO_LENGTH
     assert refusal(bench, 0x1A00, 0, 2) is None
     assert bench.get(0x1A00, 0) == 2
+
+
+# --- times -----------------------------------------------------------------------------------
+
+
+def test_an_answer_leaves_after_the_delay_of_its_drive_to_the_microsecond() -> None:
+    for delay_us in (1, 120, 250):
+        bench = Bench(reply_delay_us=(delay_us, delay_us))
+        bench.cycle(3)
+        bench.sent.clear()
+        began_ns = bench.now_ns
+        bench.give(Frame(0x80))
+        answers = [at_ns - began_ns for at_ns, frame in bench.sent if frame.cob_id == 0x181]
+        assert answers == [1000 * delay_us]
+
+
+def test_every_drive_of_a_bus_is_heard_in_the_tick_in_which_it_sends() -> None:
+    network = emulate(config(), [Behaviour(boot_us=3000), Behaviour(boot_us=3000)], keep_log=True)
+    network.advance(3 * MS + MS // 2)
+    heard = [(frame.cob_id, frame.data) for _, frame in network.log or []]
+    assert heard == [(0x701, b"\0"), (0x702, b"\0")]

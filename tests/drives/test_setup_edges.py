@@ -15,12 +15,14 @@ from legbench.drives.master.session import Session
 from legbench.drives.master.stop_report import DriveLeader, StopReport
 from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.pdo import Mapped
+from legbench.drives.setup import needs
 from legbench.drives.setup.config import Identity
 from legbench.drives.setup.configuration import configuration
 from legbench.drives.setup.field_ranges import _check_lap
 from legbench.drives.setup.file_edit import edited
 from legbench.drives.setup.homed import HomedCondition
 from legbench.drives.setup.master_watch import check_master_watch
+from legbench.drives.setup.outcome import cycle_count
 from legbench.drives.setup.units import AxisUnits
 from legbench.drives.transport.timebase import SystemTime
 from legbench.errors import ConfigError
@@ -209,3 +211,32 @@ def test_a_system_that_grants_it_is_waited_for_awake(
     assert (asked, granted.spin_us) == ([3], spin_us)
     assert isinstance(session.timebase, SystemTime)
     assert session.timebase._spin_ns == 1000 * spin_us
+
+
+@pytest.mark.parametrize(
+    ("value", "index", "there", "count"),
+    [
+        (1, -3, -3, 1),
+        (1, -3, -4, 10),
+        (10, -4, -3, 1),
+        (1, -3, -2, None),
+        (255, -3, -3, 255),
+        (26, -3, -4, None),
+        (25, -3, -4, 250),
+        (15, -4, -3, None),
+        (1, -3, -6, None),
+    ],
+)
+def test_a_cycle_is_said_at_another_power_of_ten_where_one_to_255_say_it(
+    value: int, index: int, there: int, count: int | None
+) -> None:
+    assert cycle_count(value, index, there) == count
+
+
+def test_mappings_are_those_objects_that_the_standard_numbers_so() -> None:
+    # CiA 301, 7.5.2.35 and .38: 512 each way.
+    for index in (0x1600, 0x17FF, 0x1A00, 0x1BFF):
+        assert any(index in mappings for mappings in needs.MAPPINGS)
+    for index in (0x15FF, 0x1800, 0x19FF, 0x1C00):
+        assert not any(index in mappings for mappings in needs.MAPPINGS)
+    assert (range(0x1400, 0x1600), range(0x1800, 0x1A00)) == (needs.RPDOS, needs.TPDOS)
