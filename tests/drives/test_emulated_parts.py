@@ -450,6 +450,16 @@ def test_a_fault_of_a_node_begins_once_and_ends_once() -> None:
     assert not injector.silent(1, 200)
 
 
+def test_all_faults_that_begin_or_end_together_do() -> None:
+    faults = [
+        NodeFault(kind=NodeFaultKind.SILENT, node_id=place, start_ns=100, end_ns=200)
+        for place in (1, 2, 3)
+    ]
+    injector = Injector(faults)
+    assert list(injector.node_events(100)) == [(fault, True) for fault in faults]
+    assert list(injector.node_events(200)) == [(fault, False) for fault in faults]
+
+
 def test_a_babbling_node_sends_all_the_time() -> None:
     babble = Babble(cob_id=1, start_ns=100, end_ns=200, every_ns=10)
     injector = Injector([babble])
