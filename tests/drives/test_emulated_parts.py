@@ -6,7 +6,8 @@ from typing import Any, cast
 import pytest
 from drives_rig import MS, node
 
-from legbench.drives.emulated import error_frames, rules, warmth
+from legbench.drives.emulated import dictionary, error_frames, rules, warmth
+from legbench.drives.emulated.dictionary import Dictionary, _shown_only, dictionary_of
 from legbench.drives.emulated.emergencies import EmergencyOutlet
 from legbench.drives.emulated.faults import (
     Babble,
@@ -26,7 +27,7 @@ from legbench.drives.emulated.stuffing import Stuffing, bits_of
 from legbench.drives.emulated.warmth import TENTHS, show_temperature
 from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.frame import Frame
-from legbench.drives.protocol.objects import Key
+from legbench.drives.protocol.objects import Access, Key, ObjectEntry
 from legbench.drives.protocol.pdo import Mapped
 from legbench.drives.protocol.sdo import Abort
 
@@ -523,3 +524,44 @@ def test_each_fault_strikes_its_part_of_a_drive_and_leaves_it(kind: NodeFaultKin
             begins if kind is K.JAMMED else None,
         )
     assert Injector.cuts_off(fault) is (kind is K.BUS_OFF)
+
+
+# --- dictionaries ----------------------------------------------------------------------------
+
+
+def test_a_dictionary_names_the_objects_of_the_profile() -> None:
+    # CiA 402-2: 6060h, 6061h and 8, cyclic synchronous position; 6080h max motor speed.
+    assert (dictionary.MODE, dictionary.MODE_DISPLAY, dictionary.CYCLIC) == (
+        (0x6060, 0),
+        (0x6061, 0),
+        8,
+    )
+    assert (dictionary.MAX_SPEED, dictionary.EMCY) == ((0x6080, 0), (0x1014, 0))
+    assert dictionary.USUAL_LINKS == ((0x60E4, 1), (0x2064, 0))
+    # COB-IDs of four PDOs each way.
+    assert {(base + n, 1) for base in (0x1400, 0x1800) for n in range(4)} == dictionary.RELATIVE
+    for place in (0, 1):
+        found = {entry.key: entry.default for entry in dictionary_of(node(place)).entries}
+        assert found[0x1014, 0] == 0x81 + place
+        assert found[0x1803, 1] == (1 << 31) + 0x481 + place
+        assert [found[0x1018, sub] for sub in (1, 2, 3, 4)] == [0x1234, 7, 0, 100 + place]
+
+
+def test_a_value_is_held_for_the_bus_alone_where_it_is_a_number() -> None:
+    for kind, default, shown in (
+        (DataType.UNSIGNED32, 5, b"\x05\0\0\0"),
+        (DataType.REAL32, 1.0, b"\0\0\x80\x3f"),
+    ):
+        entry = ObjectEntry(0x6080, 0, "it", kind, Access.RW, default)
+        held = _shown_only(entry)
+        assert (held.kind, held.default) == (DataType.OCTET_STRING, shown)
+    for kind, default in ((DataType.VISIBLE_STRING, "text"), (DataType.UNSIGNED32, b"\x01")):
+        entry = ObjectEntry(0x6080, 0, "it", kind, Access.RW, default)
+        assert _shown_only(entry) is entry
+
+
+def test_limits_of_an_object_refuse_what_lies_beyond() -> None:
+    limited = Dictionary(entries=(), limits={(0x6085, 0): (10, 100)})
+    for value, wanted in ((9, Abort.TOO_LOW), (10, None), (100, None), (101, Abort.TOO_HIGH)):
+        assert limited.refusal((0x6085, 0), value) is wanted
+        assert limited.refusal((0x6084, 0), value) is None

@@ -23,6 +23,7 @@ from legbench.drives.setup.file_edit import edited
 from legbench.drives.setup.homed import HomedCondition
 from legbench.drives.setup.master_watch import check_master_watch
 from legbench.drives.setup.outcome import cycle_count
+from legbench.drives.setup.parameters import Parameter, check_parameter
 from legbench.drives.setup.units import AxisUnits
 from legbench.drives.transport.timebase import SystemTime
 from legbench.errors import ConfigError
@@ -240,3 +241,56 @@ def test_mappings_are_those_objects_that_the_standard_numbers_so() -> None:
     for index in (0x15FF, 0x1800, 0x19FF, 0x1C00):
         assert not any(index in mappings for mappings in needs.MAPPINGS)
     assert (range(0x1400, 0x1600), range(0x1800, 0x1A00)) == (needs.RPDOS, needs.TPDOS)
+
+
+def printed_objection(index: int, value: int) -> str | None:
+    """Why an object of 16 bits is none that a bus file may give, from the manual of the file."""
+    written = {
+        *(0x1005, 0x1006, 0x1016, 0x1017, 0x1029, 0x6007, 0x6040, 0x605A, 0x6060),
+        *(0x607A, 0x60B0, 0x60C2),
+    }
+    if index in written or 0x1400 <= index < 0x1C00:
+        return "is written by itself"
+    if index in (0x1010, 0x1011):
+        return "would wear out the drive's memory"
+    if index in (0x1012, 0x1014) or 0x1200 <= index < 0x1300:
+        return "moves a service of CiA 301"
+    if index == 0x607D:
+        return "would not move with offset_counts"
+    if 0x605B <= index <= 0x605E and value <= 0:
+        return "which lets the leg drop: give 1 to 4"
+    return None
+
+
+def test_every_object_is_one_that_a_bus_file_may_give_or_is_refused_for_its_reason() -> None:
+    for index in (*range(0x1000, 0x1D00), *range(0x6000, 0x6100)):
+        for value in (-1, 0, 1):
+            parameter = Parameter(index=index, sub=0, kind=DataType.INTEGER16, value=value)
+            said = printed_objection(index, value)
+            if said is None:
+                check_parameter("hip", parameter)
+            else:
+                with pytest.raises(ConfigError, match=f"^node 'hip': parameter .*{said}"):
+                    check_parameter("hip", parameter)
+
+
+def test_a_parameter_is_a_number_that_its_type_holds() -> None:
+    for kind, low, high in (
+        (DataType.INTEGER8, -128, 127),
+        (DataType.UNSIGNED32, 0, (1 << 32) - 1),
+    ):
+        for value, fits in ((low, True), (high, True), (low - 1, False), (high + 1, False)):
+            parameter = Parameter(index=0x6085, sub=0, kind=kind, value=value)
+            if fits:
+                check_parameter("hip", parameter)
+            else:
+                words = f"is {value}, but its type {kind.name} holds {low} to {high}"
+                with pytest.raises(ConfigError, match=words):
+                    check_parameter("hip", parameter)
+    text = Parameter(index=0x6085, sub=0, kind=DataType.VISIBLE_STRING, value=0)
+    with pytest.raises(ConfigError, match="VISIBLE_STRING is no number"):
+        check_parameter("hip", text)
+    window = Parameter(index=0x6065, sub=0, kind=DataType.UNSIGNED32, value=0xFFFFFFFF)
+    with pytest.raises(ConfigError, match="switches the following error off"):
+        check_parameter("hip", window)
+    check_parameter("hip", replace(window, value=0xFFFFFFFE))
