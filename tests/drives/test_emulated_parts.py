@@ -7,6 +7,8 @@ import pytest
 from drives_rig import MS, node
 
 from legbench.drives.emulated import dictionary, error_frames, rules, warmth
+from legbench.drives.emulated.behaviour import Behaviour, MissingSetpoint
+from legbench.drives.emulated.connection import Connection
 from legbench.drives.emulated.dictionary import Dictionary, _shown_only, dictionary_of
 from legbench.drives.emulated.emergencies import EmergencyOutlet
 from legbench.drives.emulated.faults import (
@@ -30,6 +32,7 @@ from legbench.drives.protocol.frame import Frame
 from legbench.drives.protocol.objects import Access, Key, ObjectEntry
 from legbench.drives.protocol.pdo import Mapped
 from legbench.drives.protocol.sdo import Abort
+from legbench.drives.protocol.sdo_server import SdoAnswers
 
 OPERATIONAL = b"\x05"
 
@@ -565,3 +568,75 @@ def test_limits_of_an_object_refuse_what_lies_beyond() -> None:
     for value, wanted in ((9, Abort.TOO_LOW), (10, None), (100, None), (101, Abort.TOO_HIGH)):
         assert limited.refusal((0x6085, 0), value) is wanted
         assert limited.refusal((0x6084, 0), value) is None
+
+
+def test_a_drive_behaves_by_default_as_is_written_here() -> None:
+    usual = Behaviour()
+    assert (usual.reply_delay_us, usual.seed, usual.boot_us) == ((50, 250), 0, 5000)
+    assert (usual.missing_limit, usual.sync_loss_periods) == (3, 5)
+    assert (usual.status_lag_us, usual.mode_lag_us, usual.setpoint_delay) == (0, 2000, 0)
+    assert (usual.rpdos, usual.tpdos, usual.start_pos, usual.rated_torque) == (4, 4, 0.0, 10.0)
+    assert (usual.missing_setpoint, usual.sdo_answers) == (MissingSetpoint.HOLD, SdoAnswers.SIZED)
+    assert usual.lacking is Abort.NO_OBJECT
+    on = (usual.interpolate, usual.follows_bit, usual.halt_blocks_mode)
+    off = (usual.slow_loop, usual.mode_needs_power, usual.fixed_mapping)
+    assert (set(on), set(off)) == ({True}, {False})
+    assert not (usual.ignores or usual.lacks or usual.defaults or usual.warnings)
+    nothing = (usual.bandwidth, usual.slew_rate, usual.motor_noise, usual.hard_stop)
+    assert set(nothing) == {None}
+    assert usual.home_switch is None
+    ideal = Behaviour.ideal(0.5)
+    assert ideal == Behaviour(reply_delay_us=(0, 0), interpolate=False, start_pos=0.5)
+
+
+class Power:
+    """The power stage and the alarms of a drive, as its connection sees them."""
+
+    def __init__(self, *, option: int = 3, faulted: bool = False) -> None:
+        self.log: list[Any] = []
+        note = self.log.append
+        alarms = SimpleNamespace(
+            raise_=lambda code: Frame(0x81, code.to_bytes(2, "little")),
+            clear=lambda code: Frame(0x82, code.to_bytes(2, "little")),
+        )
+        power = SimpleNamespace(faulted=faulted, connection_lost=lambda: note("stop"))
+        axis: Any = SimpleNamespace(alarms=alarms, power=power, take=lambda: [Frame(0x83)])
+        self.connection = Connection(axis, {(0x6007, 0): option, (0x1015, 0): 0})
+
+    def sent(self) -> list[tuple[int, str]]:
+        return [(frame.cob_id, frame.data.hex()) for _, frame in self.connection.outlet.take()]
+
+
+def test_what_a_connection_reports_and_when_it_stops() -> None:
+    it = Power()
+    it.connection.report(0x8250, 5)
+    it.connection.over(0x8250, 6)
+    it.connection.forward(7)
+    assert it.sent() == [(0x81, "5082"), (0x82, "5082"), (0x83, "")]
+    assert it.log == []
+    it.connection.lost(0x8130, 8)
+    assert (it.sent(), it.log) == ([(0x81, "3081")], ["stop"])
+    # A fault keeps its reason until it is reset.
+    it = Power(faulted=True)
+    it.connection.over(0x8250, 6)
+    assert it.sent() == []
+
+
+@pytest.mark.parametrize("option", [0, 1, 2, 3])
+@pytest.mark.parametrize("faulted", [False, True])
+def test_a_connection_that_nmt_ends_is_an_error_where_it_is_a_fault(
+    option: int, faulted: bool
+) -> None:
+    it = Power(option=option, faulted=faulted)
+    it.connection.end(5)
+    told = option == 1 and not faulted
+    assert it.sent() == ([(0x81, "0081")] if told else [])
+    assert it.log == ["stop"]
+
+
+def test_a_drive_off_the_bus_stops_at_once_and_tells_when_it_is_back() -> None:
+    it = Power()
+    it.connection.leave_bus(5)
+    assert (it.sent(), it.log) == ([], ["stop"])
+    it.connection.rejoin_bus(9)
+    assert it.sent() == [(0x81, "4081"), (0x82, "4081")]
