@@ -581,7 +581,8 @@ def test_a_drive_behaves_by_default_as_is_written_here() -> None:
     on = (usual.interpolate, usual.follows_bit, usual.halt_blocks_mode)
     off = (usual.slow_loop, usual.mode_needs_power, usual.fixed_mapping)
     assert (set(on), set(off)) == ({True}, {False})
-    assert not (usual.ignores or usual.lacks or usual.defaults or usual.warnings)
+    assert (usual.ignores, usual.lacks) == (frozenset(), frozenset())
+    assert (usual.defaults, usual.warnings) == ((), ())
     nothing = (usual.bandwidth, usual.slew_rate, usual.motor_noise, usual.hard_stop)
     assert set(nothing) == {None}
     assert usual.home_switch is None
@@ -600,7 +601,9 @@ class Power:
             clear=lambda code: Frame(0x82, code.to_bytes(2, "little")),
         )
         power = SimpleNamespace(faulted=faulted, connection_lost=lambda: note("stop"))
-        axis: Any = SimpleNamespace(alarms=alarms, power=power, take=lambda: [Frame(0x83)])
+        axis: Any = SimpleNamespace(
+            alarms=alarms, power=power, take=lambda: [Frame(0x83), Frame(0x84)]
+        )
         self.connection = Connection(axis, {(0x6007, 0): option, (0x1015, 0): 0})
 
     def sent(self) -> list[tuple[int, str]]:
@@ -612,7 +615,7 @@ def test_what_a_connection_reports_and_when_it_stops() -> None:
     it.connection.report(0x8250, 5)
     it.connection.over(0x8250, 6)
     it.connection.forward(7)
-    assert it.sent() == [(0x81, "5082"), (0x82, "5082"), (0x83, "")]
+    assert it.sent() == [(0x81, "5082"), (0x82, "5082"), (0x83, ""), (0x84, "")]
     assert it.log == []
     it.connection.lost(0x8130, 8)
     assert (it.sent(), it.log) == ([(0x81, "3081")], ["stop"])

@@ -97,6 +97,13 @@ def test_a_file_system_without_locks_is_taken_as_it_is(
     lock(3, tmp_path, patience=9.0)
 
 
+def test_a_system_without_locks_is_taken_as_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(files_module, "fcntl", None)
+    lock(-1, tmp_path)
+
+
 def test_a_lock_that_fails_otherwise_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
