@@ -16,7 +16,7 @@ from legbench.drives.master.stop_report import DriveLeader, StopReport
 from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.pdo import Mapped
 from legbench.drives.setup import needs
-from legbench.drives.setup.config import Identity
+from legbench.drives.setup.config import BusConfig, Identity
 from legbench.drives.setup.configuration import configuration
 from legbench.drives.setup.field_ranges import _check_lap
 from legbench.drives.setup.file_edit import edited
@@ -186,6 +186,35 @@ def test_an_error_on_its_way_says_which_drive_keeps_its_power() -> None:
         raise ValueError("wrong")
     assert any("'hip' no longer answers" in note for note in caught.value.__notes__)
     assert it.asked == ["close first", "shutdown", "release"]
+
+
+@pytest.mark.parametrize("logs", ["before", "after", "never"])
+def test_a_link_is_closed_with_its_session_and_shows_its_frames_to_the_log(
+    logs: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    it, shown, made = Surroundings(), list[Any](), list[dict[str, Any]]()
+
+    def link_of(bus: Any, config: BusConfig, limits: Any, **how: Any) -> Any:
+        made.append({"bus": bus, "config": config, "limits": limits, **how})
+        link: Any = it.leader("link")
+        link.show_frames_to = shown.append
+        return link
+
+    monkeypatch.setattr(session_module, "Link", link_of)
+    session = it.session()
+    log: Any = SimpleNamespace(close=lambda: it.asked.append("log"), write=None)
+    if logs == "before":
+        session.log_to(log)
+    limits: Any = "limits"
+    session.link(limits, (4.0, 5.0), read_only=True)
+    if logs == "after":
+        session.log_to(log)
+    assert shown == ([] if logs == "never" else [session.log])
+    wanted = {"bus": it, "config": session.config, "limits": "limits", "stiffness": (4.0, 5.0)}
+    wanted |= {"timebase": it, "read_only": True, "lock": it, "momentum": None}
+    assert made == [wanted]
+    session.close()
+    assert it.asked[:3] == ["close link", "shutdown", "release"]
 
 
 def test_a_session_names_its_channel_and_asks_no_system_in_virtual_time() -> None:
