@@ -132,6 +132,7 @@ class _Serve:
     def __init__(self, wishes: Connection, failed: Path) -> None:
         self._wishes = wishes
         self._failed = failed
+        self._trials = 0
 
     def pytest_sessionstart(self) -> None:
         """A failing example is enough, it need not be the smallest."""
@@ -146,6 +147,10 @@ class _Serve:
         gc.freeze()
         self._wishes.send(None)
         while (wish := self._wishes.recv()) is not None:
+            self._trials += 1
+            files = self._failed.with_name(f"s{self._trials}")
+            # What an earlier child left running may still write where its tests had their files.
+            vars(session.config)["_tmp_path_factory"]._given_basetemp = files
             if isinstance(wish, Fault):
                 chosen = [items[test.name] for test in wish.tests]
                 seconds = GRACE + TIMES * sum(test.seconds for test in wish.tests)
@@ -154,6 +159,7 @@ class _Serve:
             else:
                 chosen = [item for item in session.items if item.path == wish]
                 self._wishes.send(in_fork(_trace_and_save(wish, chosen), 600.0))
+            shutil.rmtree(files, ignore_errors=True)
         return True
 
 
@@ -220,7 +226,9 @@ def _pytest(folder: Path, files: Iterable[str], plugin: object, *more: str) -> i
     os.chdir(ROOT)
     # A failure is not explained, only noticed: that takes ten times as long as to find it.
     usual = ["-q", "--assert=plain", "--tb=native", "-p", "no:cacheprovider", *more]
-    return pytest.main([*usual, f"--basetemp={folder / 't'}", *files], plugins=[plugin])
+    return pytest.main(
+        [*usual, f"--basetemp={folder / f't{os.getpid()}'}", *files], plugins=[plugin]
+    )
 
 
 class Trials:
