@@ -100,8 +100,9 @@ def at_import(
 
     telling = named | held
 
-    def order(file: str) -> tuple[int, float]:
-        return -(file in telling) - (file in near), seconds.get(file, 0.0)
+    def order(file: str) -> tuple[int, bool, float]:
+        closeness = (file in telling) + (file in near)
+        return -closeness, file not in near, seconds.get(file, 0.0)
 
     chosen = sorted(near | seconds.keys(), key=order)[:IMPORTING_FILES]
     some = (passed.test for passed in tests if file_of(passed.test) in chosen)

@@ -18,6 +18,7 @@ import ast
 import itertools
 import os
 import random
+import re
 import sys
 import tomllib
 from collections.abc import Sequence
@@ -89,7 +90,7 @@ def _faults(
         importing = edit.at_import or runs_at_import(tree, tests, module, line)
         if importing:
             # The constant, field or member that a line begins with.
-            name = before.split(maxsplit=1)[0].rstrip(":,")
+            name = re.findall(r"\w+", before)[0]
             chosen = at_import(tests, budget, module, name, edit.scope)
         else:
             chosen = in_function(tests, budget, module, *span(tree, line))
