@@ -7,6 +7,7 @@ import pytest
 
 from legbench.drives.emulated import error_frames
 from legbench.drives.emulated.faults import (
+    FOREVER_NS,
     Babble,
     FrameFault,
     FrameFaultKind,
@@ -171,6 +172,17 @@ def test_all_faults_that_begin_or_end_together_do() -> None:
     injector = Injector(faults)
     assert list(injector.node_events(100)) == [(fault, True) for fault in faults]
     assert list(injector.node_events(200)) == [(fault, False) for fault in faults]
+
+
+def test_a_fault_lasts_for_ever_unless_it_says_how_long() -> None:
+    # 146 years, and a number of 64 bits still.
+    assert FOREVER_NS == 4_611_686_018_427_387_904
+    frame = FrameFault(kind=F.DROP)
+    assert (frame.cob_id, frame.start_ns, frame.end_ns) == (None, 0, FOREVER_NS)
+    assert (frame.delay_ns, frame.length) == (0, 0)
+    of_node = NodeFault(kind=NodeFaultKind.RESET, node_id=1, start_ns=5)
+    assert (of_node.end_ns, of_node.size) == (FOREVER_NS, 0.0)
+    assert Babble(cob_id=1, start_ns=0, end_ns=1, every_ns=1).data == bytes(8)
 
 
 def test_a_babbling_node_sends_all_the_time() -> None:

@@ -187,6 +187,13 @@ def test_an_encoder_freezes_steps_or_drifts_and_heals() -> None:
     assert encoder.show(901) == 901
 
 
+def test_a_drift_of_one_radian_a_second_is_one_after_a_second() -> None:
+    encoder = Encoder(1e9)
+    encoder.fail(SensorFault.DRIFT, 1.0)
+    encoder.tick(1000 * MS)
+    assert encoder.show(0) == 10**9
+
+
 def test_both_encoders_have_their_own_resolution_and_fault() -> None:
     for place in (0, 1):
         here = node(place)
