@@ -16,7 +16,7 @@ from legbench.recording import process
 from legbench.recording.files import Appender, append_to
 from legbench.recording.log_file import LogFile, RingDrain
 from legbench.recording.process_disk import END, EVENT, LOG, LOG_END, REPORT, ROWS, UNKNOWN
-from legbench.recording.ring import Ring
+from legbench.recording.ring import RING_BYTES, Ring
 from legbench.recording.rows import RowBlock
 from legbench.recording.stream import WholeBatches, encode_schema, schema_for
 
@@ -258,3 +258,20 @@ def test_a_log_is_synced_as_it_is_closed_and_its_failure_is_told(
         with pytest.raises(OSError, match=CLOSED):
             os.fstat(fd)
     assert len(synced) == 3
+
+
+def test_a_ring_is_filled_to_its_last_byte_and_goes_on_behind_its_seam() -> None:
+    ring = Ring.create()
+    assert RING_BYTES == 16_777_216
+    assert ring.put(bytes(RING_BYTES - 10))
+    assert ring.put(b"0123456789")
+    assert not ring.put(b"x")
+    assert ring.waiting == RING_BYTES
+    assert ring.look(everything=True)[-10:] == b"0123456789"
+    ring.take(RING_BYTES - 4)
+    assert ring.put(b"abcdef")
+    assert ring.look(everything=True) == b"6789abcdef"
+    assert not ring.put(bytes(RING_BYTES - 9))
+    ring.take(10)
+    assert (ring.waiting, ring.look(everything=True)) == (0, b"")
+    ring.close()
