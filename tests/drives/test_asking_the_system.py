@@ -157,7 +157,8 @@ def test_a_message_is_a_frame_of_at_most_eight_bytes_and_eleven_or_29_bits() -> 
     ],
 )
 def test_what_is_no_frame_of_classic_can_is_not_sent(changes: dict[str, Any], said: str) -> None:
-    message = can.Message(**{"arbitration_id": 5, "is_extended_id": False, **changes})
+    given: dict[str, Any] = {"arbitration_id": 5, "is_extended_id": False, **changes}
+    message = can.Message(**given)
     with pytest.raises(can.CanOperationError, match=said):
         frame_of(message)
 

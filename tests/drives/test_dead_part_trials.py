@@ -13,7 +13,7 @@ from legbench.commissioning.broken_plant import Part
 from legbench.commissioning.dead_part_stage import Death, Emulation
 from legbench.commissioning.dead_parts import TrialOutcome, try_dead_part, watch_healthy
 from legbench.errors import PlantFault
-from legbench.servo import PERFECT
+from legbench.servo import ServoConfig
 
 PERIOD = 0.01
 ONSET = 0.05
@@ -59,7 +59,7 @@ def tried(stage: Stage, part: Part, monkeypatch: pytest.MonkeyPatch) -> TrialOut
     monkeypatch.setattr(dead_parts, "staged", staged)
     bench = cast(Any, None)
     found = try_dead_part(
-        bench, Emulation.SIM, "jump", Death(part=part, drive=1, onset=ONSET), PERFECT
+        bench, Emulation.SIM, "jump", Death(part=part, drive=1, onset=ONSET), ServoConfig()
     )
     assert stage.began == ["first"]
     return found
@@ -138,7 +138,7 @@ def test_a_healthy_leg_runs_its_time_or_says_what_ended_it(
         yield stage
 
     monkeypatch.setattr(dead_parts, "staged", staged)
-    found = watch_healthy(cast(Any, None), Emulation.CAN, "jump", PERFECT, 0.2)
+    found = watch_healthy(cast(Any, None), Emulation.CAN, "jump", ServoConfig(), 0.2)
     assert str(found).startswith(str(said))
     assert stage.cycles == (20 if ends is None else ends)
     assert stage.began == ["first"]

@@ -6,6 +6,7 @@ import pytest
 from drives_rig import config, node
 
 from legbench.drives.emulated.behaviour import Behaviour
+from legbench.drives.emulated.body import stiff_body
 from legbench.drives.emulated.dictionary import Dictionary, dictionary_of
 from legbench.drives.emulated.homing_methods import METHODS, Until
 from legbench.drives.emulated.oddities import changed
@@ -178,3 +179,7 @@ def test_either_drive_with_one_encoder_is_told_and_what_is_not_known_of_it(
     (line,) = describe_unknown(told)
     assert f"and the {other}'s position follows from it; joint_speed" in line
     assert describe_unknown(config()) == ()
+
+
+def test_a_stiff_body_is_where_its_motors_are_and_has_no_springs() -> None:
+    assert stiff_body((0.25, -0.5)) == ((0.25, -0.5), (0.0, 0.0))

@@ -192,14 +192,14 @@ def test_polls_of_different_intervals_are_all_asked() -> None:
 def test_a_request_waits_for_room_up_to_100_ms() -> None:
     latest = latest_request_us(config())
     for after_us, waits in ((latest, False), (latest + 1, True)):
-        it = Turns(200)
-        it.run(200, after_us)
-        assert it.sent == ([] if waits else [(200, 1)])
+        it = Turns(50)
+        it.run(50, after_us)
+        assert it.sent == ([] if waits else [(50, 1)])
         if waits:
             it.run(99, after_us)
             assert it.sent == []
             it.run(1, after_us)
-            assert it.sent == [(300, 1)]
+            assert it.sent == [(150, 1)]
     slow = Turns(50, period_us=4000)
     slow.run(74, 4000.0)
     assert slow.sent == []

@@ -138,7 +138,7 @@ def test_command_frames_are_off_before_a_part_that_holds_them_is_stored(
 
 @pytest.mark.parametrize(("settings", "wait_ms"), [({}, 10_000), ({"timeout": 60.0}, 60_000)])
 def test_a_drive_that_stores_by_itself_says_so(
-    settings: dict[str, float], wait_ms: int, monkeypatch: pytest.MonkeyPatch
+    settings: dict[str, Any], wait_ms: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     session, network = opened()
     network.drives[1]._values[0x1010, 1] = 3

@@ -20,7 +20,10 @@ from legbench.drives.setup.outcome import ObjectOutcome
 from legbench.drives.setup.quirks import ModeShown, Quirks
 from legbench.drives.setup.stopping import LONGEST_WAY, check_stopping, stopping_way
 from legbench.drives.setup.taken import _deadline, _lacking, not_given, tells_heartbeat, unprotected
+from legbench.drives.setup.waivers import describe_waivers
 from legbench.errors import ConfigError
+from legbench.limits.safety import SafetyLimits
+from legbench.limits.upper_ends import LIMIT_ENDS
 
 U32 = DataType.UNSIGNED32
 
@@ -188,3 +191,32 @@ def test_no_drive_stores_its_history_its_signatures_or_what_it_is_told_to_do() -
     never: set[Key | int] = {0x1003, 0x1010, 0x1011, 0x6040, 0x6071, 0x607A}
     assert set(memory.NEVER) == never
     assert range(0x10000) == memory.ALL
+
+
+# --- what is waived --------------------------------------------------------------------------
+
+
+def test_every_waiver_says_what_it_costs() -> None:
+    costs = {
+        "quick-stop ramp": "a drive may run on beyond the springs before a quick stop has ended",
+        "spring watch": "the springs of drives with one encoder may be wound beyond their limit",
+        "drive heartbeat": "drives tell that they live every 20 ms",
+        "master watch": "drives may go on for 21 ms when their master is gone",
+    }
+    for names in (tuple(costs), tuple(reversed(costs)), ("spring watch",), ()):
+        bus = config(waive=names)
+        wanted = tuple(f"the bus file waives the {name}: {costs[name]}" for name in names)
+        assert describe_waivers(bus, None) == wanted
+    assert describe_waivers(None, None) == ()
+
+
+def test_a_limit_that_is_waived_is_told_with_its_usual_end_and_unit() -> None:
+    waived = SafetyLimits(
+        lost_frames=100, command_speed=200.0, waive=("lost_frames", "command_speed")
+    )
+    assert describe_waivers(None, waived) == (
+        "the limits file waives the upper end of lost_frames: it is 100 cycles, the usual end 50 "
+        "cycles",
+        "the limits file waives the upper end of command_speed: it is 200 rad/s, the usual end "
+        f"{LIMIT_ENDS['command_speed'][0]:g} rad/s",
+    )

@@ -44,7 +44,7 @@ class Played:
             return SimpleNamespace(pid=4711, wait=self._wait)
 
         monkeypatch.setattr(process_disk, "_started", started)
-        self.files = [append_to(folder / name) for name in ("samples", "events")]
+        self.files = (append_to(folder / "samples"), append_to(folder / "events"))
         self.disk = ProcessDisk(*self.files, SCHEMA)
 
     def _wait(self) -> int:
@@ -155,10 +155,9 @@ def test_what_the_queue_does_not_take_waits_here_in_its_order(played: Played) ->
     assert not played.disk.lagging
     # As soon as there is room, what waits goes first.
     for row in range(sent):
-        packet = played.theirs.recv(longest_packet(SCHEMA))
+        assert played.theirs.recv(longest_packet(SCHEMA))[:1] == ROWS
         if row == sent - 2:
             played.disk.event(b"now\n")
-    assert packet[:1] == ROWS
     assert [played.theirs.recv(longest_packet(SCHEMA))[:1] for _ in (0, 1)] == [ROWS, EVENT]
     assert not played.disk._waiting
 
