@@ -24,7 +24,7 @@ from legbench.drives.protocol.nmt import NmtState
 from legbench.drives.protocol.pdo import Mapped
 from legbench.drives.setup.config import NodeConfig
 from legbench.drives.setup.encoders import check_encoder
-from legbench.drives.setup.exchange import check_exchange, exchanges
+from legbench.drives.setup.exchange import Exchange, _way, check_exchange, exchanges
 from legbench.drives.setup.homed import HomedCondition
 from legbench.drives.setup.units import AxisUnits
 from legbench.errors import ConfigError
@@ -173,6 +173,19 @@ def test_the_last_answer_of_either_channel_may_be_too_late() -> None:
         with pytest.raises(ConfigError, match=f"the last answer on a may come {late['a']:.0f} us"):
             check_exchange(replace(bus, tpdo_deadline_us=deadline))
         check_exchange(replace(bus, tpdo_deadline_us=int(late["a"]) + 1))
+
+
+def test_a_deadline_can_be_raised_as_far_as_the_period_goes() -> None:
+    bus = config(period_us=1000)
+    raised = "raise it to {:.0f}, or map fewer objects"
+    for answers_us, commands_us, way in (
+        (900.0, 1000.0, raised.format(901.0)),
+        (998.9, 1000.0, raised.format(999.9)),
+        (999.0, 1000.0, "map fewer objects in fewer PDOs"),
+        (900.0, 1000.1, "map fewer objects in fewer PDOs"),
+    ):
+        one = Exchange(channel=None, answers_us=answers_us, commands_us=commands_us)
+        assert _way(bus, one).startswith(way)
 
 
 # --- SYNC as a drive receives it -------------------------------------------------------------
