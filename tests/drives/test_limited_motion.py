@@ -139,6 +139,20 @@ def test_with_one_encoder_the_limits_are_told_which_one_the_loop_is_closed_over(
     assert hidden != hidden
 
 
+@pytest.mark.parametrize("place", [0, 1])
+def test_a_spring_is_wound_by_the_difference_of_two_encoders_or_by_its_torque(place: int) -> None:
+    leg = Leg()
+    leg.show((0.1, -0.2), (0.15, -0.05))
+    motor, link, torque = joint_of(leg.axes[place], 0.5)
+    assert (motor, link) == pytest.approx(((0.1, 0.15), (-0.2, -0.05))[place], abs=1e-4)
+    assert torque == 0.5 * (motor - link)
+    single = Leg(one_encoder=True)
+    single.show((0.1, -0.2), (80, -50))
+    motor, link, torque = joint_of(single.axes[place], 0.5)
+    assert torque == pytest.approx((0.8, 0.5)[place])
+    assert motor - link == pytest.approx(torque / 0.5)
+
+
 def test_a_spring_for_each_drive_and_limits_of_what_the_drives_tell() -> None:
     leg = Leg()
     for springs in ((4.0,), (4.0, 5.0, 6.0)):
