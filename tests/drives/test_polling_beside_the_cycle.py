@@ -191,7 +191,7 @@ def test_polls_of_different_intervals_are_all_asked() -> None:
 
 def test_a_request_waits_for_room_up_to_100_ms() -> None:
     latest = latest_request_us(config())
-    for after_us, waits in ((latest, False), (latest + 1, True)):
+    for after_us, waits in ((latest, False), (latest + 0.001, True)):
         it = Turns(50)
         it.run(50, after_us)
         assert it.sent == ([] if waits else [(50, 1)])

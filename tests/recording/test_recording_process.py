@@ -274,4 +274,8 @@ def test_a_ring_is_filled_to_its_last_byte_and_goes_on_behind_its_seam() -> None
     assert not ring.put(bytes(RING_BYTES - 9))
     ring.take(10)
     assert (ring.waiting, ring.look(everything=True)) == (0, b"")
+    # Once all is taken there is room for as much as it holds, from wherever it begins.
+    whole = bytes(RING_BYTES - 1) + b"x"
+    assert ring.put(whole)
+    assert ring.look(everything=True) == whole
     ring.close()
