@@ -223,3 +223,10 @@ def test_a_temperature_is_shown_in_the_unit_of_its_object(
         for key in ((0x2070, 0), None):
             show_temperature(store, cast(Any, SimpleNamespace(temperature=key)), drive, 25.0)
     assert told == [((0x2070, 0), pytest.approx(shown))]
+
+
+def test_a_controller_is_active_and_hears_others_alone() -> None:
+    station = Station(3, 500_000)
+    assert (station.tx_queue, station.bitrate) == (3, 500_000)
+    assert (station.listen_only, station.echo) == (False, False)
+    assert (station.waiting, station.unread, len(station.received)) == (0, 0, 0)
