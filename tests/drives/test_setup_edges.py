@@ -21,8 +21,8 @@ from legbench.drives.setup.configuration import configuration
 from legbench.drives.setup.field_ranges import _check_lap
 from legbench.drives.setup.file_edit import edited
 from legbench.drives.setup.homed import HomedCondition
-from legbench.drives.setup.master_watch import check_master_watch
-from legbench.drives.setup.outcome import cycle_count
+from legbench.drives.setup.master_watch import check_master_watch, means_of
+from legbench.drives.setup.outcome import cycle_count, held_by
 from legbench.drives.setup.parameters import Parameter, check_parameter
 from legbench.drives.setup.units import AxisUnits
 from legbench.drives.transport.timebase import SystemTime
@@ -105,6 +105,57 @@ def test_either_drive_that_would_go_on_without_its_master_is_named(place: int) -
     check_master_watch(bus, held={other.name: told})
     with pytest.raises(ConfigError, match=words):
         check_master_watch(bus, held={other.name: told, nodes[place].name: {}})
+    with pytest.raises(ConfigError, match=words):
+        check_master_watch(bus, held={nodes[place].name: {}})
+
+
+@pytest.mark.parametrize(
+    "led", [Mapped(0x6040, 0, DataType.UNSIGNED16), Mapped(0x607A, 0, DataType.INTEGER32)], ids=str
+)
+def test_a_deadline_of_either_object_of_a_command_is_a_means(led: Mapped) -> None:
+    there = config()
+    objects = (led, Mapped(0x6071, 0, DataType.INTEGER16))
+    drive = replace(there.nodes[0])
+    object.__setattr__(drive, "rpdos", (SimpleNamespace(number=2, objects=objects),))
+    told = {entry.key: entry.value for entry in configuration(there, there.nodes[0])}
+    told = {**told, (0x1016, 1): 0, (0x1401, 5): 7}
+    (means,) = means_of(there, drive, held=told)
+    assert (means.name, means.time_ms) == (
+        "deadline of RPDO2 1401h:05",
+        7 + 1e-3 * there.period_us,
+    )
+
+
+def test_what_a_drive_holds_is_what_was_read_else_what_it_took() -> None:
+    def one(sub: int, there: int | None, *, agrees: bool) -> Any:
+        parameter = Parameter(index=0x6085, sub=sub, kind=DataType.UNSIGNED32, value=100 + sub)
+        return SimpleNamespace(parameter=parameter, there=there, agrees=agrees)
+
+    outcomes = (
+        one(1, None, agrees=True),
+        one(2, None, agrees=False),
+        one(3, 7, agrees=False),
+        one(4, 8, agrees=True),
+    )
+    assert held_by(outcomes) == {(0x6085, 1): 101, (0x6085, 3): 7, (0x6085, 4): 8}
+
+
+def test_a_drive_may_be_up_to_as_slow_as_the_table_says_and_never_off() -> None:
+    assert not needs._time(100, 0)
+    assert needs._time(100, 1)
+    assert needs._time(0, 0) is False
+    assert (0x6065, 0) in needs.TABLE
+    assert (0x6065, 1) not in needs.TABLE
+
+
+def test_a_bus_has_two_encoders_only_where_every_drive_has_and_waits_200_ms() -> None:
+    there = config()
+    assert BusConfig.__dataclass_fields__["sdo_timeout_ms"].default == 200
+    one, two = SimpleNamespace(link=None), SimpleNamespace(link=there.nodes[0].motor)
+    lone = SimpleNamespace(nodes=(two, one))
+    getter = cast("Any", BusConfig.two_encoders).fget
+    assert not getter(lone)
+    assert getter(SimpleNamespace(nodes=(two, two)))
 
 
 # --- a session -------------------------------------------------------------------------------
