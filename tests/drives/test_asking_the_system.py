@@ -12,6 +12,7 @@ import pytest
 from drives_rig import config
 
 from legbench.drives.errors import BusError
+from legbench.drives.transport import open_bus as open_bus_module
 from legbench.drives.transport import open_channels as open_channels_module
 from legbench.drives.transport import realtime
 from legbench.drives.transport.messages import frame_of, message_of
@@ -242,3 +243,27 @@ def test_the_only_channel_is_that_of_the_flag_or_of_the_drives() -> None:
     bus = config(interface="socketcan", channel="can5")
     assert adapters_of(bus) == (Adapter(interface="socketcan", channel="can5"),)
     assert adapters_of(bus, channel="can6") == (Adapter(interface="socketcan", channel="can6"),)
+
+
+@pytest.mark.parametrize(
+    ("channel", "given", "wanted"),
+    [
+        ("/dev/pts/7", {}, 0.0),
+        ("/dev/pts/7", {"sleep_after_open": 2.0}, 2.0),
+        ("/dev/tty", {}, None),
+    ],
+)
+def test_a_terminal_of_a_program_needs_no_time_to_boot(
+    monkeypatch: pytest.MonkeyPatch, channel: str, given: dict[str, Any], wanted: float | None
+) -> None:
+    opened: list[dict[str, Any]] = []
+    module = SimpleNamespace(SlcanBus=lambda **options: opened.append(options))
+    monkeypatch.setattr(open_bus_module, "import_module", lambda _name: module)
+    monkeypatch.setattr(
+        open_bus_module, "load_config", lambda config: {"interface": "slcan", **config, **given}
+    )
+    monkeypatch.setattr(open_bus_module.os.path, "realpath", lambda path: path)
+    open_bus_module._slcan({"channel": channel})
+    (options,) = opened
+    assert options.pop("sleep_after_open", None) == wanted
+    assert options == {"channel": channel}

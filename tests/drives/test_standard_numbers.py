@@ -8,7 +8,7 @@ import itertools
 
 import pytest
 
-from legbench.drives.emulated import axis, connection, drive, reception
+from legbench.drives.emulated import axis, connection, dictionary, drive, reception
 from legbench.drives.emulated.alarms import register_of
 from legbench.drives.emulated.power import POWERED as POWERED_INSIDE
 from legbench.drives.emulated.power import PowerStage
@@ -591,3 +591,9 @@ def test_a_row_of_the_table_is_read_as_it_stands(
     assert (entry.access.value, entry.default, entry.mappable) == (access, default, mappable)
     assert objects.name_of(*key) == f"{key[0]:04X}h:{key[1]:02X} {name}"
     assert objects.name_of(0x5FFF, 3) == "5FFFh:03"
+
+
+def test_an_emulated_drive_knows_its_objects_by_the_numbers_of_the_standard() -> None:
+    assert dictionary.MAX_SPEED == (0x6080, 0)
+    assert (dictionary.MODE, dictionary.MODE_DISPLAY) == ((0x6060, 0), (0x6061, 0))
+    assert dictionary.CYCLIC == 8
