@@ -213,16 +213,16 @@ def test_a_temperature_is_shown_in_the_unit_of_its_object(
     entry: Mapped | None, scale: float, shown: float
 ) -> None:
     assert (warmth.WARM, warmth.HOT) == (25.0, 90.0)
-    told: list[tuple[Key, float]] = []
+    told: list[tuple[bool, Key, float]] = []
     for there in (True, False):
         store: Any = SimpleNamespace(
             entry=lambda key, there=there: there or None,
-            show=lambda key, value: told.append((key, value)),
+            show=lambda key, value, there=there: told.append((there, key, value)),
         )
         drive: Any = SimpleNamespace(temperature_object=entry, temperature_scale=scale)
         for key in ((0x2070, 0), None):
             show_temperature(store, cast(Any, SimpleNamespace(temperature=key)), drive, 25.0)
-    assert told == [((0x2070, 0), pytest.approx(shown))]
+    assert told == [(True, (0x2070, 0), pytest.approx(shown))]
 
 
 def test_a_controller_is_active_and_hears_others_alone() -> None:
