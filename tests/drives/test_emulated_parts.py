@@ -9,9 +9,11 @@ from drives_rig import MS, node
 from legbench.drives.emulated import warmth
 from legbench.drives.emulated.emergencies import EmergencyOutlet
 from legbench.drives.emulated.heartbeats import HeartbeatConsumer, HeartbeatProducer
+from legbench.drives.emulated.homing_methods import Until
 from legbench.drives.emulated.send_queue import SendQueue
 from legbench.drives.emulated.sensors import Encoder, SensorFault, Sensors
 from legbench.drives.emulated.station import Station
+from legbench.drives.emulated.switches import Switches
 from legbench.drives.emulated.warmth import TENTHS, show_temperature
 from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.frame import Frame
@@ -230,3 +232,16 @@ def test_a_controller_is_active_and_hears_others_alone() -> None:
     assert (station.tx_queue, station.bitrate) == (3, 500_000)
     assert (station.listen_only, station.echo) == (False, False)
     assert (station.waiting, station.unread, len(station.received)) == (0, 0, 0)
+
+
+def test_a_home_switch_is_active_from_one_end_to_the_other() -> None:
+    switches: Any = Switches.__new__(Switches)
+    switches._limits, switches._home = (-5.0, 30.0), (10.0, 20.0)
+    for travel, home in ((9.5, False), (10.0, True), (15.0, True), (20.0, True), (20.5, False)):
+        assert switches.active(Until.HOME, travel) is home
+    assert switches.active(Until.NEGATIVE_LIMIT, -5.0)
+    assert not switches.active(Until.NEGATIVE_LIMIT, -4.5)
+    assert switches.active(Until.POSITIVE_LIMIT, 30.0)
+    assert not switches.active(Until.POSITIVE_LIMIT, 29.5)
+    switches._home = None
+    assert not switches.active(Until.HOME, 15.0)

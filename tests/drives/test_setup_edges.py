@@ -14,18 +14,21 @@ from legbench.drives.master import session as session_module
 from legbench.drives.master.session import Session
 from legbench.drives.master.stop_report import DriveLeader, StopReport
 from legbench.drives.protocol.datatypes import DataType
+from legbench.drives.protocol.frame import Frame
 from legbench.drives.protocol.pdo import Mapped
-from legbench.drives.setup import needs
+from legbench.drives.setup import field_ranges, needs, stopping
 from legbench.drives.setup.config import BusConfig, Identity
 from legbench.drives.setup.configuration import configuration
-from legbench.drives.setup.field_ranges import _check_lap
+from legbench.drives.setup.field_ranges import _check_lap, check_field_ranges
 from legbench.drives.setup.file_edit import edited
 from legbench.drives.setup.homed import HomedCondition
 from legbench.drives.setup.master_watch import check_master_watch, means_of
 from legbench.drives.setup.outcome import cycle_count, held_by
 from legbench.drives.setup.parameters import Parameter, check_parameter
 from legbench.drives.setup.units import AxisUnits
+from legbench.drives.transport import unix_packet
 from legbench.drives.transport.timebase import SystemTime
+from legbench.drives.transport.unix_packet import Controller
 from legbench.errors import ConfigError
 from legbench.reading import UnreadableError
 
@@ -374,3 +377,78 @@ def test_a_parameter_is_a_number_that_its_type_holds() -> None:
     with pytest.raises(ConfigError, match="switches the following error off"):
         check_parameter("hip", window)
     check_parameter("hip", replace(window, value=0xFFFFFFFE))
+
+
+# --- ends of what is refused -----------------------------------------------------------------
+
+
+def stops(value: int, counts_per_rad: float = 100.0) -> Any:
+    ramp = Parameter(index=0x6085, sub=0, kind=DataType.UNSIGNED32, value=value)
+    motor = SimpleNamespace(counts_per_rad=counts_per_rad)
+    return SimpleNamespace(name="hip", parameters=(ramp,), motor=motor, quick_stop_ramp=None)
+
+
+def test_a_way_of_exactly_the_longest_is_let_through(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stopping, "quick_stop_ramp", lambda _node: (0x6085, 0))
+    assert stopping.LONGEST_WAY == 0.2
+    assert stopping.stopping_way(stops(1), 2.0) == 200.0
+    with pytest.raises(ConfigError, match="has no quick-stop ramp"):
+        stopping.stopping_way(stops(0), 2.0)
+    limits: Any = SimpleNamespace(command_speed=2.0)
+    for value, fits in ((1000, True), (999, False)):
+        bus: Any = SimpleNamespace(waive=(), nodes=(stops(value),))
+        if fits:
+            assert stopping.stopping_way(stops(value), 2.0) == 0.2
+            stopping.check_stopping(bus, limits)
+        else:
+            with pytest.raises(ConfigError, match=r"needs 0\.2 rad to stop from 2 rad/s"):
+                stopping.check_stopping(bus, limits)
+
+
+def test_a_range_that_ends_at_the_last_count_or_at_half_a_lap() -> None:
+    slack = field_ranges.SLACK
+    drive: Any = SimpleNamespace(
+        name="hip",
+        motor_object="6064h",
+        motor=SimpleNamespace(
+            modulus_counts=None,
+            lowest=-100,
+            modulus=201,
+            bits=8,
+            lap=4.0,
+            to_counts=lambda end: end,
+        ),
+    )
+    for low, high, fits in ((-100, 100, True), (-101, 100, False), (-100, 101, False)):
+        drive.motor.to_counts = lambda end, low=low, high=high: low if end < 0 else high
+        if fits:
+            field_ranges._check_motor(drive, (-1.0, 1.0))
+        else:
+            with pytest.raises(ConfigError, match=f"are {low} to {high} counts"):
+                field_ranges._check_motor(drive, (-1.0, 1.0))
+    drive.motor.lap = 2.0 * (1.0 + slack)
+    for half in (-1.0, 1.0):
+        with pytest.raises(ConfigError, match="from angle 0"):
+            field_ranges._check_lap(drive, (min(half, 0.0), max(half, 0.0)))
+    field_ranges._check_lap(drive, (-0.999, 0.999))
+
+
+@pytest.mark.parametrize("places", [1, 3])
+def test_every_drive_has_its_ranges(places: int) -> None:
+    there = config()
+    free = (-math.inf, math.inf)
+    limits: Any = SimpleNamespace(
+        motor_range=(free,) * places, joint_range=(free,) * places, temperature=math.inf
+    )
+    with pytest.raises(ValueError, match="zip"):
+        check_field_ranges(there, limits)
+
+
+@pytest.mark.parametrize("controller", [0, 1, 2])
+def test_a_packet_notes_the_controller_beside_what_is_its_own(controller: int) -> None:
+    for own in (False, True):
+        packet = unix_packet.pack_frame(Frame(0x181, b"\1"), Controller(controller), own=own)
+        assert packet[unix_packet.NOTE] == 2 * controller + own
+        assert unix_packet.controller_of(packet) == controller
+        assert unix_packet.is_own(packet) is own
+    assert (Controller.ACTIVE, Controller.PASSIVE, Controller.BUS_OFF) == (0, 1, 2)
