@@ -16,7 +16,7 @@ from legbench.drives.master.stop_report import DriveLeader, StopReport
 from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.frame import Frame
 from legbench.drives.protocol.pdo import Mapped
-from legbench.drives.setup import field_ranges, needs, stopping
+from legbench.drives.setup import field_ranges, needs, pdos, stopping
 from legbench.drives.setup.config import BusConfig, Identity
 from legbench.drives.setup.configuration import configuration
 from legbench.drives.setup.field_ranges import _check_lap, check_field_ranges
@@ -25,6 +25,7 @@ from legbench.drives.setup.homed import HomedCondition
 from legbench.drives.setup.master_watch import check_master_watch, means_of
 from legbench.drives.setup.outcome import cycle_count, held_by
 from legbench.drives.setup.parameters import Parameter, check_parameter
+from legbench.drives.setup.pdos import packed
 from legbench.drives.setup.units import AxisUnits
 from legbench.drives.transport import unix_packet
 from legbench.drives.transport.timebase import SystemTime
@@ -452,3 +453,21 @@ def test_a_packet_notes_the_controller_beside_what_is_its_own(controller: int) -
         assert unix_packet.controller_of(packet) == controller
         assert unix_packet.is_own(packet) is own
     assert (Controller.ACTIVE, Controller.PASSIVE, Controller.BUS_OFF) == (0, 1, 2)
+
+
+def test_a_process_data_object_by_default_and_its_deadline() -> None:
+    assert (pdos.RPDO.number, pdos.RPDO.deadline_ms, pdos.RPDO.cob_id) == (1, 20, None)
+    assert (pdos.TPDO.number, pdos.TPDO.deadline_ms, pdos.TPDO.cob_id) == (1, 0, None)
+    assert Mapped(0x2064, 0, DataType.INTEGER16) == pdos.LINK_POSITION_SHORT
+    for deadline_ms, fits in ((0, True), (65535, True), (-1, False), (65536, False)):
+        if fits:
+            assert replace(pdos.RPDO, deadline_ms=deadline_ms).deadline_ms == deadline_ms
+        else:
+            with pytest.raises(ConfigError, match="deadline_ms"):
+                replace(pdos.RPDO, deadline_ms=deadline_ms)
+
+
+def test_objects_are_packed_into_frames_of_eight_bytes() -> None:
+    word, byte = Mapped(0x6041, 0, DataType.UNSIGNED16), Mapped(0x6061, 0, DataType.INTEGER8)
+    assert [list(pdo.objects) for pdo in packed((word,) * 4)] == [[word] * 4]
+    assert [list(pdo.objects) for pdo in packed((*(word,) * 4, byte))] == [[word] * 4, [byte]]
