@@ -16,7 +16,7 @@ from legbench.drives.master.stop_report import DriveLeader, StopReport
 from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.frame import Frame
 from legbench.drives.protocol.pdo import Mapped
-from legbench.drives.setup import field_ranges, needs, pdos, stopping
+from legbench.drives.setup import eds, field_ranges, needs, pdos, stopping
 from legbench.drives.setup.config import BusConfig, Identity
 from legbench.drives.setup.configuration import configuration
 from legbench.drives.setup.field_ranges import _check_lap, check_field_ranges
@@ -471,3 +471,14 @@ def test_objects_are_packed_into_frames_of_eight_bytes() -> None:
     word, byte = Mapped(0x6041, 0, DataType.UNSIGNED16), Mapped(0x6061, 0, DataType.INTEGER8)
     assert [list(pdo.objects) for pdo in packed((word,) * 4)] == [[word] * 4]
     assert [list(pdo.objects) for pdo in packed((*(word,) * 4, byte))] == [[word] * 4, [byte]]
+
+
+def test_a_data_sheet_says_0_for_what_an_identity_leaves_open() -> None:
+    there = config()
+    drive = replace(there.nodes[0], identity=Identity(vendor=7))
+    text = eds.dcf_text(replace(there, nodes=(drive, *there.nodes[1:])), drive)
+    lines = [line.strip().replace(" ", "") for line in text.splitlines()]
+    numbers = [line.partition("=") for line in lines if line.startswith(("Product", "Revision"))]
+    found = {name: int(value, 0) for name, _, value in numbers if name.endswith("Number")}
+    assert found == {"ProductNumber": 0, "RevisionNumber": 0}
+    assert (eds.MANUFACTURER.start, eds.MANUFACTURER.stop) == (0x2000, 0x6000)
