@@ -39,13 +39,13 @@ check: $(STAMP) typings/mujoco/__init__.pyi dist ## lint, format, types, layers,
 	$(BIN)/pyrefly check --threads 1
 	$(BIN)/lint-imports
 
-test: check ## check, then the tests, a file a processor at a time
-	$(BIN)/pytest -m 'not long' --numprocesses auto --dist loadfile
+test: check ## check, then the tests, a share of their files a processor
+	$(BIN)/python scripts/run_tests.py -m 'not long'
 
 test-long: $(STAMP) ## the tests that `make test` leaves out, a notebook's kernel installed for them
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[notebook]'
 	$(BIN)/python scripts/dist.py --fresh
-	$(BIN)/pytest -m long --numprocesses auto --dist loadfile
+	$(BIN)/python scripts/run_tests.py -m long
 
 test-engine: $(STAMP) ## the tests against Pinocchio, which is installed for them
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[pinocchio]'

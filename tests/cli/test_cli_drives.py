@@ -1,12 +1,16 @@
 """`legbench drives` and `legbench run --plant can` as a user calls them."""
 
 import json
+import os
 import re
 import shutil
+import signal
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import can
 import pytest
 from commands import Done, called
 
@@ -104,8 +108,13 @@ def test_home_calls_the_present_position_zero(drives: Drives) -> None:
 
 
 @pytest.mark.parametrize("method", ["-1", "-4", "1", "17", "23", "34"])
-def test_every_kind_of_homing_can_be_tried(method: str, drives: Drives) -> None:
-    done = drives("home", "--node", "motor1", "--method", method, "--json")
+def test_every_kind_of_homing_can_be_tried(
+    method: str, capfd: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    quick = changed(tmp_path, ('"6099:01 u32" = 12517', '"6099:01 u32" = 60_000'))
+    where = ("--interface", "legbench", "--bus", quick, *DESIGN)
+    words = ("home", "--node", "motor1", "--method", method, "--json")
+    done = called(capfd, "drives", *words, *where)
     assert done.status == 0, done.err
     told = json.loads(done.out)
     assert (told["method"], told["after_counts"]) == (int(method), 0)
@@ -227,22 +236,62 @@ def test_actions_refuse_what_makes_no_sense(
     drives(*arguments).refused(*words)
 
 
-@pytest.mark.parametrize(
-    "how", [("--channel", "leg.sock"), ("--channel", "leg.sock,leg.sock"), ("--serve", "slcan")]
-)
+@pytest.mark.parametrize("names", ["leg.sock", "leg.sock,leg.sock"])
 def test_emulate_wants_a_socket_file_for_each_channel(
-    how: tuple[str, str], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    names: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     bus = changed(tmp_path, ('name = "motor2"', 'channel = "can1"\nname = "motor2"'))
     ask = ("drives", "emulate", "--bus", bus, "--bare", "--seconds", "0.05")
-    at = how
-    if how[0] == "--channel":
-        at = (how[0], ",".join(str(tmp_path / name) for name in how[1].split(",")))
-    done = called(capfd, *ask, *at)
+    at = ",".join(str(tmp_path / name) for name in names.split(","))
+    done = called(capfd, *ask, "--channel", at)
     done.refused("2 channels, can0, can1", "--channel can0.sock,can1.sock")
     assert list(tmp_path.glob("*.sock")) == []
-    one = at if how[0] != "--channel" else (how[0], at[1].split(",")[0])
+    one = ("--channel", at.split(",")[0])
     assert called(capfd, *ask, *one, "--only", "motor2").status == 0
+
+
+def test_emulate_gives_each_channel_a_terminal_of_its_own(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    bus = changed(tmp_path, ('name = "motor2"', 'channel = "can1"\nname = "motor2"'))
+    ask = ("drives", "emulate", "--bus", bus, "--serve", "slcan", "--bare", "--seconds", "0.05")
+    done = called(capfd, *ask)
+    assert done.status == 0
+    assert re.search(r"--interface slcan --channel /dev/pts/\d+,/dev/pts/\d+ ", done.err)
+    links = tmp_path / "a.tty", tmp_path / "b.tty"
+    done = called(capfd, *ask, "--channel", ",".join(map(str, links)))
+    assert done.status == 0
+    done = called(capfd, *ask, "--channel", "a.tty")
+    done.refused("2 channels, can0, can1", "a link for each", "--channel can0.tty,can1.tty")
+    assert list(tmp_path.glob("*.tty")) == []
+    assert called(capfd, *ask, "--only", "motor2").status == 0
+
+
+def test_emulate_lets_each_drive_speak_on_its_own_bus_alone(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    bus = changed(tmp_path, ('name = "motor2"', 'channel = "can1"\nname = "motor2"'))
+    names = ("emulated a", "emulated b")
+    heard = [can.Bus(interface="virtual", channel=name) for name in names]
+    seen: list[set[int]] = []
+
+    def listen_then_stop() -> None:
+        first = [one.recv(20.0) for one in heard]
+        seen.extend({frame.arbitration_id} for frame in first if frame is not None)
+        if len(seen) == 2:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    listener = threading.Thread(target=listen_then_stop)
+    listener.start()
+    ask = ("drives", "emulate", "--bus", bus, "--bare", "--seconds", "60")
+    done = called(capfd, *ask, "--interface", "virtual", "--channel", ",".join(names))
+    listener.join()
+    assert done.status == 0, done.err
+    for one, ids in zip(heard, seen, strict=True):
+        while (frame := one.recv(0.0)) is not None:
+            ids.add(frame.arbitration_id)
+        one.shutdown()
+    assert seen == [{0x701}, {0x702}]
 
 
 def test_emulate_serves_two_channels_and_leaves_no_socket_file(

@@ -2,16 +2,16 @@
 
 import math
 from collections import deque
-from collections.abc import Sequence
 from typing import final
 
 from legbench.limits.knee import Range
 from legbench.limits.momentum import (
     LegMomentum,
+    LegMotion,
     MomentumReading,
     SupportPoint,
-    Unexplained,
-    unexplained,
+    left_over,
+    motion_of,
 )
 from legbench.limits.plausibility import Doubt
 
@@ -37,17 +37,25 @@ class _Average:
     """Three moving averages over so many cycles, one after the other."""
 
     def __init__(self, cycles: int) -> None:
-        self._stages = [deque([0.0] * cycles, maxlen=cycles) for _ in range(3)]
-        self._sums = [0.0, 0.0, 0.0]
+        self._stages = tuple(deque([0.0] * cycles, maxlen=cycles) for _ in range(3))
+        self._sums = (0.0, 0.0, 0.0)
         self._share = 1.0 / cycles
 
     def after(self, value: float) -> float:
         """Take one more value; return the average."""
-        for place, stage in enumerate(self._stages):
-            self._sums[place] += value - stage[0]
-            stage.append(value)
-            value = self._share * self._sums[place]
-        return value
+        first, second, third = self._stages
+        sum_1, sum_2, sum_3 = self._sums
+        share = self._share
+        sum_1 += value - first[0]
+        first.append(value)
+        once = share * sum_1
+        sum_2 += once - second[0]
+        second.append(once)
+        twice = share * sum_2
+        sum_3 += twice - third[0]
+        third.append(twice)
+        self._sums = sum_1, sum_2, sum_3
+        return share * sum_3
 
 
 @final
@@ -55,26 +63,26 @@ class _SupportWatch:
     """Unexplained torque about one support, averaged.
 
     Attributes:
+        cycles: cycles over which each of the three averages is taken.
         reach: cycles over which the averages reach.
     """
 
     def __init__(
         self, leg: LegMomentum, support: SupportPoint, torque: float, period: float
     ) -> None:
-        self._leg, self._support = leg, support
-        self._cycles = support.average_cycles(leg.link_step, NOISE_SHARE * torque, period)
-        self.reach = 3 * self._cycles
+        self._support = support
+        self.cycles = support.average_cycles(leg.link_step, NOISE_SHARE * torque, period)
+        self.reach = 3 * self.cycles
         self.restart()
 
     def restart(self) -> None:
         """Begin to average anew."""
-        self._averages = [_Average(self._cycles) for _ in Unexplained._fields]
+        self._polar, self._knee = _Average(self.cycles), _Average(self.cycles)
 
-    def after(self, readings: Sequence[MomentumReading]) -> Unexplained:
-        """Take three readings; return the average."""
-        torque = unexplained(self._leg, self._support, readings)
-        both = zip(self._averages, torque, strict=True)
-        return Unexplained(*[average.after(value) for average, value in both])
+    def after(self, motion: LegMotion) -> tuple[float, float]:
+        """Take one more motion; return the averages along q1 + q2 and along the knee [N m]."""
+        polar, knee = left_over(self._support, motion)
+        return self._polar.after(polar), self._knee.after(knee)
 
 
 @final
@@ -91,6 +99,7 @@ class _Mismatch:
     def __init__(self, torque: float, period: float) -> None:
         """Begin with springs as designed; those wound by less than a torque [N m] tell little."""
         self._memory, self._torque = round(LEARNING_TIME / period), torque
+        self._least = torque**2
         self._seen, self._product, self._square = 0, 0.0, 0.0
         self.share = 0.0
 
@@ -99,15 +108,20 @@ class _Mismatch:
         """Whether it has been learned for long enough."""
         return self._seen >= self._memory
 
-    def learn(self, torque: Unexplained | None) -> None:
-        """Take what the likeliest support leaves unexplained; none if the knee rules out all."""
+    def learn(self, polar: float, wound: float) -> None:
+        """Take what the likeliest support leaves unexplained in a cycle.
+
+        Args:
+            polar: torque along q1 + q2, infinite if the knee rules out all supports [N m].
+            wound: torque by which the springs are wound [N m].
+        """
         self._seen = min(self._seen + 1, self._memory)
-        if torque is None or abs(torque.polar) > self._torque + MISMATCH * abs(torque.wound):
+        if abs(polar) > self._torque + MISMATCH * abs(wound):
             return  # That much is no spring's.
         gain = 1.0 / self._seen
-        self._product += gain * (torque.polar * torque.wound - self._product)
-        self._square += gain * (torque.wound * torque.wound - self._square)
-        share = self._product / (self._square + self._torque**2)
+        self._product += gain * (polar * wound - self._product)
+        self._square += gain * (wound * wound - self._square)
+        share = self._product / (self._square + self._least)
         self.share = min(max(share, -MISMATCH), MISMATCH)
 
 
@@ -140,6 +154,7 @@ class MomentumWatch:
         self._supports = [
             _SupportWatch(leg, support, self._torque, period) for support in leg.supports
         ]
+        self._lengths = sorted({one.cycles for one in self._supports})
         self._reach = max(one.reach for one in self._supports)
         contact = round(CONTACT_TIME / period)
         self._patiences = [
@@ -154,10 +169,7 @@ class MomentumWatch:
         self._begin()
 
     def restart(self) -> None:
-        """Begin anew with whatever is shown next; a watch that has seen nothing yet already does.
-
-        A leg that does not sway asks for this in every cycle.
-        """
+        """Begin anew with whatever is shown next, unless nothing has been seen yet."""
         if self._readings:
             self._begin()
 
@@ -166,6 +178,7 @@ class MomentumWatch:
         self._readings = deque[MomentumReading](maxlen=3)
         for support in self._supports:
             support.restart()
+        self._wound = {cycles: _Average(cycles) for cycles in self._lengths}
         self._seen = self._age = self._pushed = 0
         self._patience = max(self._patiences)
 
@@ -176,41 +189,51 @@ class MomentumWatch:
             reading: of that cycle.
             stands: whether one link stands while the other one swings.
         """
-        if not (self._regular(reading) and _inside(reading.joint[0], self._leg.hip_range)):
+        # A reading must have come about a period after the one before.
+        regular = 0.5 * self._period < reading.interval < 1.5 * self._period
+        if not (regular and _inside(reading.joint[0], self._leg.hip_range)):
             self.restart()
             return None
         self._readings.append(reading)
         if len(self._readings) < 3:
             return None
-        free = _inside(reading.joint[1] - reading.joint[0], self._leg.knee_range)
-        self._pushed = max(0, self._pushed - 1) if free else self._reach + 2
-        left = self._left()
+        if not _inside(reading.joint[1] - reading.joint[0], self._leg.knee_range):
+            self._pushed = self._reach + 2
+        elif self._pushed:
+            self._pushed -= 1
+        residual, patience = self._left(motion_of(self._leg, self._readings))
         self._seen += 1
         if self._seen < self._reach:
             return None
-        self.residual = min(left)
+        self.residual = residual
         self._age += 1
-        if self.residual <= self._torque:
-            self._age = 0
-            each = zip(left, self._patiences, strict=True)
-            self._patience = max(cycles for torque, cycles in each if torque <= self._torque)
+        if residual <= self._torque:
+            self._age, self._patience = 0, patience
         # A link that is thrown onto the ground, or off it, does not stand.
         lasts = self._age > (self._reach if stands else self._patience)
         return self._doubt() if lasts and self._mismatch.known else None
 
-    def _left(self) -> list[float]:
-        """Torques along q1 + q2 that the supports leave; infinite where the knee rules one out."""
-        torques = [support.after(self._readings) for support in self._supports]
+    def _left(self, motion: LegMotion) -> tuple[float, int]:
+        """Smallest torque along q1 + q2 that a support leaves, and the longest patience of all.
+
+        The torque is infinite where the knee rules all out. Patience is asked of those supports
+        that leave no more than the limit; it is 0 if there are none [cycles].
+        """
+        wound = {cycles: average.after(motion.wound) for cycles, average in self._wound.items()}
         share, most = self._mismatch.share, math.inf if self._pushed else self._knee_torque
-        left = [
-            abs(torque.polar - share * torque.wound) if abs(torque.knee) <= most else math.inf
-            for torque in torques
-        ]
-        likeliest = min(left)
+        patience = 0
+        likeliest, torque = math.inf, (math.inf, 0.0)
+        for support, cycles in zip(self._supports, self._patiences, strict=True):
+            polar, knee = support.after(motion)
+            by = wound[support.cycles]
+            unexplained = abs(polar - share * by) if abs(knee) <= most else math.inf
+            if cycles > patience and unexplained <= self._torque:
+                patience = cycles
+            if unexplained < likeliest:
+                likeliest, torque = unexplained, (polar, by)
         if self._seen >= self._reach:
-            explains = likeliest < math.inf
-            self._mismatch.learn(torques[left.index(likeliest)] if explains else None)
-        return left
+            self._mismatch.learn(*torque)
+        return likeliest, patience
 
     def _doubt(self) -> Doubt:
         return Doubt(
@@ -220,10 +243,6 @@ class MomentumWatch:
             f"link_error of {self._link_error:g} rad: look at the link encoders, at the springs' "
             "stiffness, and whether the foot slides",
         )
-
-    def _regular(self, reading: MomentumReading) -> bool:
-        """Whether a reading came about a period after the one before."""
-        return 0.5 * self._period < reading.interval < 1.5 * self._period
 
 
 def _inside(angle: float, between: Range) -> bool:
