@@ -210,7 +210,7 @@ class Served:
             upcoming=lambda: (400, None),
             advance=self._wait_until,
         )
-        self.server = BusServer(cast(Any, self.network), cast(Any, self), lambda: self.clock_ns)
+        self.server = BusServer([cast(Any, self.network)], cast(Any, self), lambda: self.clock_ns)
 
     def _network_send(self, station: Any, frame: Frame) -> None:
         assert station is self.station
