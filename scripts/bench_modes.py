@@ -47,7 +47,7 @@ DESIGN = Path(__file__).parents[1] / "models" / "optimal.toml"
 SECONDS = 0.58
 BOUND = 50.0
 OVER_BARE = 1.5
-"""Time of a hop over that of heyoka alone on the same pieces that is aimed at [-]."""
+"""Largest time of a hop over that of heyoka alone on the same pieces [-]."""
 ROUNDS = (40, 50)
 """Times in which hops and pieces are measured in turn, and repetitions in each [-]."""
 MAPS = f"fast, {MAP_TOLERANCE:g}"
@@ -231,17 +231,26 @@ def basin(points: int) -> tuple[float, float]:
         return time.perf_counter() - began, sum(os.times()[:4]) - busy
 
 
+def over_bare_hops() -> bool:
+    """Print hops over heyoka alone; return whether all are within the bound."""
+    met = True
+    for name in ("prototype", "optimal"):
+        for tolerance in (MAP_TOLERANCE, TOLERANCE):
+            hop, bare = over_bare(name, tolerance)
+            within = hop <= OVER_BARE * bare
+            met = met and within
+            print(
+                f"hop of {name} at {tolerance:g}: {1e6 * hop:.0f} us, heyoka alone on its pieces "
+                f"{1e6 * bare:.0f} us, ratio {hop / bare:.3f}  bound {OVER_BARE:g}  "
+                f"{'ok' if within else 'MISSED'}"
+            )
+    return met
+
+
 def figures(points: int) -> None:
     """Print what has no bound here."""
     for name, rate in legs_a_second().items():
         print(f"2 s of FFS, {name}: {rate:.0f} legs a second")
-    for name in ("prototype", "optimal"):
-        for tolerance in (MAP_TOLERANCE, TOLERANCE):
-            hop, bare = over_bare(name, tolerance)
-            print(
-                f"hop of {name} at {tolerance:g}: {1e6 * hop:.0f} us, heyoka alone on its pieces "
-                f"{1e6 * bare:.0f} us, ratio {hop / bare:.3f} ({OVER_BARE:g} is aimed at)"
-            )
     numpy, cold, warm = start_up()
     print(
         f"processor time of hop besides numpy: cold {cold - numpy:.2f} s, warm {warm - numpy:.2f} s"
@@ -298,11 +307,12 @@ def main() -> int:
         print(
             f"{name:<16}{1e3 * seconds:10.3f}{wrong[name]:12.1e}{ratios[0]:12.1f}{ratios[1]:12.1f}"
         )
+    within = over_bare_hops()
     figures(flags.basin)
     ratio = taken["RK45, matrices"] / taken[MAPS]
     good = ratio >= BOUND and wrong[MAPS] < min(wrong[other] for other in slow)
     print("ok" if good else f"below the bound of {BOUND:g} times at a smaller error")
-    return 0 if good else 1
+    return 0 if good and within else 1
 
 
 if __name__ == "__main__":

@@ -115,7 +115,7 @@ def test_a_stable_hop_ends_in_itself() -> None:
 
 def test_repetition_is_told_from_the_last_apexes() -> None:
     def apexes(heights: list[float]) -> list[Apex]:
-        return [replace(START, height=height) for height in heights]
+        return [START._replace(height=height) for height in heights]
 
     assert repeats(apexes([0.1, 0.2] + 20 * [0.3])) == 1
     assert repeats(apexes([0.5] + 20 * [0.3, 0.31])) == 2
@@ -125,7 +125,7 @@ def test_repetition_is_told_from_the_last_apexes() -> None:
 
 def test_a_guess_that_is_no_cycle_is_named() -> None:
     leg, law = leg_of(OPTIMAL)
-    low = replace(START, height=0.21)
+    low = START._replace(height=0.21)
     with pytest.raises(ConfigError, match=r"below the ground|no hop of period 2|does not return"):
         find_cycle(leg, law, [low, START])
 

@@ -52,7 +52,7 @@ def answer(flags: HopArguments, design: LegDesign) -> tuple[dict[str, Any], list
         "design": design.name,
         "drive": "jump",
         "jump": asdict(flags.jump),
-        "apexes": [asdict(apex) for apex in apexes],
+        "apexes": [apex._asdict() for apex in apexes],
         "fixed_points": [cycle_content(cycle) for cycle in cycles],
     }
     lines = hop_lines(design, apexes)

@@ -1,6 +1,5 @@
 """Results of `legbench hop` as lines of text and as JSON."""
 
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -46,7 +45,7 @@ def point_lines(point: FixedPoint, verdict: str) -> list[str]:
 def point_content(point: FixedPoint) -> dict[str, Any]:
     """A hop that returns to where it began, as JSON."""
     return {
-        "apex": asdict(point.apex),
+        "apex": point.apex._asdict(),
         "period": point.hop.duration,
         "touchdown": point.hop.touchdown,
         "liftoff": point.hop.liftoff,
@@ -95,8 +94,8 @@ def cycle_content(cycle: HopCycle) -> dict[str, Any]:
     first = cycle.hops[0]
     kept = [abs(value) > SMALL for value in cycle.multipliers]
     return {
-        "apex": asdict(cycle.apexes[0]),
-        "apexes": [asdict(apex) for apex in cycle.apexes],
+        "apex": cycle.apexes[0]._asdict(),
+        "apexes": [apex._asdict() for apex in cycle.apexes],
         "hops": cycle.period,
         "period": cycle.duration,
         "touchdown": first.touchdown,

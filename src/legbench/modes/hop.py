@@ -5,7 +5,6 @@ not depend on the place along the ground, so six numbers are the state of the le
 """
 
 import math
-from dataclasses import dataclass
 from enum import StrEnum
 from typing import NamedTuple
 
@@ -27,7 +26,6 @@ FALLEN = 1.2
 CALLS = 400
 """Largest number of events in one hop [-]."""
 BUDGET = range(CALLS)
-NAMES = ("height", "speed", "z1", "z2", "dz1", "dz2")
 SCALE = math.sqrt(0.5)
 CONTACT, FELL = Watched.CONTACT, Watched.FELL
 """Members that are asked for at every event; the enumeration itself takes longer to find them."""
@@ -48,9 +46,8 @@ class Ending(StrEnum):
 APEX, FAULT = Ending.APEX, Ending.FAULT
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Apex:
-    """State of a leg in flight when its centre of mass is highest."""
+class Apex(NamedTuple):
+    """State of a leg in flight when its centre of mass is highest; a tuple, as `Hop` is one."""
 
     height: float
     """Height of the centre of mass over the ground [m]."""
@@ -66,25 +63,25 @@ class Apex:
     """Rate of z2 [rad/s]."""
 
     def vector(self) -> Floats:
-        """State as an array in the order of `NAMES` (6,)."""
-        return np.array([getattr(self, name) for name in NAMES])
+        """State as an array in the order of the fields (6,)."""
+        return np.array(self)
 
     @classmethod
     def of(cls, vector: Floats) -> "Apex":
         """Inverse of `vector`."""
-        return cls(**dict(zip(NAMES, vector.tolist(), strict=True)))
+        return cls(*vector.tolist())
 
     @classmethod
     def at(cls, height: float, speed: float, q: Pair, v: Pair) -> "Apex":
         """The apex of a leg with these angles [rad] and rates [rad/s]."""
         (q1, q2), (v1, v2) = q, v
         return cls(
-            height=height,
-            speed=speed,
-            z1=SCALE * (q1 + q2),
-            z2=SCALE * (q2 - q1),
-            dz1=SCALE * (v1 + v2),
-            dz2=SCALE * (v2 - v1),
+            height,
+            speed,
+            SCALE * (q1 + q2),
+            SCALE * (q2 - q1),
+            SCALE * (v1 + v2),
+            SCALE * (v2 - v1),
         )
 
     def angles(self) -> tuple[Pair, Pair]:
@@ -105,6 +102,10 @@ class Apex:
         moved = model.mass_centre_vel_from_hip(q, v)
         trunk = (-centre[0], self.height - centre[1])
         return flying(model, q, v, trunk, (self.speed - moved[0], -moved[1]))
+
+
+NAMES = Apex._fields
+"""Names of the numbers of an apex, in their order."""
 
 
 def apex_of(model: LegModel, state: LegState) -> Apex:
@@ -171,14 +172,8 @@ def hop(leg: TaylorLeg, drive: AbstractDrive, start: Apex) -> Hop:
                 break
     except PlantFault:
         ending = FAULT
-    return Hop(
-        ending=ending,
-        after=_reached(course) if ending is APEX else None,
-        duration=course.time,
-        touchdown=touchdown,
-        liftoff=liftoff,
-        impact=course.lost,
-    )
+    after = _reached(course) if ending is APEX else None
+    return Hop(ending, after, course.time, touchdown, liftoff, course.lost)
 
 
 def _end(drive: AbstractDrive, time: float, *, reached: bool) -> Ending:
