@@ -5,8 +5,10 @@ from collections import deque
 from collections.abc import Sequence
 from typing import final
 
+from legbench.limits.ground_contact import GroundContact
 from legbench.limits.knee import Range
 from legbench.limits.momentum import (
+    AVERAGE_SHARES,
     LegMomentum,
     MomentumReading,
     SupportPoint,
@@ -19,9 +21,14 @@ CONTACT_TIME = 0.02
 """Time in which a touchdown or a lift-off is over; the foot of the paper's leg may bounce [s]."""
 RUBBER = 0.01
 """Distance from a stop of rubber at which it may push already [rad]."""
+CERTAIN_TIME = 0.015
+"""Time for which torque is unexplained before a leg is doubted that is for certain in flight, or on
+the ground [s]: twice as long as the last cycles of a stance, in which the foot already leaves."""
+CERTAIN_SHARE = 1.0 / 3.0
+"""Shortest such time, relative to the reach of the averages [-]; noise exceeds the limit for less
+than half as long."""
 NOISE_SHARE = 0.5
-"""Share of the limit that rounded encoders may leave as noise [-]; it lasts for less than the
-averages reach."""
+"""Share of the limit that rounded encoders may leave as noise [-]."""
 LEARNING_TIME = 1.0
 """Time constant in which the mismatch of the springs is learned, and first time for it: two hops. A
 leg that has only begun to sway is still watched by its sway [s]."""
@@ -34,19 +41,21 @@ middle of a stance the springs carry twice the weight, in flight they carry noth
 
 @final
 class _Average:
-    """Three moving averages over so many cycles, one after the other."""
+    """Three moving averages, one after the other, that together reach over so many cycles."""
 
     def __init__(self, cycles: int) -> None:
-        self._stages = [deque([0.0] * cycles, maxlen=cycles) for _ in range(3)]
+        first, second = [round(share * cycles) for share in AVERAGE_SHARES]
+        lengths = (first, second, cycles - first - second)
+        self._stages = [deque([0.0] * length, maxlen=length) for length in lengths]
         self._sums = [0.0, 0.0, 0.0]
-        self._share = 1.0 / cycles
+        self._shares = [1.0 / length for length in lengths]
 
     def after(self, value: float) -> float:
         """Take one more value; return the average."""
         for place, stage in enumerate(self._stages):
             self._sums[place] += value - stage[0]
             stage.append(value)
-            value = self._share * self._sums[place]
+            value = self._shares[place] * self._sums[place]
         return value
 
 
@@ -56,22 +65,26 @@ class _SupportWatch:
 
     Attributes:
         reach: cycles over which the averages reach.
+        pushed: a stop may push at the knee in one of them.
     """
 
     def __init__(
         self, leg: LegMomentum, support: SupportPoint, torque: float, period: float
     ) -> None:
         self._leg, self._support = leg, support
-        self._cycles = support.average_cycles(leg.link_step, NOISE_SHARE * torque, period)
-        self.reach = 3 * self._cycles
+        self.reach = support.average_cycles(leg.link_step, NOISE_SHARE * torque, period)
         self.restart()
 
     def restart(self) -> None:
         """Begin to average anew."""
-        self._averages = [_Average(self._cycles) for _ in Unexplained._fields]
+        self._averages = [_Average(self.reach) for _ in Unexplained._fields]
+        self._pushes = 0
+        self.pushed = False
 
-    def after(self, readings: Sequence[MomentumReading]) -> Unexplained:
-        """Take three readings; return the average."""
+    def after(self, readings: Sequence[MomentumReading], *, free: bool) -> Unexplained:
+        """Take three readings, and whether the knee is free of its stops; return the average."""
+        self._pushes = max(0, self._pushes - 1) if free else self.reach + 2
+        self.pushed = self._pushes > 0
         torque = unexplained(self._leg, self._support, readings)
         both = zip(self._averages, torque, strict=True)
         return Unexplained(*[average.after(value) for average, value in both])
@@ -116,7 +129,8 @@ class MomentumWatch:
     """Looks for torque that no support of the leg explains.
 
     While the averages reach from the ground into the air, or back, no support explains all of it.
-    So the torque must last for longer than it takes the other supports to explain it.
+    So the torque must last for longer than it takes the other supports to explain it, unless the
+    knee tells for certain which one the leg has.
 
     Attributes:
         residual: smallest torque along q1 + q2 that a support leaves unexplained, of those that the
@@ -141,11 +155,14 @@ class MomentumWatch:
             _SupportWatch(leg, support, self._torque, period) for support in leg.supports
         ]
         self._reach = max(one.reach for one in self._supports)
-        contact = round(CONTACT_TIME / period)
-        self._patiences = [
-            contact + max(other.reach for other in self._supports if other is not one or only)
-            for one in self._supports
-        ]
+        reaches = sum(one.reach for one in self._supports)
+        self._patience = round(CONTACT_TIME / period) + reaches
+        certain = max(round(CERTAIN_TIME / period), round(CERTAIN_SHARE * self._reach))
+        self._certain_patience = certain
+        self._contact: GroundContact | None = None
+        if not only:
+            ground = self._supports[0].reach
+            self._contact = GroundContact(self._knee_torque, ground, period)
         self.start()
 
     def start(self) -> None:
@@ -166,8 +183,9 @@ class MomentumWatch:
         self._readings = deque[MomentumReading](maxlen=3)
         for support in self._supports:
             support.restart()
-        self._seen = self._age = self._pushed = 0
-        self._patience = max(self._patiences)
+        if self._contact is not None:
+            self._contact.forget()
+        self._seen = self._age = self._certain_age = 0
 
     def see(self, reading: MomentumReading, *, stands: bool = False) -> Doubt | None:
         """Look at one more cycle, in which every drive has told something new.
@@ -182,8 +200,6 @@ class MomentumWatch:
         self._readings.append(reading)
         if len(self._readings) < 3:
             return None
-        free = _inside(reading.joint[1] - reading.joint[0], self._leg.knee_range)
-        self._pushed = max(0, self._pushed - 1) if free else self._reach + 2
         left = self._left()
         self._seen += 1
         if self._seen < self._reach:
@@ -191,20 +207,26 @@ class MomentumWatch:
         self.residual = min(left)
         self._age += 1
         if self.residual <= self._torque:
-            self._age = 0
-            each = zip(left, self._patiences, strict=True)
-            self._patience = max(cycles for torque, cycles in each if torque <= self._torque)
+            self._age, self._certain_age = 0, max(0, self._certain_age - 1)
+        elif self._of_certain_support(left) < math.inf:
+            self._certain_age += 1
         # A link that is thrown onto the ground, or off it, does not stand.
-        lasts = self._age > (self._reach if stands else self._patience)
+        lasts = self._age > (self._certain_patience if stands else self._patience)
+        lasts = lasts or self._certain_age > self._certain_patience
         return self._doubt() if lasts and self._mismatch.known else None
 
     def _left(self) -> list[float]:
         """Torques along q1 + q2 that the supports leave; infinite where the knee rules one out."""
-        torques = [support.after(self._readings) for support in self._supports]
-        share, most = self._mismatch.share, math.inf if self._pushed else self._knee_torque
+        _, (joint_1, joint_2) = self._readings[-1][1:]
+        free = _inside(joint_2 - joint_1, self._leg.knee_range)
+        torques = [support.after(self._readings, free=free) for support in self._supports]
+        self._judge_contact(torques[-1].knee)
+        share, most = self._mismatch.share, self._knee_torque
         left = [
-            abs(torque.polar - share * torque.wound) if abs(torque.knee) <= most else math.inf
-            for torque in torques
+            abs(torque.polar - share * torque.wound)
+            if support.pushed or abs(torque.knee) <= most
+            else math.inf
+            for support, torque in zip(self._supports, torques, strict=True)
         ]
         likeliest = min(left)
         if self._seen >= self._reach:
@@ -212,11 +234,28 @@ class MomentumWatch:
             self._mismatch.learn(torques[left.index(likeliest)] if explains else None)
         return left
 
+    def _judge_contact(self, knee: float) -> None:
+        """Judge whether the leg is in flight by the torque on the knee that free fall leaves."""
+        if self._contact is None:
+            return
+        if self._supports[-1].pushed:
+            self._contact.forget()
+        else:
+            self._contact.after(knee)
+
+    def _of_certain_support(self, left: Sequence[float]) -> float:
+        """Return the torque that the certain support leaves, infinite if none is certain [N m]."""
+        contact = self._contact
+        if contact is None or contact.in_flight:
+            return left[-1]
+        return left[0] if contact.on_ground else math.inf
+
     def _doubt(self) -> Doubt:
+        cycles = max(self._age, self._certain_age)
         return Doubt(
             "joint encoder",
             "the springs' torques contradict the motion of the links, on the ground and in the air "
-            f"alike, by more than {self._torque:.3f} N m for {self._age} cycles; the limit is a "
+            f"alike, by more than {self._torque:.3f} N m for {cycles} cycles; the limit is a "
             f"link_error of {self._link_error:g} rad: look at the link encoders, at the springs' "
             "stiffness, and whether the foot slides",
         )
