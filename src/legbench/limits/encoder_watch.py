@@ -31,7 +31,7 @@ class EncoderWatch:
             momentum: what the leg's angular momentum obeys; without it `link_error` does not act.
         """
         bounds = limits.bounds(period)
-        self._motors = tuple(MotorWatch(bounds) for _ in limits.motor_range)
+        self._motors = (MotorWatch(bounds), MotorWatch(bounds))
         self._links = LinkWatch(bounds)
         self._two_encoders = two_encoders
         self._momentum = None
@@ -65,34 +65,25 @@ class EncoderWatch:
             elapsed: periods since the cycle before.
             interval: time since the cycle before [s].
         """
-        found = None
-        for axis, watch in enumerate(self._motors):
-            found = watch.see(axis + 1, motor_pos[axis], expected_pos[axis]) or found
-        doubt = None
-        if self._two_encoders:
-            doubt = self._links.see(motor_pos, joint_pos, expected_pos, fresh, elapsed)
-            doubt = doubt or self._ask_momentum(motor_pos, joint_pos, fresh, interval)
+        watch_1, watch_2 = self._motors
+        motor_1, motor_2 = motor_pos
+        expected_1, expected_2 = expected_pos
+        found = watch_1.see(1, motor_1, expected_1)
+        found = watch_2.see(2, motor_2, expected_2) or found
+        if not self._two_encoders:
+            return found
+        doubt = self._links.see(motor_pos, joint_pos, expected_pos, fresh, elapsed)
+        momentum = self._momentum
+        if momentum is not None and doubt is None:
+            # It is asked where a sway may hide an encoder that is wrong.
+            if self._links.hides_drift and all(fresh):
+                joint_1, joint_2 = joint_pos
+                reading = MomentumReading(interval, (motor_1, motor_2), (joint_1, joint_2))
+                doubt = momentum.see(reading, stands=self._links.stands)
+            else:
+                momentum.restart()
         if found is None and doubt is not None:
             # A motor that is not where it should be makes the springs sway, too: it is the cause.
             suspects = [watch.suspicion for watch in self._motors if watch.suspicion is not None]
             found = suspects[0] if suspects else doubt
         return found
-
-    def _ask_momentum(
-        self,
-        motor_pos: Sequence[float],
-        joint_pos: Sequence[float],
-        fresh: Sequence[bool],
-        interval: float,
-    ) -> Doubt | None:
-        """Ask the leg's momentum, where a sway may hide an encoder that is wrong."""
-        watch = self._momentum
-        if watch is None:
-            return None
-        if not (all(fresh) and self._links.hides_drift):
-            watch.restart()
-            return None
-        motor_1, motor_2 = motor_pos
-        joint_1, joint_2 = joint_pos
-        reading = MomentumReading(interval, (motor_1, motor_2), (joint_1, joint_2))
-        return watch.see(reading, stands=self._links.stands)

@@ -8,7 +8,7 @@ times that angle, and this torque is then unexplained about each of these points
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -95,36 +95,77 @@ class Unexplained(NamedTuple):
     """Torque of spring 2 less that of spring 1 [N m]."""
 
 
-def unexplained(
-    leg: LegMomentum, support: SupportPoint, readings: Sequence[MomentumReading]
-) -> Unexplained:
-    """Return the unexplained torque at the second one of three readings.
+class LegMotion(NamedTuple):
+    """Motion of a leg and torques of its springs, which do not depend on what supports it."""
+
+    accel_1: float
+    """Acceleration of q1 [rad/s^2]."""
+    accel_2: float
+    """Acceleration of q2 [rad/s^2]."""
+    coupled_polar: float
+    """Part of the rate of angular momentum that turns q1 and q2 together, for a coupling of 1
+    [1/s^2]."""
+    coupled_knee: float
+    """Part that turns q2 against q1, centrifugal term included, for a coupling of 1 [1/s^2]."""
+    sine_1: float
+    """Sine of q1 [-]."""
+    sine_2: float
+    """Sine of q2 [-]."""
+    torque_1: float
+    """Torque of spring and damping on q1 [N m]."""
+    torque_2: float
+    """Torque of spring and damping on q2 [N m]."""
+    wound: float
+    """Torque of spring 2 less that of spring 1 [N m]."""
+
+
+def motion_of(leg: LegMomentum, readings: Iterable[MomentumReading]) -> LegMotion:
+    """Return the motion at the second one of three readings.
+
+    With `c = cos(q1 - q2)` the coupling turns q1 and q2 together by the rate of `c (v1 + v2)`, and
+    against each other by the rate of `c (v2 - v1)` and the centrifugal `2 sin(q1 - q2) v1 v2`.
+    """
+    (_, _, (p1, p2)), (since, (motor_1, motor_2), (q1, q2)), (until, _, (n1, n2)) = readings
+    (k1, k2), (d1, d2) = leg.stiffness, leg.damping
+    back_1, back_2 = (q1 - p1) / since, (q2 - p2) / since
+    on_1, on_2 = (n1 - q1) / until, (n2 - q2) / until
+    c_back = math.cos(0.5 * (p1 + q1 - p2 - q2))
+    c_on = math.cos(0.5 * (q1 + n1 - q2 - n2))
+    v1, v2 = 0.5 * (back_1 + on_1), 0.5 * (back_2 + on_2)
+    spring_1, spring_2 = k1 * (motor_1 - q1), k2 * (motor_2 - q2)
+    per_second = 2.0 / (since + until)
+    against = c_on * (on_2 - on_1) - c_back * (back_2 - back_1)
+    return LegMotion(
+        (on_1 - back_1) * per_second,
+        (on_2 - back_2) * per_second,
+        (c_on * (on_1 + on_2) - c_back * (back_1 + back_2)) * per_second,
+        against * per_second + 2.0 * math.sin(q1 - q2) * v1 * v2,
+        math.sin(q1),
+        math.sin(q2),
+        spring_1 - d1 * v1,
+        spring_2 - d2 * v2,
+        spring_2 - spring_1,
+    )
+
+
+def left_over(support: SupportPoint, motion: LegMotion) -> tuple[float, float]:
+    """Return the torques along q1 + q2 and along the knee that a support leaves unexplained [N m].
 
     Turning the whole leg changes no inertia, so `(I1 + C c) v1 + (I2 + C c) v2` with
     `c = cos(q1 - q2)` changes by the torques alone; `(I2 - C c) v2 - (I1 - C c) v1` has the
     centrifugal term `2 C sin(q1 - q2) v1 v2` besides.
     """
-    before, at, after = readings
-    (i1, i2), mixed = support.inertia, support.coupling
-    (k1, k2), (d1, d2), (m1, m2) = leg.stiffness, leg.damping, support.moment
-    (p1, p2), (q1, q2) = before.joint, at.joint
-    n1, n2 = after.joint
-    back_1, back_2 = (q1 - p1) / at.interval, (q2 - p2) / at.interval
-    on_1, on_2 = (n1 - q1) / after.interval, (n2 - q2) / after.interval
-    c_back = mixed * math.cos(0.5 * (p1 + q1 - p2 - q2))
-    c_on = mixed * math.cos(0.5 * (q1 + n1 - q2 - n2))
-    v1, v2 = 0.5 * (back_1 + on_1), 0.5 * (back_2 + on_2)
-    spring_1, spring_2 = k1 * (at.motor[0] - q1), k2 * (at.motor[1] - q2)
-    torque_1 = spring_1 - d1 * v1 - m1 * math.sin(q1)
-    torque_2 = spring_2 - d2 * v2 - m2 * math.sin(q2)
-    whirl = 2.0 * mixed * math.sin(q1 - q2) * v1 * v2
-    gain_1 = (i1 + c_on) * on_1 - (i1 + c_back) * back_1
-    gain_2 = (i2 + c_on) * on_2 - (i2 + c_back) * back_2
-    part_1 = (i1 - c_on) * on_1 - (i1 - c_back) * back_1
-    part_2 = (i2 - c_on) * on_2 - (i2 - c_back) * back_2
-    interval = 0.5 * (at.interval + after.interval)
-    return Unexplained(
-        polar=(gain_1 + gain_2) / interval - torque_1 - torque_2,
-        knee=(part_2 - part_1) / interval - torque_2 + torque_1 - whirl,
-        wound=spring_2 - spring_1,
-    )
+    (i1, i2), (m1, m2), coupling = support.inertia, support.moment, support.coupling
+    a1, a2, polar, knee, sine_1, sine_2, torque_1, torque_2, _ = motion
+    left_1 = i1 * a1 + m1 * sine_1 - torque_1
+    left_2 = i2 * a2 + m2 * sine_2 - torque_2
+    return left_1 + left_2 + coupling * polar, left_2 - left_1 - coupling * knee
+
+
+def unexplained(
+    leg: LegMomentum, support: SupportPoint, readings: Iterable[MomentumReading]
+) -> Unexplained:
+    """Return the unexplained torque at the second one of three readings."""
+    motion = motion_of(leg, readings)
+    polar, knee = left_over(support, motion)
+    return Unexplained(polar=polar, knee=knee, wound=motion.wound)

@@ -10,10 +10,11 @@ from legbench.limits.knee import Range
 from legbench.limits.momentum import (
     AVERAGE_SHARES,
     LegMomentum,
+    LegMotion,
     MomentumReading,
     SupportPoint,
-    Unexplained,
-    unexplained,
+    left_over,
+    motion_of,
 )
 from legbench.limits.plausibility import Doubt
 
@@ -46,17 +47,22 @@ class _Average:
     def __init__(self, cycles: int) -> None:
         first, second = [round(share * cycles) for share in AVERAGE_SHARES]
         lengths = (first, second, cycles - first - second)
-        self._stages = [deque([0.0] * length, maxlen=length) for length in lengths]
-        self._sums = [0.0, 0.0, 0.0]
-        self._shares = [1.0 / length for length in lengths]
+        self._stages = tuple(deque([0.0] * length, maxlen=length) for length in lengths)
+        self._sums = (0.0, 0.0, 0.0)
+        self._scale = 1.0 / math.prod(lengths)
 
     def after(self, value: float) -> float:
         """Take one more value; return the average."""
-        for place, stage in enumerate(self._stages):
-            self._sums[place] += value - stage[0]
-            stage.append(value)
-            value = self._shares[place] * self._sums[place]
-        return value
+        first, second, third = self._stages
+        sum_1, sum_2, sum_3 = self._sums
+        sum_1 += value - first[0]
+        first.append(value)
+        sum_2 += sum_1 - second[0]
+        second.append(sum_1)
+        sum_3 += sum_2 - third[0]
+        third.append(sum_2)
+        self._sums = sum_1, sum_2, sum_3
+        return self._scale * sum_3
 
 
 @final
@@ -71,23 +77,27 @@ class _SupportWatch:
     def __init__(
         self, leg: LegMomentum, support: SupportPoint, torque: float, period: float
     ) -> None:
-        self._leg, self._support = leg, support
+        self._support = support
         self.reach = support.average_cycles(leg.link_step, NOISE_SHARE * torque, period)
         self.restart()
 
     def restart(self) -> None:
         """Begin to average anew."""
-        self._averages = [_Average(self.reach) for _ in Unexplained._fields]
+        self._polar, self._knee = _Average(self.reach), _Average(self.reach)
         self._pushes = 0
         self.pushed = False
 
-    def after(self, readings: Sequence[MomentumReading], *, free: bool) -> Unexplained:
-        """Take three readings, and whether the knee is free of its stops; return the average."""
+    def after(self, motion: LegMotion, *, free: bool) -> tuple[float, float]:
+        """Take one more motion; return the averages along q1 + q2 and along the knee [N m].
+
+        Args:
+            motion: of the leg.
+            free: whether its knee is free of its stops.
+        """
         self._pushes = max(0, self._pushes - 1) if free else self.reach + 2
         self.pushed = self._pushes > 0
-        torque = unexplained(self._leg, self._support, readings)
-        both = zip(self._averages, torque, strict=True)
-        return Unexplained(*[average.after(value) for average, value in both])
+        polar, knee = left_over(self._support, motion)
+        return self._polar.after(polar), self._knee.after(knee)
 
 
 @final
@@ -104,6 +114,7 @@ class _Mismatch:
     def __init__(self, torque: float, period: float) -> None:
         """Begin with springs as designed; those wound by less than a torque [N m] tell little."""
         self._memory, self._torque = round(LEARNING_TIME / period), torque
+        self._least = torque**2
         self._seen, self._product, self._square = 0, 0.0, 0.0
         self.share = 0.0
 
@@ -112,15 +123,20 @@ class _Mismatch:
         """Whether it has been learned for long enough."""
         return self._seen >= self._memory
 
-    def learn(self, torque: Unexplained | None) -> None:
-        """Take what the likeliest support leaves unexplained; none if the knee rules out all."""
+    def learn(self, polar: float, wound: float) -> None:
+        """Take what the likeliest support leaves unexplained in a cycle.
+
+        Args:
+            polar: torque along q1 + q2, infinite if the knee rules out all supports [N m].
+            wound: torque by which the springs are wound [N m].
+        """
         self._seen = min(self._seen + 1, self._memory)
-        if torque is None or abs(torque.polar) > self._torque + MISMATCH * abs(torque.wound):
+        if abs(polar) > self._torque + MISMATCH * abs(wound):
             return  # That much is no spring's.
         gain = 1.0 / self._seen
-        self._product += gain * (torque.polar * torque.wound - self._product)
-        self._square += gain * (torque.wound * torque.wound - self._square)
-        share = self._product / (self._square + self._torque**2)
+        self._product += gain * (polar * wound - self._product)
+        self._square += gain * (wound * wound - self._square)
+        share = self._product / (self._square + self._least)
         self.share = min(max(share, -MISMATCH), MISMATCH)
 
 
@@ -154,6 +170,7 @@ class MomentumWatch:
         self._supports = [
             _SupportWatch(leg, support, self._torque, period) for support in leg.supports
         ]
+        self._reaches = sorted({one.reach for one in self._supports})
         self._reach = max(one.reach for one in self._supports)
         reaches = sum(one.reach for one in self._supports)
         self._patience = round(CONTACT_TIME / period) + reaches
@@ -183,6 +200,7 @@ class MomentumWatch:
         self._readings = deque[MomentumReading](maxlen=3)
         for support in self._supports:
             support.restart()
+        self._wound = {reach: _Average(reach) for reach in self._reaches}
         if self._contact is not None:
             self._contact.forget()
         self._seen = self._age = self._certain_age = 0
@@ -200,7 +218,9 @@ class MomentumWatch:
         self._readings.append(reading)
         if len(self._readings) < 3:
             return None
-        left = self._left()
+        joint_1, joint_2 = reading.joint
+        free = _inside(joint_2 - joint_1, self._leg.knee_range)
+        left = self._left(motion_of(self._leg, self._readings), free=free)
         self._seen += 1
         if self._seen < self._reach:
             return None
@@ -215,23 +235,23 @@ class MomentumWatch:
         lasts = lasts or self._certain_age > self._certain_patience
         return self._doubt() if lasts and self._mismatch.known else None
 
-    def _left(self) -> list[float]:
+    def _left(self, motion: LegMotion, *, free: bool) -> list[float]:
         """Torques along q1 + q2 that the supports leave; infinite where the knee rules one out."""
-        _, (joint_1, joint_2) = self._readings[-1][1:]
-        free = _inside(joint_2 - joint_1, self._leg.knee_range)
-        torques = [support.after(self._readings, free=free) for support in self._supports]
-        self._judge_contact(torques[-1].knee)
+        wound = {reach: average.after(motion.wound) for reach, average in self._wound.items()}
         share, most = self._mismatch.share, self._knee_torque
-        left = [
-            abs(torque.polar - share * torque.wound)
-            if support.pushed or abs(torque.knee) <= most
-            else math.inf
-            for support, torque in zip(self._supports, torques, strict=True)
-        ]
-        likeliest = min(left)
+        left: list[float] = []
+        likeliest, torque, knee = math.inf, (math.inf, 0.0), 0.0
+        for support in self._supports:
+            polar, knee = support.after(motion, free=free)
+            by = wound[support.reach]
+            allowed = support.pushed or abs(knee) <= most
+            unexplained = abs(polar - share * by) if allowed else math.inf
+            left.append(unexplained)
+            if unexplained < likeliest:
+                likeliest, torque = unexplained, (polar, by)
+        self._judge_contact(knee)
         if self._seen >= self._reach:
-            explains = likeliest < math.inf
-            self._mismatch.learn(torques[left.index(likeliest)] if explains else None)
+            self._mismatch.learn(*torque)
         return left
 
     def _judge_contact(self, knee: float) -> None:

@@ -73,6 +73,7 @@ class MotorWatch:
     def __init__(self, bounds: HealthBounds) -> None:
         self._bounds = bounds
         self._gain = 1.0 - math.exp(-2.0 * math.pi * bounds.servo_bandwidth * bounds.period)
+        self._limit = bounds.following_error
         self._low = self._high = 0.0
         self._age = 0
         self.suspicion: Doubt | None = None
@@ -87,11 +88,11 @@ class MotorWatch:
         low, high, gain = self._low, self._high, self._gain
         self._low = low = expected if expected < low else low + gain * (expected - low)
         self._high = high = expected if expected > high else high + gain * (expected - high)
-        excess = max(low - position, position - high)
-        limit = self._bounds.following_error
-        if excess <= limit:
+        limit = self._limit
+        if low - position <= limit and position - high <= limit:
             self._age, self.suspicion = 0, None
             return None
+        excess = max(low - position, position - high)
         self._age += 1
         self.suspicion = Doubt(
             "following error",
@@ -115,39 +116,34 @@ class LinkWatch:
 
     Attributes:
         stands: one link stands while the other one swings, as it may in a leg that sways.
+        hides_drift: the leg may sway so far that a drift of an encoder would be found too late.
     """
 
     def __init__(self, bounds: HealthBounds) -> None:
         self._bounds = bounds
         self._step_max = bounds.joint_speed * bounds.period
         self._forget = bounds.period / MEMORY
+        self._keep = 1.0 - self._forget
         self._fade = 1.0 - bounds.period / SWAY_MEMORY
         self._delay = round(SWAY_DELAY / bounds.period)
         self._standing_cycles = max(2, round(STANDING_TIME / bounds.period))
         self._watches_standing = math.isfinite(bounds.standing)
-        self._restart()
-
-    def _restart(self) -> None:
-        self.stands = False
-        self._last: list[float] = []
-        self._silent = [0, 0]
-        self._sway_age = 0
-        self._sway_rest = self._led_rest = self._led = self._swayed = 0.0
-        self._young = deque[float]()
-        self._links = (self._window(), self._window())
-        self._springs = (self._window(), self._window())
-
-    def _window(self) -> deque[float]:
-        return deque(maxlen=self._standing_cycles)
+        self._near = 0.49 * bounds.standing
+        """Distance from one place within which a link does not swing, rounding included [rad]."""
+        self.start()
 
     def start(self) -> None:
         """Begin anew with whatever is shown next."""
-        self._restart()
-
-    @property
-    def hides_drift(self) -> bool:
-        """Whether the leg may sway so far that a drift of an encoder would be found too late."""
-        return self._bounds.sway + self._widening > HIDDEN
+        self.stands = self.hides_drift = False
+        self._last: tuple[float, float] | None = None
+        self._silent = [0, 0]
+        self._heard = True
+        self._sway_age = 0
+        self._sway_rest = self._led_rest = self._led = self._swayed = self._widening = 0.0
+        self._young = deque([0.0] * self._delay, maxlen=self._delay)
+        self._window = deque[tuple[float, float, float, float]](maxlen=self._standing_cycles)
+        self._place = (math.nan, math.nan)
+        self._near_cycles = 0
 
     def see(
         self,
@@ -166,27 +162,47 @@ class LinkWatch:
             fresh: which drives have told something new.
             elapsed: periods since the readings before.
         """
-        if not self._last:
-            self._last = list(joint_pos)
-            self._sway_rest = sum(joint_pos)
-            self._led_rest = sum(commands)
-        polar, forget = sum(commands), self._forget
-        self._led_rest += forget * (polar - self._led_rest)
-        self._led = max(self._led * (1.0 - forget), abs(polar - self._led_rest))
-        doubt = self._speed(joint_pos, fresh, elapsed)
-        doubt = self._sway(joint_pos) or doubt
-        return self._standing(motor_pos, joint_pos, fresh) or doubt
+        joint_1, joint_2 = joint_pos
+        command_1, command_2 = commands
+        polar, led = joint_1 + joint_2, command_1 + command_2
+        last = self._last
+        if last is None:
+            self._last = last = (joint_1, joint_2)
+            self._sway_rest, self._led_rest = polar, led
+        self._led_rest = rest = self._led_rest + self._forget * (led - self._led_rest)
+        self._led = max(self._led * self._keep, abs(led - rest))
+        complete, reach = all(fresh), self._step_max * elapsed
+        doubt = None
+        if (
+            complete
+            and self._heard
+            and abs(joint_1 - last[0]) <= reach
+            and abs(joint_2 - last[1]) <= reach
+        ):
+            self._last = (joint_1, joint_2)
+        else:
+            doubt = self._speed((joint_1, joint_2), last, fresh, elapsed)
+        doubt = self._sway(polar) or doubt
+        if not (complete and self._watches_standing):
+            return doubt
+        motor_1, motor_2 = motor_pos
+        return self._standing(joint_1, joint_2, joint_1 - motor_1, joint_2 - motor_2) or doubt
 
     def _speed(
-        self, joint_pos: Sequence[float], fresh: Sequence[bool], elapsed: int
+        self,
+        joint_pos: tuple[float, float],
+        last: tuple[float, float],
+        fresh: Sequence[bool],
+        elapsed: int,
     ) -> Doubt | None:
-        doubt = None
+        """Judge each link by the time since its own last reading."""
+        doubt, known = None, list(last)
         for place, value in enumerate(joint_pos):
             self._silent[place] += elapsed
             if not fresh[place]:
                 continue
-            step, cycles = abs(value - self._last[place]), self._silent[place]
-            self._last[place], self._silent[place] = value, 0
+            step, cycles = abs(value - last[place]), self._silent[place]
+            known[place], self._silent[place] = value, 0
             if step > self._step_max * cycles:
                 doubt = Doubt(
                     "joint speed",
@@ -194,17 +210,24 @@ class LinkWatch:
                     f"{step / (cycles * self._bounds.period):.0f} rad/s; the limit is "
                     f"{self._bounds.joint_speed:g} rad/s: look at its encoder",
                 )
+        self._last = (known[0], known[1])
+        self._heard = not any(self._silent)
         return doubt
 
-    def _sway(self, joint_pos: Sequence[float]) -> Doubt | None:
-        polar = sum(joint_pos)
-        self._sway_rest += self._forget * (polar - self._sway_rest)
-        sway = abs(polar - self._sway_rest)
+    def _sway(self, polar: float) -> Doubt | None:
+        """Judge how far the links are from where q1 + q2 rests [rad]."""
+        self._sway_rest = rest = self._sway_rest + self._forget * (polar - self._sway_rest)
+        sway = abs(polar - rest)
+        self._swayed = swayed = max(self._swayed * self._fade, self._young[0])
         self._young.append(sway)
-        if len(self._young) > self._delay:
-            self._swayed = max(self._swayed * self._fade, self._young.popleft())
+        # What the leg may do along the polar mode, from what it did and was led to do.
+        self._widening = SWAY_GROWTH * swayed + POLAR_GAIN * self._led
         limit = self._bounds.sway + self._widening
-        self._sway_age = self._sway_age + 1 if sway > limit else 0
+        self.hides_drift = limit > HIDDEN
+        if not sway > limit:
+            self._sway_age = 0
+            return None
+        self._sway_age += 1
         if self._sway_age < SWAY_CYCLES:
             return None
         return Doubt(
@@ -214,36 +237,43 @@ class LinkWatch:
             "leg that is pushed from outside",
         )
 
-    @property
-    def _widening(self) -> float:
-        """What the leg may do along the polar mode, from what it did and was led to do [rad]."""
-        return SWAY_GROWTH * self._swayed + POLAR_GAIN * self._led
-
     def _standing(
-        self, motor_pos: Sequence[float], joint_pos: Sequence[float], fresh: Sequence[bool]
+        self, joint_1: float, joint_2: float, spring_1: float, spring_2: float
     ) -> Doubt | None:
-        if not (self._watches_standing and all(fresh)):
-            return None
+        """Judge links [rad] and springs [rad] of a cycle in which both drives have answered."""
+        window, cycles, near = self._window, self._standing_cycles, self._near
+        window.append((joint_1, joint_2, spring_1, spring_2))
         self.stands = False
-        for place in (0, 1):
-            self._links[place].append(joint_pos[place])
-            self._springs[place].append(joint_pos[place] - motor_pos[place])
-        if len(self._links[0]) < self._standing_cycles:
+        place_1, place_2 = self._place
+        if abs(joint_1 - place_1) <= near and abs(joint_2 - place_2) <= near:
+            self._near_cycles += 1
+            if self._near_cycles >= cycles:
+                return None  # No link has swung.
+        else:
+            self._place, self._near_cycles = (joint_1, joint_2), 1
+        if len(window) < cycles:
             return None
+        first = window[0]
+        if abs(joint_1 - first[0]) > STANDING_BAND and abs(joint_2 - first[1]) > STANDING_BAND:
+            return None  # No link stands.
+        return self._compare_ranges()
+
+    def _compare_ranges(self) -> Doubt | None:
+        """Judge each link by how far both have moved since the window began."""
+        columns = tuple(zip(*self._window, strict=True))
+        joints, springs = columns[:2], columns[2:]
+        ranges = (_range(joints[0]), _range(joints[1]))
         limit = self._bounds.standing + self._widening
-        if all(abs(shown[-1] - shown[0]) > STANDING_BAND for shown in self._links):
-            return None
-        ranges = (_range(self._links[0]), _range(self._links[1]))
         for place in (0, 1):
             if ranges[place] > STANDING_BAND or ranges[1 - place] <= self._bounds.standing:
                 continue
             self.stands = True
             # A link that its motor merely carries along pulls at nothing: the spring must work.
-            moved = min(ranges[1 - place], _range(self._springs[1 - place]))
+            moved = min(ranges[1 - place], _range(springs[1 - place]))
             if moved > limit:
                 return Doubt(
                     "joint encoder",
-                    f"joint {place + 1} stands at {joint_pos[place]:.3f} rad for "
+                    f"joint {place + 1} stands at {joints[place][-1]:.3f} rad for "
                     f"{self._standing_cycles} cycles, in which the other one moved by "
                     f"{moved:.3f} rad; the limit is {limit:.3f} rad: its encoder is dead, or the "
                     "link is blocked",
@@ -251,5 +281,5 @@ class LinkWatch:
         return None
 
 
-def _range(values: deque[float]) -> float:
+def _range(values: Sequence[float]) -> float:
     return max(values) - min(values)
