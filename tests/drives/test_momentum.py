@@ -32,7 +32,7 @@ from legbench.limits.momentum import (
     SupportPoint,
     unexplained,
 )
-from legbench.limits.momentum_watch import CERTAIN_TIME, CONTACT_TIME, MomentumWatch
+from legbench.limits.momentum_watch import CONTACT_TIME, FLIGHT_TIME, MomentumWatch
 from legbench.limits.safety import SafetyLimits
 from legbench.plant.leg_momentum import momentum_of, momentum_on
 from legbench.plants import LIMITS_NAME
@@ -158,58 +158,67 @@ def alarm(
 
 REACH = SPIN.average_cycles(0.0, 0.12, PERIOD)
 """Cycles over which its averages reach."""
-CERTAIN = round(CERTAIN_TIME / PERIOD)
-HEAVY = replace(SPIN, moment=(-4.0 / math.sin(POSTURE[0]), 4.0 / math.sin(POSTURE[1])))
-"""A support that needs springs of 4 N m/rad to be wound apart by 1 rad each."""
+CONTACT, FLIGHT = round(CONTACT_TIME / PERIOD), round(FLIGHT_TIME / PERIOD)
+CROUCHED = (-0.9, 1.0)
+HEAVY = replace(SPIN, moment=(4.0 / math.sin(0.9), 4.0 / math.sin(1.0)))
+"""Ground on which a leg that crouches winds its springs of 4 N m/rad apart by 1 rad each."""
+HOPPING = springs(HEAVY, SPIN)
 
 
 def test_a_torque_within_the_limit_is_never_doubted_and_one_beyond_it_is() -> None:
     leg = springs(SPIN)
     assert alarm(MomentumWatch(leg, 0.03, PERIOD), wound(0.0299)) is None
-    found = alarm(MomentumWatch(leg, 0.03, PERIOD), wound(0.0301))
-    assert found is not None
-    assert CERTAIN < found <= CERTAIN + REACH
-
-
-@pytest.mark.parametrize("well", [apart(0.0), apart(1.0)], ids=["in flight", "on the ground"])
-def test_a_leg_whose_support_is_certain_is_doubted_at_once(well: MomentumReading) -> None:
-    motors = (well.motor[0] + 0.1, well.motor[1] + 0.1)
-    found = alarm(
-        MomentumWatch(springs(HEAVY, SPIN), 0.03, PERIOD), well._replace(motor=motors), well=well
-    )
-    assert found is not None
-    assert CERTAIN < found < CERTAIN + REACH
-
-
-def test_a_leg_that_may_change_its_support_is_doubted_once_both_would_explain() -> None:
-    # Springs that carry half of what they do on the ground.
-    unsure = apart(0.5)
-    late = alarm(MomentumWatch(springs(HEAVY, SPIN), 0.03, PERIOD), unsure, well=apart(0.0))
-    soon = alarm(
-        MomentumWatch(springs(HEAVY, SPIN), 0.03, PERIOD), unsure, well=apart(0.0), stands=True
-    )
+    late = alarm(MomentumWatch(leg, 0.03, PERIOD), wound(0.0301))
+    soon = alarm(MomentumWatch(leg, 0.03, PERIOD), wound(0.0301), stands=True)
     assert late is not None
     assert soon is not None
-    assert late - soon == 2 * REACH + round(CONTACT_TIME / PERIOD) - CERTAIN
+    assert late - soon == CONTACT + REACH - FLIGHT
 
 
-@pytest.mark.parametrize(("pause", "doubted"), [(12, True), (24, False)])
-def test_a_torque_that_is_explained_now_and_then_is_doubted_if_it_mostly_is_not(
-    pause: int, *, doubted: bool
+def crouched(by: float, more: float = 0.0) -> MomentumReading:
+    """A leg that crouches, its springs wound against each other, and both further on [rad]."""
+    (first, second), posture = apart(by, posture=CROUCHED)[1:]
+    return MomentumReading(PERIOD, (first + more, second + more), posture)
+
+
+@pytest.mark.parametrize(("by", "patience"), [(0.0, FLIGHT), (1.0, CONTACT)])
+def test_a_leg_in_flight_or_in_a_stance_is_doubted_soon(by: float, patience: int) -> None:
+    watch = MomentumWatch(HOPPING, 0.03, PERIOD)
+    found = alarm(watch, crouched(by, 0.1), well=crouched(by))
+    assert found is not None
+    assert patience < found < patience + REACH
+
+
+def test_a_leg_between_ground_and_flight_is_doubted_once_both_would_explain() -> None:
+    # Springs that carry half of what they do on the ground.
+    found = [
+        alarm(MomentumWatch(HOPPING, 0.03, PERIOD), crouched(0.5), well=crouched(0.0), stands=one)
+        for one in (False, True)
+    ]
+    assert None not in found
+    late, soon = found
+    assert (late or 0) - (soon or 0) == 2 * REACH
+
+
+@pytest.mark.parametrize(
+    ("first", "then", "on", "off", "doubted"),
+    [(0.04, 0.04, 6, 9, True), (0.04, -0.04, 6, 9, False), (0.03, 0.03, 9, 12, False)],
+    ids=["mostly", "of both signs", "less than half of the time"],
+)
+def test_torque_is_evidence_as_far_as_it_is_of_one_sign_and_not_explained(
+    first: float, then: float, on: int, off: int, *, doubted: bool
 ) -> None:
-    watch, limit = MomentumWatch(springs(SPIN), 0.03, PERIOD), 4.0 * 0.03
+    watch, doubts = MomentumWatch(HOPPING, 0.03, PERIOD), 0
     for _ in range(1100):
-        assert watch.see(wound(0.0)) is None
-    longest = age = 0
-    found = False
-    for cycle in range(600):
-        by = 0.07 if cycle % (12 + pause) < 12 else 0.0
-        found = watch.see(wound(by)) is not None or found
+        assert watch.see(crouched(0.0)) is None
+    age = longest = 0
+    for more in ([first] * on + [0.0] * off + [then] * on + [0.0] * off) * 10:
+        doubts += watch.see(crouched(0.0, more)) is not None
         assert watch.residual is not None
-        age = age + 1 if watch.residual > limit else 0
+        age = age + 1 if watch.residual > 4.0 * 0.03 else 0
         longest = max(longest, age)
-    assert 0 < longest < CERTAIN
-    assert found == doubted
+    assert 0 < longest <= FLIGHT
+    assert (doubts > 0) == doubted
 
 
 @pytest.mark.parametrize(

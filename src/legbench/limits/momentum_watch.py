@@ -22,13 +22,13 @@ CONTACT_TIME = 0.02
 """Time in which a touchdown or a lift-off is over; the foot of the paper's leg may bounce [s]."""
 RUBBER = 0.01
 """Distance from a stop of rubber at which it may push already [rad]."""
-CERTAIN_TIME = 0.015
-"""Time for which torque is unexplained before a leg is doubted that is for certain in flight, or on
-the ground [s]: twice as long as the last cycles of a stance, in which the foot already leaves."""
-CERTAIN_SHARE = 1.0 / 3.0
-"""Shortest such time, relative to the reach of the averages [-]; noise exceeds the limit for less
-than half as long."""
-NOISE_SHARE = 0.5
+FLIGHT_TIME = 0.01
+"""Time for which torque of one sign is unexplained before a leg is doubted that is for certain in
+flight, where nothing but its springs acts [s]."""
+PATIENT_SHARE = 0.5
+"""Shortest such time, relative to the reach of the averages [-]: a single step of an encoder leaves
+torque of one sign for as long."""
+NOISE_SHARE = 0.6
 """Share of the limit that rounded encoders may leave as noise [-]."""
 LEARNING_TIME = 1.0
 """Time constant in which the mismatch of the springs is learned, and first time for it: two hops. A
@@ -71,6 +71,7 @@ class _SupportWatch:
 
     Attributes:
         reach: cycles over which the averages reach.
+        patience: cycles of torque of one sign that it may leave while the leg has it for certain.
         pushed: a stop may push at the knee in one of them.
     """
 
@@ -79,6 +80,8 @@ class _SupportWatch:
     ) -> None:
         self._support = support
         self.reach = support.average_cycles(leg.link_step, NOISE_SHARE * torque, period)
+        bears = FLIGHT_TIME if support is leg.supports[-1] else CONTACT_TIME
+        self.patience = max(round(bears / period), round(PATIENT_SHARE * self.reach))
         self.restart()
 
     def restart(self) -> None:
@@ -145,8 +148,9 @@ class MomentumWatch:
     """Looks for torque that no support of the leg explains.
 
     While the averages reach from the ground into the air, or back, no support explains all of it.
-    So the torque must last for longer than it takes the other supports to explain it, unless the
-    knee tells for certain which one the leg has.
+    So the torque must last for longer than a change of supports, and averages over both, unless the
+    knee tells for certain which one the leg has. Torque of that one is evidence, of one sign or the
+    other; cycles that are explained take evidence away.
 
     Attributes:
         residual: smallest torque along q1 + q2 that a support leaves unexplained, of those that the
@@ -174,8 +178,6 @@ class MomentumWatch:
         self._reach = max(one.reach for one in self._supports)
         reaches = sum(one.reach for one in self._supports)
         self._patience = round(CONTACT_TIME / period) + reaches
-        certain = max(round(CERTAIN_TIME / period), round(CERTAIN_SHARE * self._reach))
-        self._certain_patience = certain
         self._contact: GroundContact | None = None
         if not only:
             ground = self._supports[0].reach
@@ -203,7 +205,7 @@ class MomentumWatch:
         self._wound = {reach: _Average(reach) for reach in self._reaches}
         if self._contact is not None:
             self._contact.forget()
-        self._seen = self._age = self._certain_age = 0
+        self._seen = self._age = self._evidence = 0
 
     def see(self, reading: MomentumReading, *, stands: bool = False) -> Doubt | None:
         """Look at one more cycle, in which every drive has told something new.
@@ -224,16 +226,28 @@ class MomentumWatch:
         self._seen += 1
         if self._seen < self._reach:
             return None
-        self.residual = min(left)
+        self.residual = min(map(abs, left))
         self._age += 1
+        lasts = False
         if self.residual <= self._torque:
-            self._age, self._certain_age = 0, max(0, self._certain_age - 1)
-        elif self._of_certain_support(left) < math.inf:
-            self._certain_age += 1
+            self._age = 0
+            self._evidence -= (self._evidence > 0) - (self._evidence < 0)
+        else:
+            lasts = self._contradicted(left)
         # A link that is thrown onto the ground, or off it, does not stand.
-        lasts = self._age > (self._certain_patience if stands else self._patience)
-        lasts = lasts or self._certain_age > self._certain_patience
+        lasts = lasts or self._age > (self._supports[0].patience if stands else self._patience)
         return self._doubt() if lasts and self._mismatch.known else None
+
+    def _contradicted(self, left: Sequence[float]) -> bool:
+        """Whether the support that the leg has for certain leaves torque of one sign for long."""
+        contact = self._contact
+        if contact is None or not (contact.in_flight or contact.in_stance):
+            return False
+        place = -1 if contact.in_flight else 0
+        torque, patience = left[place], self._supports[place].patience
+        if torque < math.inf:
+            self._evidence += 1 if torque > 0.0 else -1
+        return abs(self._evidence) > patience
 
     def _left(self, motion: LegMotion, *, free: bool) -> list[float]:
         """Torques along q1 + q2 that the supports leave; infinite where the knee rules one out."""
@@ -245,10 +259,10 @@ class MomentumWatch:
             polar, knee = support.after(motion, free=free)
             by = wound[support.reach]
             allowed = support.pushed or abs(knee) <= most
-            unexplained = abs(polar - share * by) if allowed else math.inf
+            unexplained = polar - share * by if allowed else math.inf
             left.append(unexplained)
-            if unexplained < likeliest:
-                likeliest, torque = unexplained, (polar, by)
+            if abs(unexplained) < likeliest:
+                likeliest, torque = abs(unexplained), (polar, by)
         self._judge_contact(knee)
         if self._seen >= self._reach:
             self._mismatch.learn(*torque)
@@ -263,15 +277,8 @@ class MomentumWatch:
         else:
             self._contact.after(knee)
 
-    def _of_certain_support(self, left: Sequence[float]) -> float:
-        """Return the torque that the certain support leaves, infinite if none is certain [N m]."""
-        contact = self._contact
-        if contact is None or contact.in_flight:
-            return left[-1]
-        return left[0] if contact.on_ground else math.inf
-
     def _doubt(self) -> Doubt:
-        cycles = max(self._age, self._certain_age)
+        cycles = max(self._age, abs(self._evidence))
         return Doubt(
             "joint encoder",
             "the springs' torques contradict the motion of the links, on the ground and in the air "
