@@ -221,6 +221,23 @@ def test_torque_is_evidence_as_far_as_it_is_of_one_sign_and_not_explained(
     assert (doubts > 0) == doubted
 
 
+def test_single_steps_of_coarse_encoders_are_no_evidence_against_a_leg_that_stands() -> None:
+    # A leg that sways on the ground by 0.06 rad in a second, as while its drives are enabled.
+    step, omega, swing = 2.0 * math.pi / 4096, 2.0 * math.pi, 0.03
+    leg, terms = momentum(step=step), held(SetupKind.JUMP)[0]
+    watch = MomentumWatch(leg, 0.025, PERIOD)
+    for cycle in range(1600):
+        at = omega * PERIOD * cycle
+        q = np.array([-0.33, 0.52]) + swing * math.cos(at)
+        v = np.full(2, -swing * omega * math.sin(at))
+        a = np.full(2, -swing * omega**2 * math.cos(at))
+        torque = pair_mass(terms, q) @ a + pair_coriolis(terms, q, v) @ v + pair_gravity(terms, q)
+        motor = q + (torque + np.asarray(DESIGN.damping) * v) / np.asarray(DESIGN.stiffness)
+        shown = step * np.round(q / step)
+        reading = MomentumReading(PERIOD, (motor[0], motor[1]), (shown[0], shown[1]))
+        assert watch.see(reading) is None
+
+
 @pytest.mark.parametrize(
     "gap",
     [
