@@ -14,7 +14,7 @@ from docs_blocks import ROOT
 
 from legbench import Experiment, JumpConfig, load_design, run
 from legbench.cli import COMMANDS, main
-from legbench.cli.hop import HopArguments
+from legbench.cli.hop_arguments import HopArguments
 from legbench.cli.hop_checks import check as check_hop
 
 TARGET = re.compile(r"^([a-z][a-z-]*):", re.MULTILINE)

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from legbench.cli import main
 
-CHANNEL = "vcan0"
+CHANNEL, SECOND = "vcan0", "vcan1"
 BUS = ("--interface", "socketcan", "--channel", CHANNEL)
 PATIENCE = 3600.0
 """Longest that anything may take to happen [s]. An hour of the guest's time is half a minute of the
@@ -143,9 +143,9 @@ class Drives:
 
 
 @contextmanager
-def drives_on(folder: Path, *options: str) -> Iterator[Drives]:
-    """`legbench drives emulate` on the interface, ready."""
-    child = legbench(folder / "drives.txt", "drives", "emulate", *BUS, "--json", *options)
+def drives_on(folder: Path, *options: str, bus: tuple[str, ...] = BUS) -> Iterator[Drives]:
+    """`legbench drives emulate` on the interface, or on that of other flags, ready."""
+    child = legbench(folder / "drives.txt", "drives", "emulate", *bus, "--json", *options)
     try:
         drives = Drives(child)
         drives.wait_for("switch on disabled")

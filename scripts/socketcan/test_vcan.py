@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import shutil
 import signal
 import subprocess
 from collections.abc import Iterator
@@ -13,7 +14,7 @@ from typing import Any
 
 import can
 import pytest
-from processes import BUS, CHANNEL, Child, Drives, drives_on, forked, ip, legbench
+from processes import BUS, CHANNEL, SECOND, Child, Drives, drives_on, forked, ip, legbench
 
 from legbench.design import load_design
 from legbench.drives.errors import StopError
@@ -155,6 +156,42 @@ def test_a_run_is_whole_and_its_bus_log_too(tmp_path: Path, drives: Drives) -> N
     assert grid == pytest.approx([1e-3 * tick for tick in range(501)], abs=2e-4)
     for cob_id in (0x181, 0x182, 0x201, 0x202):
         assert sum(frame.arbitration_id == cob_id for frame in frames) >= 500
+
+
+@contextmanager
+def heard(channel: str, *wanted: tuple[int, int]) -> Iterator[set[int]]:
+    """Identifiers that a listener with these filters (identifier, mask) hears meanwhile."""
+    found: set[int] = set()
+    filters: Any = [{"can_id": cob_id, "can_mask": mask} for cob_id, mask in wanted]
+    with can.Bus(interface="socketcan", channel=channel, can_filters=filters) as bus:
+        yield found
+        while (message := bus.recv(0.1)) is not None:
+            found.add(message.arbitration_id)
+
+
+def test_two_channels_carry_the_frames_of_one_drive_each(tmp_path: Path) -> None:
+    text = (ROOT / "hardware" / "leg.toml").read_text(encoding="utf-8")
+    (tmp_path / "leg.toml").write_text(
+        text.replace('name = "motor2"', f'channel = "{SECOND}"\nname = "motor2"'), encoding="utf-8"
+    )
+    shutil.copy(ROOT / "hardware" / "limits.toml", tmp_path)
+    where = ("--bus", str(tmp_path / "leg.toml"), *BUS[:-1], f"{CHANNEL},{SECOND}")
+    node = 0x7F
+    with (
+        heard(CHANNEL, (0x701, 0x7FF), (2, node)) as first,
+        heard(SECOND, (0x702, 0x7FF), (1, node)) as second,
+        drives_on(tmp_path, bus=where) as both,
+    ):
+        child = legbench(
+            tmp_path / "run.txt",
+            *("run", "jump", "--plant", "can", *where, "--duration", "0.3"),
+            *("--out", str(tmp_path / "runs"), "--json"),
+        )
+        assert child.wait() == 0, child.text
+        both.wait_for("switch on disabled")
+    assert (first, second) == ({0x701}, {0x702})
+    assert (manifest(tmp_path)["status"], manifest(tmp_path)["rows"]) == ("complete", 300)
+    assert bus_event(tmp_path)["lost_cycles"] == [0, 0]
 
 
 # --- another master ------------------------------------------------------------------------------

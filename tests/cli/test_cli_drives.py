@@ -227,22 +227,35 @@ def test_actions_refuse_what_makes_no_sense(
     drives(*arguments).refused(*words)
 
 
-@pytest.mark.parametrize(
-    "how", [("--channel", "leg.sock"), ("--channel", "leg.sock,leg.sock"), ("--serve", "slcan")]
-)
+@pytest.mark.parametrize("names", ["leg.sock", "leg.sock,leg.sock"])
 def test_emulate_wants_a_socket_file_for_each_channel(
-    how: tuple[str, str], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    names: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     bus = changed(tmp_path, ('name = "motor2"', 'channel = "can1"\nname = "motor2"'))
     ask = ("drives", "emulate", "--bus", bus, "--bare", "--seconds", "0.05")
-    at = how
-    if how[0] == "--channel":
-        at = (how[0], ",".join(str(tmp_path / name) for name in how[1].split(",")))
-    done = called(capfd, *ask, *at)
+    at = ",".join(str(tmp_path / name) for name in names.split(","))
+    done = called(capfd, *ask, "--channel", at)
     done.refused("2 channels, can0, can1", "--channel can0.sock,can1.sock")
     assert list(tmp_path.glob("*.sock")) == []
-    one = at if how[0] != "--channel" else (how[0], at[1].split(",")[0])
+    one = ("--channel", at.split(",")[0])
     assert called(capfd, *ask, *one, "--only", "motor2").status == 0
+
+
+def test_emulate_gives_each_channel_a_terminal_of_its_own(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    bus = changed(tmp_path, ('name = "motor2"', 'channel = "can1"\nname = "motor2"'))
+    ask = ("drives", "emulate", "--bus", bus, "--serve", "slcan", "--bare", "--seconds", "0.05")
+    done = called(capfd, *ask)
+    assert done.status == 0
+    assert re.search(r"--interface slcan --channel /dev/pts/\d+,/dev/pts/\d+ ", done.err)
+    links = tmp_path / "a.tty", tmp_path / "b.tty"
+    done = called(capfd, *ask, "--channel", ",".join(map(str, links)))
+    assert done.status == 0
+    done = called(capfd, *ask, "--channel", "a.tty")
+    done.refused("2 channels, can0, can1", "a link for each", "--channel can0.tty,can1.tty")
+    assert list(tmp_path.glob("*.tty")) == []
+    assert called(capfd, *ask, "--only", "motor2").status == 0
 
 
 def test_emulate_serves_two_channels_and_leaves_no_socket_file(

@@ -127,7 +127,7 @@ def test_time_that_the_server_was_away_is_forgiven(server: UnixServer) -> None:
 def test_drives_on_any_bus_of_python_can() -> None:
     here = can.Bus(interface="virtual", channel="leg")
     there = can.Bus(interface="virtual", channel="leg")
-    with here, BusServer(emulate(load_bus(BUS)), there, Time()) as server:
+    with here, BusServer([emulate(load_bus(BUS))], there, Time()) as server:
         for _ in range(200):
             server.poll()
         heard = {message.arbitration_id for message in iter(lambda: here.recv(0.0), None)}
@@ -160,16 +160,16 @@ class Failing(can.BusABC):
 def test_drives_lose_frames_and_outlive_an_interface_that_goes_down(
     send: int, receive: int | None
 ) -> None:
-    bus = Failing(send=send, receive=receive)
-    with BusServer(emulate(load_bus(BUS)), bus, Time()) as server:
+    network, bus = emulate(load_bus(BUS)), Failing(send=send, receive=receive)
+    with BusServer([network], bus, Time()) as server:
         for _ in range(200):
             server.poll()
-        assert server.network.now_ns > 10 * MS
+        assert network.now_ns > 10 * MS
 
 
 def test_drives_end_with_an_interface_that_is_gone() -> None:
     with (
-        BusServer(emulate(load_bus(BUS)), Failing(receive=errno.ENODEV), Time()) as server,
+        BusServer([emulate(load_bus(BUS))], Failing(receive=errno.ENODEV), Time()) as server,
         pytest.raises(BusError, match="No such device"),
     ):
         server.poll()

@@ -136,6 +136,29 @@ def test_a_drive_that_left_operation_enabled_is_not_led_back() -> None:
     assert machine.goal is Goal.DISABLED
 
 
+def test_a_statusword_is_settled_once_its_goal_is_reached_and_its_controlword_was_held() -> None:
+    machine = PowerMachine()
+    machine.seek(Goal.ENABLED)
+    for statusword in (0x40, 0x40, 0x31, 0x31, 0x33, 0x33):
+        machine.step(statusword)
+        assert machine.settled is None
+    seen = [machine.settled for _ in range(4) if machine.step(0x1237)]
+    assert seen[-1] == 0x1237
+    assert all(word in (None, 0x1237) for word in seen)
+    # Another word with the same state is settled as itself; another state is none.
+    machine.step(0x0237)
+    assert machine.settled == 0x0237
+    machine.step(0x17)
+    assert machine.settled is None
+    # A word that was settled under one goal is not under the next one.
+    again = PowerMachine()
+    for _ in range(4):
+        again.step(0x40)
+    assert again.settled == 0x40
+    again.seek(Goal.ENABLED)
+    assert again.settled is None
+
+
 def test_controlwords_on_the_way_up_stand_at_least_two_cycles() -> None:
     machine = PowerMachine()
     machine.seek(Goal.ENABLED)

@@ -1,10 +1,13 @@
 import itertools
+import struct
 
 import pytest
+from drives_rig import node
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from legbench.drives.errors import CodecError
+from legbench.drives.master.axis_link import AxisLink
 from legbench.drives.protocol.datatypes import FORMATS, DataType, pack, range_of, size_of, unpack
 from legbench.drives.protocol.emcy import Emergency, decode_emcy, emcy_frame
 from legbench.drives.protocol.frame import Frame, describe_id, sync_frame
@@ -18,7 +21,7 @@ from legbench.drives.protocol.nmt import (
     nmt_frame,
 )
 from legbench.drives.protocol.pdo import Mapped, PdoMap, split_word
-from legbench.drives.setup.units import AxisUnits, Unwrapper, wrap
+from legbench.drives.setup.units import AxisUnits, wrap
 
 NUMERIC = list(FORMATS)
 LAYOUTS = st.lists(st.sampled_from(NUMERIC), min_size=1, max_size=8).filter(
@@ -128,12 +131,17 @@ def test_a_heartbeat_never_heard_is_lost_too() -> None:
 @settings(derandomize=True, max_examples=150)
 @given(st.integers(-(1 << 40), 1 << 40), st.sampled_from([16, 32]))
 def test_positions_are_followed_across_the_seam(start: int, bits: int) -> None:
+    # The encoder on the link has 16 bits, that on the motor 32.
+    axis, shown = AxisLink(node(0)), {16: 0, 32: 0}
+    moved = began = 0
     step = (1 << bits) // 3
-    follower = Unwrapper(1 << bits, start)
-    counts = start
-    for move in (step, step, -step, step, step, step, -1):
-        counts += move
-        assert follower.feed(wrap(counts, bits)) == counts
+    for move in (0, step, step, -step, step, step, step, -1):
+        moved += move
+        shown[bits] = wrap(start + moved, bits)
+        assert axis.feed(0x181, struct.pack("<Hih", 0x0237, shown[32], shown[16]))
+        counts = {16: axis.link_counts, 32: axis.motor_counts}[bits]
+        began = counts if move == 0 else began
+        assert counts - began == moved
     nearest = AxisUnits(counts_per_rev=1000, bits=bits).nearest
     assert nearest(wrap(start, bits), start) == start
 

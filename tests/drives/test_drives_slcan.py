@@ -17,7 +17,8 @@ from can_rig import BUS, MS
 from legbench.drives.emulated.build import emulate
 from legbench.drives.emulated.network import Network
 from legbench.drives.emulated.slcan import SlcanAdapter
-from legbench.drives.emulated.slcan_server import FULL, SlcanServer
+from legbench.drives.emulated.slcan_line import FULL
+from legbench.drives.emulated.slcan_server import SlcanServer
 from legbench.drives.errors import BusError
 from legbench.drives.protocol.frame import Frame
 from legbench.drives.protocol.slcan import bitrate_of_registers, format_frame, parse_frame
@@ -41,7 +42,7 @@ def network() -> Network:
 def served(network: Network, link: Path | None = None, warned: list[str] | None = None):
     clock = itertools.count(0, MS // 10)
     told = [] if warned is None else warned
-    return SlcanServer(network, link, lambda: next(clock), told.append)
+    return SlcanServer([network], [link], lambda: next(clock), told.append)
 
 
 @pytest.fixture
@@ -151,14 +152,14 @@ def test_the_one_of_python_can_itself_does_too(server: SlcanServer) -> None:
 
 def test_a_frame_behind_an_acknowledgement_is_not_missed(server: SlcanServer) -> None:
     with opened(server) as bus:
-        os.write(server._ours, b"\r\r\a\rt7011")
+        os.write(server._lines[0]._ours, b"\r\r\a\rt7011")
         assert bus.recv(0.0) is None
-        os.write(server._ours, b"05\r\rt70210")
+        os.write(server._lines[0]._ours, b"05\r\rt70210")
         message = bus.recv(0.0)
         assert message is not None
         assert (message.arbitration_id, message.data) == (0x701, b"\x05")
         bus.set_filters([{"can_id": 0x701, "can_mask": 0x7FF}])
-        os.write(server._ours, b"5\rt701104\r")
+        os.write(server._lines[0]._ours, b"5\rt701104\r")
         message = bus.recv(0.0)
         assert message is not None
         assert message.data == b"\x04"
@@ -181,13 +182,13 @@ def test_what_an_earlier_program_left_unread_is_forgotten(
     for count in range(FULL // 50):
         network.send(other, Frame(0x7EE, count.to_bytes(8, "little")))
         server.poll()
-    assert server._unsent
+    assert server._lines[0]._unsent
     with asked(server) as bus:
         bus.send(ASK)
-        heard, left, before = [], server._unsent, server._openings
+        heard, left, before = [], server._lines[0]._unsent, server._lines[0]._openings
         for _ in range(100):
             # What lies in the terminal is the kernel's; what the adapter still holds is forgotten.
-            left = server._unsent if server._openings == before else left
+            left = server._lines[0]._unsent if server._lines[0]._openings == before else left
             server.poll()
             heard += iter(lambda: bus.recv(0.0), None)
         old = [frame for frame in map(parse_frame, left.decode().split("\r")[1:]) if frame]
@@ -236,7 +237,7 @@ def test_no_bytes_hurt_either_side(network: Network, server: SlcanServer) -> Non
             assert adapter.feed(chunk) is not None
             network.advance(network.now_ns + MS // 10)
             adapter.take()
-            os.write(server._ours, chunk)
+            os.write(server._lines[0]._ours, chunk)
             while bus.recv(0.0) is not None:
                 continue
 

@@ -32,8 +32,9 @@ from legbench.limits.momentum import (
     SupportPoint,
     unexplained,
 )
-from legbench.limits.momentum_watch import CONTACT_TIME, FLIGHT_TIME, MomentumWatch
+from legbench.limits.momentum_watch import MomentumWatch
 from legbench.limits.safety import SafetyLimits
+from legbench.limits.support_watch import CONTACT_TIME, FLIGHT_TIME
 from legbench.plant.leg_momentum import momentum_of, momentum_on
 from legbench.plants import LIMITS_NAME
 from legbench.servo import ServoConfig

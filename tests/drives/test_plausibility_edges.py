@@ -1,6 +1,8 @@
 """What motors and links may show, at both sides of each bound, against closed forms."""
 
 import math
+import random
+from collections import deque
 from dataclasses import replace
 
 import pytest
@@ -233,6 +235,29 @@ def test_a_link_that_left_and_came_back_does_not_stand() -> None:
             here = excursion if cycle == 10 else 0.0
             seen.append(it.see((REST[0] + here, REST[1] + 0.0012 * cycle)))
         assert (seen[-1] is not None) is found
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_link_stands_as_the_ranges_of_its_last_readings_say(seed: int) -> None:
+    # Legs that rest, creep and swing in turns, in steps around both bounds.
+    dice, watch, last = (
+        random.Random(seed),
+        LinkWatch(BOUNDS),
+        deque[tuple[float, float]](maxlen=20),
+    )
+    links, speeds, stood = list(REST), [0.0, 0.0], 0
+    for cycle in range(1500):
+        if cycle % 25 == 0:
+            speeds = [dice.choice((0.0, 0.0, 5e-5, 1e-4, 5e-4, 1.2e-3)) for _ in REST]
+            speeds = [speed * dice.choice((-1, 1)) for speed in speeds]
+        links = [link + speed for link, speed in zip(links, speeds, strict=True)]
+        last.append((links[0], links[1]))
+        watch.see(REST, links, REST, (True, True), 1)
+        ranges = [max(each) - min(each) for each in zip(*last, strict=True)]
+        stands = min(ranges) <= 0.002 and max(ranges) > BOUNDS.standing
+        assert watch.stands is (stands and len(last) == 20), cycle
+        stood += watch.stands
+    assert 20 < stood < 1000
 
 
 def test_readings_that_are_not_new_are_no_standing() -> None:

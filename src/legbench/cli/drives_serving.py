@@ -71,10 +71,10 @@ def _print_state(as_json: bool, at: float, node: str, state: str) -> None:
 class Emulate:
     """Emulate a leg for other processes, at --channel: a socket file for legbench_unix.
 
-    Drives that hang on several channels are served at a socket file each, --channel A,B. With
-    --serve slcan the leg sits behind a pseudo terminal, as behind an adapter on a serial line, and
-    --channel may name a link to it. With --interface it sits on that bus, such as socketcan on a
-    vcan. --bitrate is that of the emulated wire.
+    Drives that hang on several channels are served at a place each, --channel A,B. With
+    --serve slcan the leg sits behind pseudo terminals, as behind adapters on serial lines, and
+    --channel may name links to them. With --interface it sits on those buses, such as socketcan on
+    a vcan. --bitrate is that of the emulated wire.
     """
 
     serve: Literal["unix", "slcan"] = "unix"
@@ -108,19 +108,17 @@ class Emulate:
             config, start_pos = only(config, self.only), (0.0,)
         paths = self._paths(bench, config)
         end = time.monotonic() + self.seconds
-        where = None if bench.channel is None else Path(bench.channel)
 
         _tell_problems(config)
 
         def serve_at(networks: "Sequence[Network]") -> "Server":
+            if self.serve == SLCAN:
+                return SlcanServer(networks, paths, warn=note)
             if len(paths) > 1:
                 return ChannelsServer(networks, paths)
-            (network,) = networks
-            if self.serve == SLCAN:
-                return SlcanServer(network, where, warn=note)
             if paths:
-                return UnixServer(network, paths[0])
-            return BusServer(network, open_session(config, bench.choice, leads=False).bus)
+                return UnixServer(networks[0], paths[0])
+            return BusServer(networks, open_session(config, bench.choice, leads=False).bus)
 
         with stop_on_interrupt() as stop:
             serve(
@@ -129,7 +127,6 @@ class Emulate:
                 start_pos=start_pos,
                 body=body,
                 patience=self.patience,
-                split=len(paths) > 1,
                 report=partial(_print_state, bench.json),
                 ready=partial(self._tell_ready, bench, config.bitrate),
                 stop=lambda: stop.is_set or time.monotonic() > end,
@@ -147,23 +144,25 @@ class Emulate:
         note(f"serving {channel}; use it with --interface {interface} --channel {channel}{at}")
 
     def _paths(self, bench: BenchFlags, config: "BusConfig") -> tuple[Path, ...]:
-        """Socket files to serve, one a channel; none where it is another bus.
+        """Socket files to serve, or links to terminals, one a channel; none where none are asked.
 
         Raises:
-            ConfigError: drives hang on several channels, and it is not one socket file for each.
+            ConfigError: it is not one path for each channel that drives hang on.
         """
-        sockets = self.serve != SLCAN and bench.interface in (None, UNIX)
-        if len(config.channels) == 1:
-            return (Path(bench.channel),) if sockets and bench.channel is not None else ()
-        if not sockets and self.serve != SLCAN:
+        slcan = self.serve == SLCAN
+        if bench.interface not in (None, UNIX) or (slcan and bench.channel is None):
             return ()
-        given = (bench.channel or "").split(",") if sockets else []
-        if len(set(filter(None, given))) != len(config.channels):
-            names = ", ".join(map(str, config.channels))
-            example = ",".join(f"{name}.sock" for name in config.channels)
+        channel = bench.channel or ""
+        if len(config.channels) == 1:
+            return (Path(channel),)
+        given = channel.split(",")
+        if len(given) != len(config.channels) or len(set(filter(None, given))) != len(given):
+            kind = "link" if slcan else "socket file"
+            example = ",".join(f"{name}.{'tty' if slcan else 'sock'}" for name in config.channels)
             raise ConfigError(
-                f"the bus file's drives hang on {len(config.channels)} channels, {names}; a socket "
-                f"file or a terminal is one wire: give a socket file for each, --channel {example}"
+                f"the bus file's drives hang on {len(config.channels)} channels, "
+                f"{', '.join(map(str, config.channels))}; each is a wire of its own: give a "
+                f"{kind} for each, --channel {example}"
             )
         return tuple(map(Path, given))
 

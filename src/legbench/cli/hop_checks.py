@@ -1,14 +1,11 @@
 """Questions that `legbench hop` refuses before the leg has hopped."""
 
 import math
-from typing import TYPE_CHECKING
 
+from legbench.cli.hop_arguments import HopArguments
 from legbench.errors import ConfigError
 from legbench.modes.basin import GridAxis
 from legbench.modes.cycles import LONGEST
-
-if TYPE_CHECKING:
-    from legbench.cli.hop import HopArguments
 
 LARGE = 250_000
 """Cells of a basin map beyond which it is asked whether that was meant [-]."""
@@ -16,7 +13,7 @@ CELL_TIME = 0.004
 """Time that one cell takes one process, about [s]."""
 
 
-def check(flags: "HopArguments") -> None:
+def check(flags: HopArguments) -> None:
     """Refuse what would only be found after the leg has hopped.
 
     Raises:

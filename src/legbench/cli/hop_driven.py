@@ -3,12 +3,13 @@
 import math
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from legbench.analytic import LegModel
 from legbench.analytic.taylor import TaylorLeg
+from legbench.cli.hop_arguments import HopArguments
 from legbench.cli.hop_tables import (
     cycle_content,
     cycle_lines,
@@ -27,9 +28,6 @@ from legbench.modes.hop_family import HopFamily, follow_hop
 from legbench.modes.hop_setting import tools_at
 from legbench.signals import Ints
 
-if TYPE_CHECKING:
-    from legbench.cli.hop import HopArguments
-
 WHY = {
     Ending.STANDS: "it stays on the ground; take a larger --dz2, or a --height that is nearer",
     Ending.FELL: "it falls over; take a smaller --dz2, or a --height that is nearer",
@@ -41,7 +39,7 @@ ENDING_HOPS = 400
 """Number of hops after which one that is not stable should have come to its end [-]."""
 
 
-def answer(flags: "HopArguments", design: LegDesign) -> tuple[dict[str, Any], list[str]]:
+def answer(flags: HopArguments, design: LegDesign) -> tuple[dict[str, Any], list[str]]:
     """Hops under the jump controller, as JSON and as lines."""
     law = JumpLaw(flags.jump, design)
     if flags.family is not None and flags.to is not None:
@@ -83,7 +81,7 @@ def answer(flags: "HopArguments", design: LegDesign) -> tuple[dict[str, Any], li
     return content, lines
 
 
-def _start(flags: "HopArguments", model: LegModel) -> Apex:
+def _start(flags: HopArguments, model: LegModel) -> Apex:
     """The apex to begin with: relaxed and upright, by default 30 mm over standing."""
     z2 = flags.jump.z2 + flags.jump.dz2
     q = (-z2 * math.sqrt(0.5), z2 * math.sqrt(0.5))
@@ -166,7 +164,7 @@ def _plot_family(out: Path, design: LegDesign, family: HopFamily) -> None:
     note(f"wrote {out / 'family.png'}")
 
 
-def _basin(flags: "HopArguments", design: LegDesign, cycle: HopCycle, out: Path) -> Ints:
+def _basin(flags: HopArguments, design: LegDesign, cycle: HopCycle, out: Path) -> Ints:
     from legbench.viz.print.hops import plot_basin
 
     def axis(name: str, span: float) -> GridAxis:

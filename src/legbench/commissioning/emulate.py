@@ -31,7 +31,6 @@ def serve(
     start_pos: tuple[float, ...],
     body: Body = stiff_body,
     patience: int = 5,
-    split: bool = False,
     report: Report,
     ready: Callable[[Server], None],
     stop: Callable[[], bool],
@@ -46,7 +45,6 @@ def serve(
         start_pos: motor positions at power-on [rad].
         body: mechanical load on the motor shafts.
         patience: periods without SYNC or target after which an enabled drive faults.
-        split: whether every channel of the bus file is a wire of its own, instead of all being one.
         report: told every change of a drive's state, until it fails.
         ready: called when the bus can be used.
         stop: called repeatedly; the server ends when it returns true.
@@ -57,7 +55,7 @@ def serve(
     """
     # A master on the same processor goes first, as it would on one of its own.
     ask(priority=PRIORITY - 1)
-    networks, drives = _emulated(config, _behaviours(config, start_pos, patience), body, split)
+    networks, drives = _emulated(config, _behaviours(config, start_pos, patience), body)
     # A terminal that is closed must not take the drives from a master that leads them.
     reporting = Onlooker("report", report)
     shown: dict[str, DriveState] = {}
@@ -74,10 +72,10 @@ def serve(
 
 
 def _emulated(
-    config: BusConfig, behaviours: Sequence[Behaviour], body: Body, split: bool
+    config: BusConfig, behaviours: Sequence[Behaviour], body: Body
 ) -> tuple[tuple[Network, ...], list[tuple[str, EmulatedDrive]]]:
-    """Networks of a bus file, one a channel if they are split, and their drives by name."""
-    if split:
+    """Networks of a bus file, one a channel, and their drives by name."""
+    if len(config.channels) > 1:
         nodes = [node for channel in config.channels for node in config.nodes_on(channel)]
         networks = emulate_channels(config, behaviours, body=body, body_period_ns=BODY_PERIOD_NS)
     else:

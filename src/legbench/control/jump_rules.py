@@ -19,12 +19,9 @@ changes sign twice a period: only the ground loads them for longer than half of 
 import math
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from legbench.phases import PhaseInfo, Role
-
-if TYPE_CHECKING:
-    from legbench.control.jump import JumpConfig
 
 
 class JumpPhase(IntEnum):
@@ -58,7 +55,36 @@ class PhaseExit:
     """Time that the load must last on its side of the level [s]."""
 
 
-def phase_exits(config: "JumpConfig") -> dict[JumpPhase, PhaseExit]:
+class JumpThresholds(Protocol):
+    """Loads and times at which phases of the jump controller end; `JumpConfig` holds them."""
+
+    @property
+    def delay(self) -> float:
+        """Time at rest before the first push [s]."""
+        ...
+
+    @property
+    def touchdown_load(self) -> float:
+        """Load that means ground, as a share of the load of standing [-]."""
+        ...
+
+    @property
+    def touchdown_time(self) -> float:
+        """Time that this load must last [s]."""
+        ...
+
+    @property
+    def release_load(self) -> float:
+        """Load at which a push has lifted the leg, as a share of the load of standing [-]."""
+        ...
+
+    @property
+    def release_time(self) -> float:
+        """Shortest time from release to the next flight [s]."""
+        ...
+
+
+def phase_exits(config: JumpThresholds) -> dict[JumpPhase, PhaseExit]:
     """Return the end of each phase with these settings."""
     return {
         JumpPhase.REST: PhaseExit(to=JumpPhase.PUSH, dwell=config.delay),
@@ -73,7 +99,7 @@ def phase_exits(config: "JumpConfig") -> dict[JumpPhase, PhaseExit]:
     }
 
 
-def phase_infos(config: "JumpConfig") -> tuple[PhaseInfo, ...]:
+def phase_infos(config: JumpThresholds) -> tuple[PhaseInfo, ...]:
     """The phases for readers of a run; a touchdown is told once its load has lasted."""
     return (
         PhaseInfo(code=JumpPhase.REST, name="rest", role=Role.REST, doc="the leg stands"),

@@ -35,6 +35,8 @@ class EncoderWatch:
         self._links = LinkWatch(bounds)
         self._two_encoders = two_encoders
         self._momentum = None
+        self._asked = False
+        """Whether the momentum was asked in the cycle before."""
         if momentum is not None and limits.link_error is not None:
             self._momentum = MomentumWatch(momentum, limits.link_error, period)
 
@@ -77,10 +79,12 @@ class EncoderWatch:
         if momentum is not None and doubt is None:
             # It is asked where a sway may hide an encoder that is wrong.
             if self._links.hides_drift and all(fresh):
+                self._asked = True
                 joint_1, joint_2 = joint_pos
                 reading = MomentumReading(interval, (motor_1, motor_2), (joint_1, joint_2))
                 doubt = momentum.see(reading, stands=self._links.stands)
-            else:
+            elif self._asked:
+                self._asked = False
                 momentum.restart()
         if found is None and doubt is not None:
             # A motor that is not where it should be makes the springs sway, too: it is the cause.

@@ -2,11 +2,11 @@
 
 import math
 from collections.abc import Sequence
-from typing import final
+from typing import NoReturn, final
 
 from legbench.errors import PlantFault
 from legbench.limits.encoder_watch import EncoderWatch
-from legbench.limits.knee import knee_of, project
+from legbench.limits.knee import Range, knee_of, project
 from legbench.limits.momentum import LegMomentum
 from legbench.limits.safety import START_TOLERANCE, UNLIMITED, SafetyLimits
 from legbench.limits.shortfall import Shortfall
@@ -117,16 +117,21 @@ class Guard:
             and low2 <= motor2 <= high2
             and -step <= motor1 - last1 <= step
             and -step <= motor2 - last2 <= step
-            and (knee is None or knee[0] <= knee_of(wish) <= knee[1])
+            and (knee is None or knee[0] <= motor2 - motor1 <= knee[1])
         )
 
     def _check_wish(self, wish: Sequence[float]) -> None:
         before = self.applied if self._wish is None else self._wish
         limit = self._limits.command_step
-        for value, wished in zip(wish, before, strict=True):
-            # Of what is not finite no step is within a limit, unless there is none.
-            if not abs(value - wished) <= limit or not math.isfinite(value):
-                self._refuse_wish(wish, before)
+        (wish_1, wish_2), (before_1, before_2) = wish, before
+        # Of what is not finite no step is within a limit, unless there is none.
+        if not (
+            abs(wish_1 - before_1) <= limit
+            and abs(wish_2 - before_2) <= limit
+            and math.isfinite(wish_1)
+            and math.isfinite(wish_2)
+        ):
+            self._refuse_wish(wish, before)
 
     def _refuse_wish(self, wish: Sequence[float], before: Sequence[float]) -> None:
         limit = self._limits.command_step
@@ -208,7 +213,13 @@ class Guard:
         Raises:
             PlantFault: a limit is exceeded.
         """
-        self._check_joints(joint_pos)
+        (low1, high1), (low2, high2) = self._limits.joint_range
+        joint1, joint2 = joint_pos
+        if not (low1 <= joint1 <= high1 and low2 <= joint2 <= high2):
+            self._refuse_joints(joint_pos)
+        knee = self._joint_knee
+        if knee is not None and not knee[0] <= joint2 - joint1 <= knee[1]:
+            self._refuse_knee(joint_pos, knee)
         torque1, torque2 = spring_torque
         most = self._limits.spring_torque
         if not (-most <= torque1 <= most and -most <= torque2 <= most):
@@ -246,18 +257,13 @@ class Guard:
                     "temperature of the limits; let it cool down",
                 )
 
-    def _check_joints(self, joint_pos: Sequence[float]) -> None:
-        (low1, high1), (low2, high2) = self._limits.joint_range
-        joint1, joint2 = joint_pos
-        if not (low1 <= joint1 <= high1 and low2 <= joint2 <= high2):
-            self._refuse_joints(joint_pos)
-        knee = self._joint_knee
-        if knee is not None and not knee[0] <= knee_of(joint_pos) <= knee[1]:
-            raise PlantFault(
-                "joint range",
-                f"q2 - q1 is at {knee_of(joint_pos):.3f} rad, the limits are [{knee[0]:g}, "
-                f"{knee[1]:g}] rad, joint_knee_range: the knee has gone through its stop",
-            )
+    def _refuse_knee(self, joint_pos: Sequence[float], knee: Range) -> NoReturn:
+        """Raise PlantFault for a knee beyond its range."""
+        raise PlantFault(
+            "joint range",
+            f"q2 - q1 is at {knee_of(joint_pos):.3f} rad, the limits are [{knee[0]:g}, "
+            f"{knee[1]:g}] rad, joint_knee_range: the knee has gone through its stop",
+        )
 
     def _refuse_joints(self, joint_pos: Sequence[float]) -> None:
         """Raise PlantFault for the first known joint beyond its range; none if all are unknown."""

@@ -7,140 +7,16 @@ from typing import final
 
 from legbench.limits.ground_contact import GroundContact
 from legbench.limits.knee import Range
-from legbench.limits.momentum import (
-    AVERAGE_SHARES,
-    LegMomentum,
-    LegMotion,
-    MomentumReading,
-    SupportPoint,
-    left_over,
-    motion_of,
-)
+from legbench.limits.momentum import LegMomentum, LegMotion, MomentumReading, motion_of
 from legbench.limits.plausibility import Doubt
+from legbench.limits.spring_mismatch import SpringMismatch
+from legbench.limits.support_watch import CONTACT_TIME, MovingAverage, SupportWatch
 
-CONTACT_TIME = 0.02
-"""Time in which a touchdown or a lift-off is over; the foot of the paper's leg may bounce [s]."""
 RUBBER = 0.01
 """Distance from a stop of rubber at which it may push already [rad]."""
-FLIGHT_TIME = 0.01
-"""Time for which torque of one sign is unexplained before a leg is doubted that is for certain in
-flight, where nothing but its springs acts [s]."""
-PATIENT_SHARE = 0.5
-"""Shortest such time, relative to the reach of the averages [-]: a single step of an encoder leaves
-torque of one sign for as long."""
-NOISE_SHARE = 0.6
-"""Share of the limit that rounded encoders may leave as noise [-]."""
-LEARNING_TIME = 1.0
-"""Time constant in which the mismatch of the springs is learned, and first time for it: two hops. A
-leg that has only begun to sway is still watched by its sway [s]."""
-MISMATCH = 0.06
-"""Largest share by which both springs may differ from the design, each to another side [-]."""
 WEIGHT_SHARE = 0.2
 """Torque on the knee that rules a support out, relative to what the weight can do there [-]: in the
 middle of a stance the springs carry twice the weight, in flight they carry nothing."""
-
-
-@final
-class _Average:
-    """Three moving averages, one after the other, that together reach over so many cycles."""
-
-    def __init__(self, cycles: int) -> None:
-        first, second = [round(share * cycles) for share in AVERAGE_SHARES]
-        lengths = (first, second, cycles - first - second)
-        self._stages = tuple(deque([0.0] * length, maxlen=length) for length in lengths)
-        self._sums = (0.0, 0.0, 0.0)
-        self._scale = 1.0 / math.prod(lengths)
-
-    def after(self, value: float) -> float:
-        """Take one more value; return the average."""
-        first, second, third = self._stages
-        sum_1, sum_2, sum_3 = self._sums
-        sum_1 += value - first[0]
-        first.append(value)
-        sum_2 += sum_1 - second[0]
-        second.append(sum_1)
-        sum_3 += sum_2 - third[0]
-        third.append(sum_2)
-        self._sums = sum_1, sum_2, sum_3
-        return self._scale * sum_3
-
-
-@final
-class _SupportWatch:
-    """Unexplained torque about one support, averaged.
-
-    Attributes:
-        reach: cycles over which the averages reach.
-        patience: cycles of torque of one sign that it may leave while the leg has it for certain.
-        pushed: a stop may push at the knee in one of them.
-    """
-
-    def __init__(
-        self, leg: LegMomentum, support: SupportPoint, torque: float, period: float
-    ) -> None:
-        self._support = support
-        self.reach = support.average_cycles(leg.link_step, NOISE_SHARE * torque, period)
-        bears = FLIGHT_TIME if support is leg.supports[-1] else CONTACT_TIME
-        self.patience = max(round(bears / period), round(PATIENT_SHARE * self.reach))
-        self.restart()
-
-    def restart(self) -> None:
-        """Begin to average anew."""
-        self._polar, self._knee = _Average(self.reach), _Average(self.reach)
-        self._pushes = 0
-        self.pushed = False
-
-    def after(self, motion: LegMotion, *, free: bool) -> tuple[float, float]:
-        """Take one more motion; return the averages along q1 + q2 and along the knee [N m].
-
-        Args:
-            motion: of the leg.
-            free: whether its knee is free of its stops.
-        """
-        self._pushes = max(0, self._pushes - 1) if free else self.reach + 2
-        self.pushed = self._pushes > 0
-        polar, knee = left_over(self._support, motion)
-        return self._polar.after(polar), self._knee.after(knee)
-
-
-@final
-class _Mismatch:
-    """Springs that are stiffer or softer than the design says, as far as they differ.
-
-    Torque that is unexplained in proportion to how far the springs are wound, for seconds, is
-    theirs; an encoder that dies leaves a torque of its own. Least squares that forget.
-
-    Attributes:
-        share: unexplained torque per torque by which the springs are wound [-].
-    """
-
-    def __init__(self, torque: float, period: float) -> None:
-        """Begin with springs as designed; those wound by less than a torque [N m] tell little."""
-        self._memory, self._torque = round(LEARNING_TIME / period), torque
-        self._least = torque**2
-        self._seen, self._product, self._square = 0, 0.0, 0.0
-        self.share = 0.0
-
-    @property
-    def known(self) -> bool:
-        """Whether it has been learned for long enough."""
-        return self._seen >= self._memory
-
-    def learn(self, polar: float, wound: float) -> None:
-        """Take what the likeliest support leaves unexplained in a cycle.
-
-        Args:
-            polar: torque along q1 + q2, infinite if the knee rules out all supports [N m].
-            wound: torque by which the springs are wound [N m].
-        """
-        self._seen = min(self._seen + 1, self._memory)
-        if abs(polar) > self._torque + MISMATCH * abs(wound):
-            return  # That much is no spring's.
-        gain = 1.0 / self._seen
-        self._product += gain * (polar * wound - self._product)
-        self._square += gain * (wound * wound - self._square)
-        share = self._product / (self._square + self._least)
-        self.share = min(max(share, -MISMATCH), MISMATCH)
 
 
 @final
@@ -172,7 +48,7 @@ class MomentumWatch:
         # A leg that is always supported alike needs nothing to be ruled out.
         self._knee_torque = math.inf if only else WEIGHT_SHARE * weight
         self._supports = [
-            _SupportWatch(leg, support, self._torque, period) for support in leg.supports
+            SupportWatch(leg, support, self._torque, period) for support in leg.supports
         ]
         self._reaches = sorted({one.reach for one in self._supports})
         self._reach = max(one.reach for one in self._supports)
@@ -186,14 +62,11 @@ class MomentumWatch:
 
     def start(self) -> None:
         """Begin anew with whatever is shown next, and forget the leg's springs."""
-        self._mismatch = _Mismatch(self._torque, self._period)
+        self._mismatch = SpringMismatch(self._torque, self._period)
         self._begin()
 
     def restart(self) -> None:
-        """Begin anew with whatever is shown next; a watch that has seen nothing yet already does.
-
-        A leg that does not sway asks for this in every cycle.
-        """
+        """Begin anew with whatever is shown next, unless nothing has been seen yet."""
         if self._readings:
             self._begin()
 
@@ -202,7 +75,7 @@ class MomentumWatch:
         self._readings = deque[MomentumReading](maxlen=3)
         for support in self._supports:
             support.restart()
-        self._wound = {reach: _Average(reach) for reach in self._reaches}
+        self._wound = {reach: MovingAverage(reach) for reach in self._reaches}
         if self._contact is not None:
             self._contact.forget()
         self._seen = self._age = self._evidence = 0
@@ -214,7 +87,9 @@ class MomentumWatch:
             reading: of that cycle.
             stands: whether one link stands while the other one swings.
         """
-        if not (self._regular(reading) and _inside(reading.joint[0], self._leg.hip_range)):
+        # A reading must have come about a period after the one before.
+        regular = 0.5 * self._period < reading.interval < 1.5 * self._period
+        if not (regular and _inside(reading.joint[0], self._leg.hip_range)):
             self.restart()
             return None
         self._readings.append(reading)
@@ -286,10 +161,6 @@ class MomentumWatch:
             f"link_error of {self._link_error:g} rad: look at the link encoders, at the springs' "
             "stiffness, and whether the foot slides",
         )
-
-    def _regular(self, reading: MomentumReading) -> bool:
-        """Whether a reading came about a period after the one before."""
-        return 0.5 * self._period < reading.interval < 1.5 * self._period
 
 
 def _inside(angle: float, between: Range) -> bool:

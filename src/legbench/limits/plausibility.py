@@ -172,17 +172,23 @@ class LinkWatch:
         self._led_rest = rest = self._led_rest + self._forget * (led - self._led_rest)
         self._led = max(self._led * self._keep, abs(led - rest))
         complete, reach = all(fresh), self._step_max * elapsed
-        doubt = None
-        if (
-            complete
-            and self._heard
-            and abs(joint_1 - last[0]) <= reach
-            and abs(joint_2 - last[1]) <= reach
-        ):
+        doubt, usual = None, complete and self._heard
+        if usual and abs(joint_1 - last[0]) <= reach and abs(joint_2 - last[1]) <= reach:
             self._last = (joint_1, joint_2)
         else:
             doubt = self._speed((joint_1, joint_2), last, fresh, elapsed)
-        doubt = self._sway(polar) or doubt
+        self._sway_rest = rest = self._sway_rest + self._forget * (polar - self._sway_rest)
+        sway = abs(polar - rest)
+        self._swayed = swayed = max(self._swayed * self._fade, self._young[0])
+        self._young.append(sway)
+        # What the leg may do along the polar mode, from what it did and was led to do.
+        self._widening = widening = SWAY_GROWTH * swayed + POLAR_GAIN * self._led
+        limit = self._bounds.sway + widening
+        self.hides_drift = limit > HIDDEN
+        if sway > limit:
+            doubt = self._doubt_sway(sway, limit) or doubt
+        else:
+            self._sway_age = 0
         if not (complete and self._watches_standing):
             return doubt
         motor_1, motor_2 = motor_pos
@@ -214,19 +220,8 @@ class LinkWatch:
         self._heard = not any(self._silent)
         return doubt
 
-    def _sway(self, polar: float) -> Doubt | None:
-        """Judge how far the links are from where q1 + q2 rests [rad]."""
-        self._sway_rest = rest = self._sway_rest + self._forget * (polar - self._sway_rest)
-        sway = abs(polar - rest)
-        self._swayed = swayed = max(self._swayed * self._fade, self._young[0])
-        self._young.append(sway)
-        # What the leg may do along the polar mode, from what it did and was led to do.
-        self._widening = SWAY_GROWTH * swayed + POLAR_GAIN * self._led
-        limit = self._bounds.sway + self._widening
-        self.hides_drift = limit > HIDDEN
-        if not sway > limit:
-            self._sway_age = 0
-            return None
+    def _doubt_sway(self, sway: float, limit: float) -> Doubt | None:
+        """Doubt a sway that is beyond its limit [rad], once it has lasted."""
         self._sway_age += 1
         if self._sway_age < SWAY_CYCLES:
             return None

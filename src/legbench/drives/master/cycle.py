@@ -66,8 +66,8 @@ class Cycle:
         self.silent_total = 0
         self.notices = Notices()
         self.stopping = False
+        self._gaps = True  # A drive may have missed a cycle since two in a row were complete.
         self._tpdos = {cob: axis for axis in self.axes for cob in axis.tpdo_ids}
-        self._expected = len(self._tpdos)
         self._ours = frozenset(
             {NMT_ID, SYNC_ID, HEARTBEAT_BASE + config.master_id}
             | {node.rpdo_id(pdo) for node in config.nodes for pdo in node.rpdos}
@@ -120,13 +120,14 @@ class Cycle:
         sent = self._outgoing.sync()
         for axis in self.axes:
             axis.begin_cycle()
-        missing = self._gather(sync_ns + self._deadline_ns) if sent else self._expected
+        complete = sent and self._gather(sync_ns + self._deadline_ns)
         # The next SYNC leaves on the grid, however late this one was.
-        self._requests.turn(None if missing or self.stopping else timebase.now_ns() - due_ns)
-        for axis, watch in zip(self.axes, self.watches, strict=True):
-            watch.cycle(complete=axis.fresh)
+        asks = complete and not self.stopping
+        self._requests.turn(timebase.now_ns() - due_ns if asks else None)
+        if self._gaps or not complete:
+            self._count()
         self._due_ns = due_ns + self._period_ns
-        return Tick(sync_ns, sync_ns - due_ns, skipped + silent, silent, missing == 0)
+        return Tick(sync_ns, sync_ns - due_ns, skipped + silent, silent, complete)
 
     def hears_sync(self, until_ns: int) -> bool:
         """Whether another master sends SYNC by then; from its first one on this one may `follow`.
@@ -143,7 +144,7 @@ class Cycle:
         """Wait for the SYNC of another master, gather process data; nothing is sent."""
         timebase, last_ns = self._port.timebase, self._due_ns
         self.bus_error = None
-        missing, skipped = self._expected, 0
+        complete, skipped = False, 0
         sync_ns = None
         try:
             sync_ns = self._await_sync(timebase.now_ns() + 2 * self._period_ns)
@@ -153,11 +154,16 @@ class Cycle:
             axis.begin_cycle()
         if sync_ns is not None:
             skipped = max(0, round((sync_ns - last_ns) / self._period_ns) - 1)
-            missing = self._gather(sync_ns + self._deadline_ns)
+            complete = self._gather(sync_ns + self._deadline_ns)
         self._due_ns = sync_ns or last_ns + self._period_ns
+        self._count()
+        return Tick(sync_ns or timebase.now_ns(), 0, skipped, skipped, complete)
+
+    def _count(self) -> None:
+        """Count this cycle for every drive; one in order changes no count while there are none."""
         for axis, watch in zip(self.axes, self.watches, strict=True):
             watch.cycle(complete=axis.fresh)
-        return Tick(sync_ns or timebase.now_ns(), 0, skipped, skipped, missing == 0)
+        self._gaps = any(watch.gaps for watch in self.watches)
 
     def _await_sync(self, until_ns: int) -> int | None:
         """Time at which the SYNC of another master came [ns]; none if it has not by `until_ns`."""
@@ -180,6 +186,7 @@ class Cycle:
         for axis, watch in zip(self.axes, self.watches, strict=True):
             if not self._owed.isdisjoint(axis.tpdo_ids):
                 watch.cycle(complete=False)
+                self._gaps = True
         self._due_ns += self._period_ns
         self._port.timebase.wait_until(self._due_ns)
         self._drain()
@@ -191,13 +198,9 @@ class Cycle:
         return self.stranger is not None
 
     def send(self, controlwords: Sequence[int | None]) -> bool:
-        """Send the RPDOs of all drives, which act at the next SYNC; false if the bus failed.
-
-        A frame that is refused keeps no other drive from its own. A drive without a controlword
-        gets no frame.
-        """
+        """Send the RPDOs and the heartbeat as `Outgoing` does; false if the bus failed."""
         sent = self._outgoing.commands(controlwords)
-        return self.send_heartbeat() and sent
+        return self._outgoing.heartbeat(self._due_ns) and sent
 
     def send_heartbeat(self) -> bool:
         """Send the heartbeat, where due; false if the bus failed."""
@@ -229,9 +232,10 @@ class Cycle:
         elif base == SDO_REQUEST_BASE and self._port.foreign(message):
             self.notices.sdo_request(message, node_id, self._port.timebase.now_ns())
 
-    def _gather(self, until_ns: int) -> int:
-        """Take frames until all process data is there or the deadline; counts those missing."""
-        missing, receive, tpdos = self._expected, self._port.receive, self._tpdos
+    def _gather(self, until_ns: int) -> bool:
+        """Take frames until all process data is there or the deadline; whether it is complete."""
+        receive, tpdos = self._port.receive, self._tpdos
+        missing: set[int] = set(tpdos)
         garbled: set[int] = set()
         try:
             while missing:
@@ -245,20 +249,19 @@ class Cycle:
                     if self._port.timebase.now_ns() >= until_ns:
                         break
                     continue
-                before = axis.fresh
-                if axis.received(cob_id):
+                if cob_id not in missing:
                     self.notices.answered_twice(message, self._port.timebase.now_ns())
-                if not axis.feed(cob_id, message.data):
+                if axis.feed(cob_id, message.data):
+                    missing.discard(cob_id)
+                else:
                     garbled.add(cob_id)
                     self._by_node[axis.node.node_id].bad_total += 1
-                elif axis.fresh and not before:
-                    missing -= len(axis.tpdo_ids)
         except BusError as error:
             self._failed(error)
         if missing:
             owed = {cob_id for axis in self.axes for cob_id in axis.missing_ids}
             self._owed = owed - garbled
-        return missing
+        return not missing
 
     def _drain(self) -> None:
         """Discard, before SYNC, what has come by now: late or copied data must not pass for new.
@@ -266,11 +269,11 @@ class Cycle:
         Frames that come as fast as they are read hold up no stop: after a period the tick goes on
         with a bus that has failed.
         """
-        timebase = self._port.timebase
-        until_ns = timebase.now_ns() + self._period_ns
+        now_ns, until_ns = self._port.timebase.now_ns, None
         try:
             while (message := self._port.take()) is not None:
-                if timebase.now_ns() > until_ns:
+                until_ns = until_ns or now_ns() + self._period_ns
+                if now_ns() > until_ns:
                     raise BusError(
                         f"frames come faster than they are read, for {1e-6 * self._period_ns:g} ms "
                         "now: look for a node or a program that babbles"

@@ -40,14 +40,17 @@ class LimitedMotion:
         self._two_encoders = two_encoders
         self._cycle, self._guard = cycle, guard
         self._stiffness = tuple(float(value) for value in stiffness)
-        self._expected: list[tuple[float, ...]] = []
+        self._acting: tuple[float, ...] | None = None
+        """Command that acts by now; none before `begin` [rad]."""
+        self._sent: tuple[float, ...] = ()
+        """Command that acts in the next cycle [rad]."""
         self._seen_ns = 0
 
     def begin(self) -> None:
         """Begin to command from the targets that the drives hold, not from their encoders."""
         held = tuple(axis.target_pos for axis in self._cycle.axes)
         self._guard.start_at(held)
-        self._expected = [held] * 2
+        self._acting = self._sent = held
 
     def sample(self, tick: Tick) -> Sample:
         """Measurements of all drives after a tick."""
@@ -72,7 +75,7 @@ class LimitedMotion:
             motor_pos=sample.motor_pos,
             joint_pos=sample.link_pos,
             spring_torque=sample.spring_torque,
-            expected_pos=self._expected[0] if self._expected else None,
+            expected_pos=self._acting,
             temperature=sample.temperature,
             fresh=sample.fresh,
             elapsed=1 + sample.skipped,
@@ -87,11 +90,11 @@ class LimitedMotion:
             PlantFault: the command is not finite or jumps too far.
         """
         applied = self._guard.command(motor_pos)
-        words: list[int | None] = []
-        for axis, target in zip(self._cycle.axes, applied, strict=True):
+        axes = self._cycle.axes
+        for axis, target in zip(axes, applied, strict=True):
             axis.aim(target)
-            words.append(axis.machine.controlword)
-        self._expected = [self._expected[-1], applied]
+        words: list[int | None] = [axis.machine.controlword for axis in axes]
+        self._acting, self._sent = self._sent, applied
         return applied, words
 
 

@@ -176,9 +176,8 @@ class Link(DriveLeader):
         """
         self.open()
         if self.state is not LinkState.CONFIGURED:
-            raise DriveError(
-                f"a link that is {self.state.name.lower()} cannot start; make a new one"
-            )
+            name = self.state.name.lower()
+            raise DriveError(f"a link that is {name} cannot start; make a new one")
         parts, ticks = self._parts, self._ticks
         if not parts.read_only and self.cycle.led_by_another():
             self._supervisor.check_no_other_master()  # It came after `open`, and keeps the drives.
@@ -214,17 +213,20 @@ class Link(DriveLeader):
         Raises:
             PlantFault: a watchdog or a limit; all drives have been stopped by then.
         """
+        status, cycle, motion = self._status, self.cycle, self._motion
         self._refuse_ended()
-        cycle, motion = self.cycle, self._motion
-        with self._stop_on_error:
+        try:
             tick = self._ticks.watched()
-            if self._status.state is LinkState.CYCLIC:
+            if status.state is LinkState.CYCLIC:
                 self._start_up.idle()
                 return motion.sample(tick)
             self._supervisor.states()
             cycle.notices.statuswords(cycle.axes, tick.time_ns)
             sample = motion.sample(tick)
             motion.check(sample)
+        except BaseException as error:  # Whatever is raised, the drives stop.
+            self._ending.stop_after(error)
+            raise
         return sample
 
     def look(self) -> Sample:
@@ -251,14 +253,19 @@ class Link(DriveLeader):
             PlantFault: it is not finite or jumps too far; all drives have been stopped by then.
             DriveError: the drives are not enabled.
         """
-        self._refuse_ended()
-        if self._status.state is not LinkState.RUNNING:
-            raise DriveError(
+        status = self._status
+        if status.fault is not None or status.state is not LinkState.RUNNING:
+            self._refuse_ended()
+            why = (
                 "this link is read-only" if self._parts.read_only else "the drives are not enabled"
             )
-        with self._stop_on_error:
+            raise DriveError(why)
+        try:
             applied, words = self._motion.aim(motor_pos)
             self._supervisor.sent(complete=self.cycle.send(words))
+        except BaseException as error:  # Whatever is raised, the drives stop.
+            self._ending.stop_after(error)
+            raise
         return applied
 
     def restart_from_applied(self) -> tuple[float, ...]:

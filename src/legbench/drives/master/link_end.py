@@ -27,6 +27,13 @@ class LinkEnd:
             self._status.fault = error
         self.stop()
 
+    def stop_after(self, error: BaseException) -> None:
+        """Stop all drives at once after an error; a `PlantFault` becomes the fault of the link."""
+        if isinstance(error, PlantFault):
+            self.end(error)
+        else:
+            self.stop()
+
     def stop(self) -> None:
         """Stop all drives in this cycle, as `Link.stop` describes it."""
         parts, status = self._parts, self._status
@@ -84,7 +91,7 @@ class LinkEnd:
 class StopOnError:
     """A `with` block that stops the drives of a link if anything is raised in it.
 
-    One object serves every cycle. A `PlantFault` becomes the fault of the link.
+    A `PlantFault` becomes the fault of the link.
     """
 
     __slots__ = ("_ending",)
@@ -102,9 +109,5 @@ class StopOnError:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        if error is None:
-            return
-        if isinstance(error, PlantFault):
-            self._ending.end(error)
-        else:
-            self._ending.stop()
+        if error is not None:
+            self._ending.stop_after(error)

@@ -37,7 +37,7 @@ class Notices:
         """Count warnings (bit 7) and internal limits (bit 11) in the statuswords just received."""
         for axis in axes:
             word = axis.statusword & TOLD
-            if not (word and axis.fresh):
+            if not word or not axis.fresh:
                 continue
             drive = axis.node.name
             if word & WARNING:

@@ -3,8 +3,6 @@
 from collections.abc import Callable, Sequence
 from typing import final
 
-import can
-
 from legbench.drives.errors import BusError
 from legbench.drives.master.axis_link import AxisLink
 from legbench.drives.master.port import Port
@@ -51,7 +49,12 @@ class Outgoing:
 
     def sync(self) -> bool:
         """Send SYNC; false if the bus failed."""
-        return self._put(self._sync)
+        try:
+            self._port.put(self._sync)
+        except BusError as error:
+            self._failed(error)
+            return False
+        return True
 
     def commands(self, controlwords: Sequence[int | None]) -> bool:
         """Send the RPDOs of all drives, which act at the next SYNC; false if the bus failed.
@@ -59,14 +62,18 @@ class Outgoing:
         A frame that is refused keeps no other drive from its own. A drive without a controlword
         gets no frame.
         """
-        sent, messages = True, self._commands
+        sent, messages, put = True, self._commands, self._port.put
         for axis, controlword in zip(self._axes, controlwords, strict=True):
             if controlword is None:
                 continue
             for cob_id, data in axis.frames(controlword):
                 message = messages[cob_id]
                 message.data[:] = data
-                sent = self._put(message) and sent
+                try:
+                    put(message)
+                except BusError as error:
+                    self._failed(error)
+                    sent = False
         return sent
 
     def heartbeat(self, due_ns: int) -> bool:
@@ -76,16 +83,10 @@ class Outgoing:
         """
         if due_ns < self._beat_due_ns:
             return True
-        if not self._put(self._beat):
-            return False
-        self._beat_due_ns = due_ns + self._beat_ns
-        return True
-
-    def _put(self, message: can.Message) -> bool:
-        """Send a message; false if the bus failed."""
         try:
-            self._port.put(message)
+            self._port.put(self._beat)
         except BusError as error:
             self._failed(error)
             return False
+        self._beat_due_ns = due_ns + self._beat_ns
         return True

@@ -93,7 +93,9 @@ class Port:
         while True:
             left = 1e-9 * (until_ns - now_ns())
             message = self._receive(left if left > 0.0 else 0.0)
-            if message is None or self._for_us(message):
+            if message is None or message.is_error_frame:
+                return message
+            if not (message.is_extended_id or message.is_remote_frame):
                 return message
             if left <= 0.0:
                 return None
@@ -102,7 +104,9 @@ class Port:
         """Take the next frame that has come already, none if none has; raises BusError."""
         while True:
             message = self._receive(0.0)
-            if message is None or self._for_us(message):
+            if message is None or message.is_error_frame:
+                return message
+            if not (message.is_extended_id or message.is_remote_frame):
                 return message
 
     def _receive(self, timeout: float) -> can.Message | None:
@@ -112,16 +116,13 @@ class Port:
             raise
         except Exception as error:
             raise BusError(f"{self.bus.channel_info}: cannot receive: {error}; {HINT}") from error
-        if message is not None and self.listener is not None:
-            message.timestamp = self._came_at(message.timestamp)
-            self._show_to_listener(message)
+        if message is not None:
+            if message.is_error_frame:
+                self.error_frames += 1
+            if self.listener is not None:
+                message.timestamp = self._came_at(message.timestamp)
+                self._show_to_listener(message)
         return message
-
-    def _for_us(self, message: can.Message) -> bool:
-        if message.is_error_frame:
-            self.error_frames += 1
-            return True
-        return not (message.is_extended_id or message.is_remote_frame)
 
     def _came_at(self, stamp: float) -> float:
         """Time of reception on the bus's time base, from a driver's time stamp [s].

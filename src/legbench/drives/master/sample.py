@@ -1,14 +1,11 @@
 """The measurements of one cycle."""
 
 from collections.abc import Sequence
-from operator import attrgetter, mul, sub
 from typing import NamedTuple
 
 from legbench.drives.master.cycle import Cycle
 from legbench.drives.master.joint import joint_of
 from legbench.drives.master.tick import Tick
-
-_SHOWN = attrgetter("motor_pos", "link_pos", "statusword", "fresh")
 
 
 class Sample(NamedTuple):
@@ -47,7 +44,7 @@ def sample_of(
     *,
     two_encoders: bool = True,
 ) -> Sample:
-    """The state of a cycle after a tick.
+    """The state of a cycle of two drives after a tick.
 
     Args:
         cycle: cycle of the drives.
@@ -56,12 +53,15 @@ def sample_of(
         applied_pos: command as it was last let through [rad].
         two_encoders: every drive has an encoder on both sides of its spring.
     """
-    axes = cycle.axes
-    motor, links, statusword, fresh = zip(*map(_SHOWN, axes), strict=True)
+    axis_1, axis_2 = cycle.axes
+    poll_1, poll_2 = cycle.polls
+    stiffness_1, stiffness_2 = stiffness
     if two_encoders:
-        torque = tuple(map(mul, stiffness, map(sub, motor, links)))
+        motor = motor_1, motor_2 = axis_1.motor_pos, axis_2.motor_pos
+        links = link_1, link_2 = axis_1.link_pos, axis_2.link_pos
+        torque = stiffness_1 * (motor_1 - link_1), stiffness_2 * (motor_2 - link_2)
     else:
-        joints = [joint_of(axis, k) for axis, k in zip(axes, stiffness, strict=True)]
+        joints = joint_of(axis_1, stiffness_1), joint_of(axis_2, stiffness_2)
         motor, links, torque = zip(*joints, strict=True)
     return Sample(
         tick.time_ns,
@@ -71,7 +71,7 @@ def sample_of(
         links,
         torque,
         applied_pos,
-        statusword,
-        fresh,
-        tuple([poll.celsius for poll in cycle.polls]),
+        (axis_1.statusword, axis_2.statusword),
+        (axis_1.fresh, axis_2.fresh),
+        (poll_1.celsius, poll_2.celsius),
     )

@@ -3,6 +3,7 @@
 import math
 from typing import final
 
+from legbench.drives.master.axis_link import AxisLink
 from legbench.drives.master.cycle import Cycle
 from legbench.drives.master.tick import Tick
 from legbench.drives.protocol.cia402 import Way, describe_statusword
@@ -32,14 +33,18 @@ class Supervisor:
 
     def bus(self, tick: Tick) -> None:
         """Check that the controller is on the bus and the grid is kept; raises PlantFault."""
-        if self._cycle.stranger is not None:
+        cycle = self._cycle
+        if cycle.stranger is not None:
             self.check_no_other_master()
-        missed = tick.skipped - tick.silent
-        self._overruns = self._overruns + missed if missed else 0
-        if self._cycle.bus_off:
+        if cycle.bus_off:
             raise PlantFault(
                 "bus off", "the controller has left the bus; check wiring and termination"
             )
+        missed = tick.skipped - tick.silent
+        if not missed:
+            self._overruns = 0
+            return
+        self._overruns += missed
         if self._overruns >= self._limits.overrun_cycles:
             raise PlantFault(
                 OVERRUNS,
@@ -69,41 +74,48 @@ class Supervisor:
 
     def drives(self) -> None:
         """Check that every drive answers, lives and reports no emergency; raises PlantFault."""
-        now_ns = self._timebase.now_ns()
+        now_ns, cycle = self._timebase.now_ns(), self._cycle
         if self._watches_temperature:
-            self._temperatures()
-        for watch in self._cycle.watches:
+            for place, poll in enumerate(cycle.polls):
+                if poll.unanswered >= MISSING_TEMPERATURES:
+                    raise _unknown_temperature(cycle.axes[place], poll.unanswered)
+        for watch in cycle.watches:
             trouble = watch.trouble(now_ns, self._lost_frames)
             if trouble is not None:
                 cause, text = trouble
-                error = self._cycle.bus_error
+                error = cycle.bus_error
                 raise PlantFault(cause, text if error is None else f"{text}; {error}")
 
-    def _temperatures(self) -> None:
-        """Check that every drive that is to report its temperature does."""
-        for place, poll in enumerate(self._cycle.polls):
-            if poll.unanswered >= MISSING_TEMPERATURES:
-                axis = self._cycle.axes[place]
-                raise PlantFault(
-                    "temperature",
-                    f"drive '{axis.node.name}' (node {axis.node.node_id}) has not reported its "
-                    f"temperature for {poll.unanswered} requests; its limit cannot be watched",
-                )
-
     def states(self) -> None:
-        """Check that every drive is enabled and follows its target; raises PlantFault."""
+        """Check that every drive is enabled and follows its target; raises PlantFault.
+
+        A statusword that was taken in the cycle before needs no new decision.
+        """
         ignored = False
         for axis in self._cycle.axes:
             if not axis.fresh:
                 continue
-            if axis.machine.step(axis.statusword).way is not Way.REACHED:
+            word, machine, follows = axis.statusword, axis.machine, axis.follows
+            if word != machine.settled and machine.step(word).way is not Way.REACHED:
                 raise PlantFault(
                     "drive not enabled",
                     f"drive '{axis.node.name}' (node {axis.node.node_id}) left operation enabled: "
-                    f"{describe_statusword(axis.statusword)}",
+                    f"{describe_statusword(word)}",
                 )
-            ignored = ignored or axis.statusword & axis.follows != axis.follows
-        self._ignored = self._ignored + 1 if ignored else 0
+            ignored = ignored or word & follows != follows
+        if not ignored:
+            self._ignored = 0
+            return
+        self._ignored += 1
         if self._ignored > self._limits.following_cycles:
             words = "; ".join(describe_statusword(axis.statusword) for axis in self._cycle.axes)
             raise PlantFault("command ignored", f"a drive does not follow its target: {words}")
+
+
+def _unknown_temperature(axis: AxisLink, unanswered: int) -> PlantFault:
+    """Fault of a drive whose temperature has a limit and is not reported."""
+    return PlantFault(
+        "temperature",
+        f"drive '{axis.node.name}' (node {axis.node.node_id}) has not reported its "
+        f"temperature for {unanswered} requests; its limit cannot be watched",
+    )

@@ -39,6 +39,7 @@ class NodeWatch:
         self.expects_heartbeat = True
         self._rebooted = False
         self._well = True
+        self._reports_trouble = False
 
     def arm(self, now_ns: int) -> None:
         """Start watching from now: the counts, emergency and state of before are cleared."""
@@ -46,6 +47,7 @@ class NodeWatch:
         self.emergency, self.missed, self._rebooted = None, 0, False
         self.lost_total = self.bad_total = 0
         self.state = None
+        self._reports_trouble = False
 
     def take_heartbeat(self, data: bytes, now_ns: int) -> None:
         """Take a heartbeat or boot-up message."""
@@ -56,6 +58,7 @@ class NodeWatch:
         self.state = state
         if state is NmtState.BOOT_UP:
             self._rebooted = True
+        self._judge()
 
     def take_emergency(self, data: bytes) -> None:
         """Take an emergency message."""
@@ -66,6 +69,12 @@ class NodeWatch:
         warns = emergency.code in self._node.quirks.warnings
         if emergency.code != 0 and not warns and self.emergency is None:
             self.emergency = emergency
+            self._judge()
+
+    def _judge(self) -> None:
+        """Judge what the drive has reported, once a message instead of once a cycle."""
+        stands = self.state in NOT_OPERATIONAL
+        self._reports_trouble = stands or self._rebooted or self.emergency is not None
 
     def cycle(self, *, complete: bool) -> None:
         """Count a cycle that has ended with or without its process data."""
@@ -78,6 +87,11 @@ class NodeWatch:
             self.missed += 1
             self.lost_total += 1
 
+    @property
+    def gaps(self) -> bool:
+        """Whether it has missed a cycle since two in a row had its process data."""
+        return not self._well or self.missed > 0
+
     def _way(self) -> str:
         """How to go on after an emergency that only the maker of the drive can explain."""
         if self.emergency is None or self.emergency.code in MEANINGS:
@@ -87,6 +101,10 @@ class NodeWatch:
 
     def trouble(self, now_ns: int, lost_frames: int) -> tuple[str, str] | None:
         """Cause and message of what is wrong with the drive; none if nothing is."""
+        beat = self._beat  # Its `lost` without the call.
+        late = now_ns - beat.last_ns > beat.timeout_ns and self.expects_heartbeat
+        if not (late or self._reports_trouble or self.missed >= lost_frames):
+            return None
         if self.emergency is not None:
             return "drive emergency", f"{self._who}: {self.emergency}{self._way()}"
         if self._rebooted:
@@ -97,7 +115,7 @@ class NodeWatch:
                 f"{self._who} sent no process data for {self.missed} cycles, the limit is "
                 f"{lost_frames}",
             )
-        if self.expects_heartbeat and self._beat.lost(now_ns):
+        if late:
             late_ms = (now_ns - self._beat.last_ns) / 1e6
             return "heartbeat lost", f"{self._who}: no heartbeat for {late_ms:.0f} ms"
         state = self.state

@@ -205,38 +205,39 @@ class PowerMachine:
     Attributes:
         goal: state to reach; `DISABLED` after a drive has left operation enabled unasked.
         lost: the drive left operation enabled unasked; cleared by the next `seek`.
+        controlword: controlword that the last step decided.
         refused: the last step could not be taken from the drive's state.
+        settled: statusword that the last step took and whose repetition needs no step, as the goal
+            is reached and its controlword has been held for long enough; none otherwise.
     """
 
     def __init__(self) -> None:
         self.goal = Goal.DISABLED
         self.lost = False
         self._enabled = False
-        self._controlword = int(Controlword.DISABLE_VOLTAGE)
+        self.controlword = int(Controlword.DISABLE_VOLTAGE)
         self._age = 0
         self._begun = False
         self._reset_spent = False
         self.refused = False
+        self.settled: int | None = None
         self._steady: PowerStep | None = None
         self._steady_byte = 0
-
-    @property
-    def controlword(self) -> int:
-        """Controlword that the last step decided."""
-        return self._controlword
 
     def seek(self, goal: Goal) -> None:
         """Ask for a goal; asking again for the same one starts a new try."""
         self.goal, self.lost = goal, False
         self._enabled = self._reset_spent = self.refused = False
-        self._steady = None
+        self._steady = self.settled = None
 
     def step(self, statusword: int) -> PowerStep:
         """Decide the controlword of this cycle from the latest statusword."""
         steady = self._steady
         if steady is not None and statusword & 0xFF == self._steady_byte:
             self._age += 1
+            self.settled = statusword if self._age >= HOLD_CYCLES else None
             return steady
+        self.settled = None
         state = decode_state(statusword)
         if state is None:
             self._steady = None
@@ -245,7 +246,7 @@ class PowerMachine:
                 self._age += 1
             else:
                 self._send(int(word), at_once=True)
-            return PowerStep(self._controlword, None, Way.MOVING)
+            return PowerStep(self.controlword, None, Way.MOVING)
         if self.goal is Goal.ENABLED:
             if state is DriveState.OPERATION_ENABLED:
                 self._enabled = True
@@ -258,31 +259,31 @@ class PowerMachine:
             way = Way.REFUSED
         self.refused = way is Way.REFUSED
         self._send(int(wanted), at_once=self.goal in (Goal.QUICK_STOP, Goal.DISABLED))
-        step = PowerStep(self._controlword, state, way)
-        settled = way is Way.REACHED and self._controlword == wanted
+        step = PowerStep(self.controlword, state, way)
+        settled = way is Way.REACHED and self.controlword == wanted
         self._steady, self._steady_byte = step if settled else None, statusword & 0xFF
         return step
 
     def _edge(self) -> tuple[Controlword, Way]:
         """Fault reset with one rising edge of bit 7 a request: low, high, low, two cycles each."""
-        if self._controlword & Controlword.FAULT_RESET:
+        if self.controlword & Controlword.FAULT_RESET:
             if self._age < HOLD_CYCLES:
                 return Controlword.FAULT_RESET, Way.MOVING
             return Controlword.DISABLE_VOLTAGE, Way.MOVING
         if self._reset_spent:
             late = self._age > RESET_PATIENCE
             return Controlword.DISABLE_VOLTAGE, Way.REFUSED if late else Way.MOVING
-        if self._controlword != Controlword.DISABLE_VOLTAGE or self._age < HOLD_CYCLES:
+        if self.controlword != Controlword.DISABLE_VOLTAGE or self._age < HOLD_CYCLES:
             return Controlword.DISABLE_VOLTAGE, Way.MOVING
         self._reset_spent = True
         return Controlword.FAULT_RESET, Way.MOVING
 
     def _send(self, wanted: int, *, at_once: bool) -> None:
         # The very first word must not disturb a drive that is found enabled.
-        if wanted == self._controlword:
+        if wanted == self.controlword:
             self._age += 1
         elif at_once or not self._begun or self._age >= HOLD_CYCLES:
-            self._controlword, self._age = wanted, 1
+            self.controlword, self._age = wanted, 1
         else:
             self._age += 1
         self._begun = True

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass, field
-from typing import final
 
 from legbench.errors import ConfigError
 
@@ -130,20 +129,3 @@ def wrap(counts: int, bits: int = 32) -> int:
     """A count as the signed position object shows it."""
     half = 1 << (bits - 1)
     return (counts + half & (1 << bits) - 1) - half
-
-
-@final
-class Unwrapper:
-    """Follows a wrapping position object across its seam."""
-
-    __slots__ = ("_half", "_modulus", "counts")
-
-    def __init__(self, modulus: int, near: int) -> None:
-        self._half, self._modulus = modulus // 2, modulus
-        self.counts = near
-
-    def feed(self, shown: int) -> int:
-        """The unwrapped count: `AxisUnits.nearest` without its calls, four times a cycle."""
-        near, half = self.counts, self._half
-        self.counts = counts = near + (shown - near + half) % self._modulus - half
-        return counts

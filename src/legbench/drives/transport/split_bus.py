@@ -51,6 +51,14 @@ def worst_state(parts: Sequence[can.BusABC]) -> can.BusState:
     return can.BusState.ACTIVE
 
 
+def wait_for_any(parts: Sequence[can.BusABC], left: float | None) -> None:
+    """Wait until an interface has something or the time [s] is over, or a moment if unknown."""
+    try:
+        select.select([part.fileno() for part in parts], [], [], left)
+    except (NotImplementedError, ValueError, OSError):
+        time.sleep(LOOK_S if left is None else min(LOOK_S, left))
+
+
 @final
 class SplitBus(can.BusABC):
     """Buses of several channels as one interface of python-can.
@@ -90,14 +98,7 @@ class SplitBus(can.BusABC):
             left = None if until is None else until - time.monotonic()
             if left is not None and left <= 0.0:
                 return None
-            self._wait(left)
-
-    def _wait(self, left: float | None) -> None:
-        """Wait until one of the interfaces has something, or a moment where they cannot tell."""
-        try:
-            select.select([part.fileno() for part in self.parts], [], [], left)
-        except (NotImplementedError, ValueError, OSError):
-            time.sleep(LOOK_S if left is None else min(LOOK_S, left))
+            wait_for_any(self.parts, left)
 
     @property
     def state(self) -> can.BusState:
