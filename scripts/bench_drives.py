@@ -66,7 +66,7 @@ PATIENCE = 0.5
 QUIET = 0.005
 """Time without a frame after which the peer has answered all that it was sent [s]."""
 PARTS = ("controller", "record", "link")
-OVER_RAW = {Kind.REST: 1.6, Kind.JUMP: 1.6, Kind.SWAY: 1.9}
+OVER_RAW = {Kind.REST: 1.6, Kind.JUMP: 1.6, Kind.SWAY: 2.0}
 """Bounds of the link over raw frames; a leg that sways has its momentum watched, too."""
 BOUNDS = {"link over canopen": 0.8, "cycle cpu p50 [us]": 350.0}
 
@@ -107,7 +107,8 @@ class Switched(can.BusABC):
     def __init__(self, first: LockstepBus) -> None:
         self.inner: can.BusABC = first
         self._first = first
-        self.channel_info = "switched"
+        # No other bench on this machine shares its lock.
+        self.channel_info = f"bench of process {os.getpid()}"
         super().__init__(channel="switched")
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:

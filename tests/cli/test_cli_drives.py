@@ -1,12 +1,16 @@
 """`legbench drives` and `legbench run --plant can` as a user calls them."""
 
 import json
+import os
 import re
 import shutil
+import signal
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import can
 import pytest
 from commands import Done, called
 
@@ -256,6 +260,33 @@ def test_emulate_gives_each_channel_a_terminal_of_its_own(
     done.refused("2 channels, can0, can1", "a link for each", "--channel can0.tty,can1.tty")
     assert list(tmp_path.glob("*.tty")) == []
     assert called(capfd, *ask, "--only", "motor2").status == 0
+
+
+def test_emulate_lets_each_drive_speak_on_its_own_bus_alone(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    bus = changed(tmp_path, ('name = "motor2"', 'channel = "can1"\nname = "motor2"'))
+    names = ("emulated a", "emulated b")
+    heard = [can.Bus(interface="virtual", channel=name) for name in names]
+    seen: list[set[int]] = []
+
+    def listen_then_stop() -> None:
+        first = [one.recv(20.0) for one in heard]
+        seen.extend({frame.arbitration_id} for frame in first if frame is not None)
+        if len(seen) == 2:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    listener = threading.Thread(target=listen_then_stop)
+    listener.start()
+    ask = ("drives", "emulate", "--bus", bus, "--bare", "--seconds", "60")
+    done = called(capfd, *ask, "--interface", "virtual", "--channel", ",".join(names))
+    listener.join()
+    assert done.status == 0, done.err
+    for one, ids in zip(heard, seen, strict=True):
+        while (frame := one.recv(0.0)) is not None:
+            ids.add(frame.arbitration_id)
+        one.shutdown()
+    assert seen == [{0x701}, {0x702}]
 
 
 def test_emulate_serves_two_channels_and_leaves_no_socket_file(
