@@ -198,7 +198,7 @@ def test_a_leg_between_ground_and_flight_is_doubted_once_both_would_explain() ->
     ]
     assert None not in found
     late, soon = found
-    assert (late or 0) - (soon or 0) == 2 * REACH
+    assert (late or 0) - (soon or 0) == 2 * REACH + CONTACT - FLIGHT
 
 
 @pytest.mark.parametrize(

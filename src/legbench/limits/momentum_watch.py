@@ -110,7 +110,7 @@ class MomentumWatch:
         else:
             lasts = self._contradicted(left)
         # A link that is thrown onto the ground, or off it, does not stand.
-        lasts = lasts or self._age > (self._supports[0].patience if stands else self._patience)
+        lasts = lasts or self._age > (self._supports[-1].patience if stands else self._patience)
         return self._doubt() if lasts and self._mismatch.known else None
 
     def _contradicted(self, left: Sequence[float]) -> bool:
