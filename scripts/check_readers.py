@@ -26,6 +26,7 @@ from legbench.export.formats import Format, export
 from legbench.imperfections import Imperfections
 from legbench.recording.reader import load
 from legbench.recording.saved import save_recording
+from legbench.recording.sealed import sealed_bytes
 from legbench.recording.writer import RunWriter
 from legbench.signals import Command, Observation
 
@@ -89,6 +90,8 @@ def main(arguments: list[str]) -> int:
         shutil.copy(recording.path / "samples.parquet", folder)
         columns: dict[str, Any] = dict(recording.columns)
         np.savez(folder / "run.npz", **columns)
+        # Written as the table of a campaign is.
+        (folder / "table.parquet").write_bytes(sealed_bytes(recording.to_arrow()))
         kept_of_a_campaign(folder)
         torn_streams(folder)
         command = [arguments[0], str(ROOT / "scripts/readers.py"), str(folder)]

@@ -5,7 +5,8 @@ command that needs an extra must name it in one line. Warnings are errors.
 
 What the wheel asks for is linked into its environment from the one that runs this, package by
 package as their metadata name each other; pip then checks that nothing is missing and that all
-versions fit. With --fresh, pip installs it from the registry, as it does for a user.
+versions fit. With --fresh, pip installs it from the registry, as it does for a user, and every main
+use has a process of its own.
 """
 
 import argparse
@@ -78,10 +79,13 @@ JOBS = (
 
 TOGETHER = """
 import contextlib, io, json, sys
+from pathlib import Path
 from legbench.cli import COMMANDS, main
 
 found = []
 for words in [["--help"], *([name, "--help"] for name in COMMANDS), *json.loads(sys.argv[1])]:
+    run = next(map(str, Path("runs").glob("*_*")), "")
+    words = [run if word == "{run}" else word for word in words]
     said = io.StringIO()
     with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
         try:
@@ -91,7 +95,8 @@ for words in [["--help"], *([name, "--help"] for name in COMMANDS), *json.loads(
     found.append([words, status, said.getvalue()])
 print(json.dumps(found))
 """
-"""Program that asks every command for help and then calls some, all in one process."""
+"""Program that asks every command for help and then calls some, all in one process; {run} is the
+first run in its folder."""
 
 
 def main() -> int:
@@ -108,7 +113,7 @@ def main() -> int:
         python = installed(next(out.glob("*.whl")), Path(place) / "env", fresh=asked.fresh)
         empty = Path(place) / "empty"
         empty.mkdir()
-        wrong = list(faults(python, empty))
+        wrong = list(faults(python, empty, alone=asked.fresh))
     for line in wrong:
         print(line)
     print(f"{out}: {', '.join(sorted(path.name for path in out.iterdir()))}")
@@ -135,32 +140,41 @@ def installed(wheel: Path, place: Path, *, fresh: bool) -> Path:
     return python
 
 
-def faults(python: Path, folder: Path) -> Iterator[str]:
+def faults(python: Path, folder: Path, *, alone: bool) -> Iterator[str]:
     """Say which commands do not do what they should in an empty folder.
 
-    Main uses have a process each; help and refusals come from one process for all.
+    Args:
+        python: interpreter that has the package.
+        folder: empty folder in which commands are called.
+        alone: whether main uses have a process each; help and refusals share one in any case.
     """
     eds = str(ROOT / "hardware" / "legbench-drive.eds")
-    for job in [job for job in JOBS if not job.status]:
-        words = filled(job, folder, eds)
+    single = [job for job in JOBS if alone and not job.status]
+    for job in single:
+        words = [word.replace("{run}", first_run(folder)) for word in filled(job, eds)]
         done = legbench(python, folder, ["-W", "error", "-m", "legbench", *words])
         yield from fault(job, words, done.returncode, done.stdout + done.stderr)
-    refused = [job for job in JOBS if job.status]
-    lines = json.dumps([filled(job, folder, eds) for job in refused])
+    shared = [job for job in JOBS if job not in single]
+    lines = json.dumps([filled(job, eds) for job in shared])
     done = legbench(python, folder, ["-W", "error", "-c", TOGETHER, lines])
     if done.returncode:
-        yield f"help and refusals: status {done.returncode}\n{done.stdout}{done.stderr}"
+        yield f"commands in one process: status {done.returncode}\n{done.stdout}{done.stderr}"
         return
     told = json.loads(done.stdout)
     helped = Job(words=("--help",), prints="usage")
-    jobs = [helped] * (len(told) - len(refused)) + refused
+    jobs = [helped] * (len(told) - len(shared)) + shared
     for job, (words, status, printed) in zip(jobs, told, strict=True):
         yield from fault(job, words, status, printed)
 
 
-def filled(job: Job, folder: Path, eds: str) -> list[str]:
-    """Words of a job with the run that is there by then."""
-    return [word.format(run=next(folder.glob("runs/*_*"), ""), eds=eds) for word in job.words]
+def first_run(folder: Path) -> str:
+    """The run that is there by now; empty before it."""
+    return next(map(str, folder.glob("runs/*_*")), "")
+
+
+def filled(job: Job, eds: str) -> list[str]:
+    """Words of a job, the run still to be named."""
+    return [word.replace("{eds}", eds) for word in job.words]
 
 
 def fault(job: Job, words: Sequence[str], status: int, printed: str) -> Iterator[str]:

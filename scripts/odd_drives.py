@@ -33,6 +33,8 @@ START = (-0.4, 0.5)
 """Motor positions at power-on [rad]."""
 FAR = 0.25
 """Way of every motor [rad]."""
+SETTLING = 60
+"""Cycles for which a target that has been reached is held; a slow drive lags by 20."""
 STIFFNESS = (4.0, 4.0)
 LIMITS = SafetyLimits(
     motor_range=((-1.1, 0.8), (-0.8, 1.1)),
@@ -114,7 +116,7 @@ def _lead(
     ]
     there = [pos + (FAR if place else -FAR) for place, pos in enumerate(START)]
     sample = link.move_to(there, 2.0)
-    for _ in range(150):
+    for _ in range(SETTLING):
         link.command(there)
         sample = link.exchange()
     for place, (drive, drawn) in enumerate(zip(emulated, drives, strict=True)):

@@ -72,9 +72,10 @@ def main(folder: Path) -> int:
     kept = dict(np.load(folder / "kept.npz"))
     stiffness = kept.pop("stiffness")
     for name, read in PARQUET.items():
-        wrong = differs(read(folder / "run.parquet"), wanted, 0.0)
-        failed += wrong is not None
-        print(f"{'ok' if wrong is None else f'WRONG in {wrong}':<8} run.parquet, {name}: exact")
+        for file in ("run.parquet", "table.parquet"):
+            wrong = differs(read(folder / file), wanted, 0.0)
+            failed += wrong is not None
+            print(f"{'ok' if wrong is None else f'WRONG in {wrong}':<8} {file}, {name}: exact")
         try:
             wrong = differs(read(folder / "samples.parquet"), wanted, 0.0)
             torques = with_torques(read(folder / "kept/samples.parquet"), stiffness)

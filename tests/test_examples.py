@@ -1,6 +1,7 @@
 """The examples of `scripts/examples` run as they stand, and are as short as they are said to be."""
 
 import os
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -17,10 +18,15 @@ LONGEST = {"own_controller.py": 25}
 """Lines that are not blank; 30 of any other."""
 
 
-def printed(name: str, folder: Path) -> list[str]:
-    """Lines that an example prints when it runs beside the designs and the bus file."""
+def beside(folder: Path) -> None:
+    """Put the designs and the bus file where an example looks for them."""
     for needed in ("models", "hardware"):
         (folder / needed).symlink_to(ROOT / needed)
+
+
+def printed(name: str, folder: Path) -> list[str]:
+    """Lines that an example prints in a process of its own."""
+    beside(folder)
     done = subprocess.run(
         [sys.executable, str(EXAMPLES / name)],
         cwd=folder,
@@ -63,9 +69,13 @@ def test_the_bench_is_emulated_recorded_and_compared(tmp_path: Path) -> None:
     assert legbench.load(run).description.plant == "can"
 
 
-def test_the_cells_of_a_notebook_run_one_after_the_other(tmp_path: Path) -> None:
-    lines = printed("notebook_figure.py", tmp_path)
-    assert "ended       complete" in lines
+def test_the_cells_of_a_notebook_run_one_after_the_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    beside(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    runpy.run_path(str(EXAMPLES / "notebook_figure.py"), run_name="__main__")
+    assert "ended       complete" in capsys.readouterr().out.splitlines()
     assert list(tmp_path.glob("20*")) == []
 
 

@@ -223,7 +223,11 @@ def test_a_duration_that_makes_no_run(prototype: LegDesign, duration: float) -> 
         short(prototype, duration=duration)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    # A master on drives that gets SIGINT is among the tests of processes.
+    "number",
+    [pytest.param(signal.SIGINT, marks=pytest.mark.long), signal.SIGTERM],
+)
 def test_an_interrupted_command_leaves_a_whole_run(
     tmp_path: Path, models: Path, number: signal.Signals
 ) -> None:

@@ -3,9 +3,9 @@
 import ast
 import re
 from collections.abc import Iterator
-from pathlib import Path
 
-SOURCES = sorted((Path(__file__).parents[1] / "src").rglob("*.py"))
+from source_trees import SOURCES, tree_of
+
 FIRST_WORDS = re.compile(
     r"(of|and|that|with|in|on|at|by|for|from|to|into|onto|under|over|between|beside|beyond|but|or"
     r"|so|like|as|than|then|after|before|until|while|where|when|within|without|through|against"
@@ -37,7 +37,7 @@ def test_docstrings_can_be_read_alone() -> None:
     found = [
         f"{path.name}:{line}: {text.splitlines()[0]}"
         for path in SOURCES
-        for line, text in docstrings(ast.parse(path.read_text(encoding="utf-8")))
+        for line, text in docstrings(tree_of(path))
         if FIRST_WORDS.match(text)
     ]
     assert found == []
@@ -56,7 +56,7 @@ def test_no_function_is_too_long_to_be_seen_at_once() -> None:
     found = [
         f"{path.name}:{node.lineno}: {node.name}, {size} lines"
         for path in SOURCES
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for node in ast.walk(tree_of(path))
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
         and (size := (node.end_lineno or node.lineno) - node.lineno + 1) > MOST_FUNCTION_LINES
     ]

@@ -10,10 +10,11 @@ from legbench.errors import RecordingError, UnwritableError
 
 
 def reason(error: Exception) -> str:
-    """Say why `error` happened, with the name of its errno if it has one."""
+    """Say why `error` happened, in one line, with the name of its errno if it has one."""
     if isinstance(error, OSError) and error.errno is not None:
         return f"{os.strerror(error.errno)} [{errno.errorcode.get(error.errno, error.errno)}]"
-    return str(error)
+    # Arrow tells what it met in several lines.
+    return " ".join(str(error).split())
 
 
 def put_in_place(draft: Path, path: Path) -> None:

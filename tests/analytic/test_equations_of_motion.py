@@ -247,7 +247,7 @@ def test_closed_form_of_touchdown_is_the_projector(design: LegDesign) -> None:
     terms = floating_terms(design)
     wanted = np.einsum("nij,nj->ni", mx.impact_map(terms, pos), vel)[:, 2:]
     foot = np.einsum("nij,nj->ni", mx.contact_jacobian(terms, pos), vel)
-    closed = eq.touchdown_rates(
+    closed, lost = eq.touchdown(
         eq.ARRAY,
         stance_terms(design),
         terms,
@@ -256,6 +256,10 @@ def test_closed_form_of_touchdown_is_the_projector(design: LegDesign) -> None:
         tuple(foot.T),
     )
     assert np.max(np.abs(np.stack(closed, axis=-1) - wanted) / (1.0 + np.abs(wanted))) < 1e-12
+    inertia = mx.floating_mass(terms, pos)
+    after = np.einsum("nij,nj->ni", mx.impact_map(terms, pos), vel)
+    before, left = (0.5 * np.einsum("ni,nij,nj->n", x, inertia, x) for x in (vel, after))
+    assert np.max(np.abs(lost - (before - left)) / before) < 1e-12
 
 
 def test_bars_weigh_what_the_trunk_loses() -> None:

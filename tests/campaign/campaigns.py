@@ -34,16 +34,18 @@ MIXED = (
     + """
 [[cells]]
 name = "step"
-trials = 4
+trials = 2
 grid.controller.settings.z2 = [1.0, 1.1]
 [[cells]]
 name = "swing"
-trials = 4
+trials = 2
 set.controller = { kind = "bang-bang", settings = { delay = 0.02 } }
 grid.controller.settings.z2 = [1.0, 1.2]
 """
 )
-"""Two groups that are stepped apart: 16 runs."""
+"""Two groups that are stepped apart: 8 runs."""
+LARGE = MIXED.replace("trials = 2", "trials = 4")
+"""The same in 16 runs, of which a kill leaves some to do."""
 
 
 def written(folder: Path, text: str, name: str = "campaign.toml") -> Path:

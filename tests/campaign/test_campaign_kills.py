@@ -12,7 +12,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from campaigns import MIXED, alive, children_of, planned, program, ran, table_bytes, written
+from campaigns import LARGE, alive, children_of, planned, program, ran, table_bytes, written
 from distributed import KilledWorker
 from submitit.core.utils import FailedJobError, UncompletedJobError
 
@@ -43,8 +43,8 @@ def test_a_campaign_that_is_killed_is_gone_on_with(tmp_path: Path) -> None:
 
     `scripts/bench_campaign.py kills` does so again and again.
     """
-    written(tmp_path, MIXED)
-    plan, out = planned(tmp_path, MIXED), tmp_path / "out"
+    written(tmp_path, LARGE)
+    plan, out = planned(tmp_path, LARGE), tmp_path / "out"
     chance = random.Random(4)
     wanted = chance.randrange(2, 10)
     with subprocess.Popen(program(tmp_path, out, "local")) as process:
@@ -85,7 +85,7 @@ def test_a_shard_whose_worker_dies_is_run_again_then_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """One shard kills its worker once, one always; the others are run as ever."""
-    shards = shards_of(planned(tmp_path, MIXED), 4)
+    shards = shards_of(planned(tmp_path, LARGE), 4)
     once, always, calm = (work_of(shard, None) for shard in shards[:3])
     once = Work(**{name: getattr(once, name) for name in FIELDS}, records=tmp_path / "mark")
     lost: dict[str, Any] = {name: getattr(always, name) for name in FIELDS}

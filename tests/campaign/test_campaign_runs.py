@@ -48,11 +48,11 @@ def whole(mixed: CampaignPlan, tmp_path_factory: pytest.TempPathFactory) -> byte
     """Table of the campaign that this process has run at one go."""
     out = tmp_path_factory.mktemp("whole")
     finished = ran(mixed, out)
-    assert (finished.done, finished.total, finished.failures) == (16, 16, ())
+    assert (finished.done, finished.total, finished.failures) == (8, 8, ())
     return table_bytes(out)
 
 
-@pytest.mark.parametrize(("size", "threads"), [(1, 1), (7, 2), (16, 2)])
+@pytest.mark.parametrize(("size", "threads"), [(1, 1), (3, 2), (8, 2)])
 def test_company_and_threads_change_no_byte(
     mixed: CampaignPlan, whole: bytes, size: int, threads: int, tmp_path: Path
 ) -> None:
@@ -63,13 +63,13 @@ def test_company_and_threads_change_no_byte(
 def test_processes_of_this_machine_change_no_byte(
     mixed: CampaignPlan, whole: bytes, tmp_path: Path
 ) -> None:
-    ran(mixed, tmp_path, PoolExecutor(1), 4)
+    ran(mixed, tmp_path, PoolExecutor(1), 2)
     assert table_bytes(tmp_path) == whole
 
 
 @pytest.mark.long
 def test_dask_changes_no_byte(mixed: CampaignPlan, whole: bytes, tmp_path: Path) -> None:
-    ran(mixed, tmp_path, DaskExecutor(workers=1), 4)
+    ran(mixed, tmp_path, DaskExecutor(workers=1), 2)
     assert table_bytes(tmp_path) == whole
 
 
@@ -78,7 +78,7 @@ def test_dask_changes_no_byte(mixed: CampaignPlan, whole: bytes, tmp_path: Path)
 def test_jobs_change_no_byte(mixed: CampaignPlan, whole: bytes, tmp_path: Path) -> None:
     """Jobs of the array that Slurm gets, run by submitit in this process; it leaves logs open."""
     jobs = SlurmExecutor(tmp_path / "jobs", cluster="debug")
-    ran(mixed, tmp_path / "out", jobs, 8)
+    ran(mixed, tmp_path / "out", jobs, 4)
     assert table_bytes(tmp_path / "out") == whole
     gc.collect()
 
@@ -86,7 +86,7 @@ def test_jobs_change_no_byte(mixed: CampaignPlan, whole: bytes, tmp_path: Path) 
 def test_parts_of_several_callers_make_one_table(
     mixed: CampaignPlan, whole: bytes, tmp_path: Path
 ) -> None:
-    shards, executor = shards_of(mixed, 4), SerialExecutor(1)
+    shards, executor = shards_of(mixed, 2), SerialExecutor(1)
     for number in (2, 3):
         finished = run_campaign(mixed, tmp_path, executor, shards, part=(number, 3))
         assert finished.table is None
@@ -101,7 +101,7 @@ def test_the_table_says_what_ran_where(mixed: CampaignPlan, whole: bytes, tmp_pa
     (tmp_path / "table.parquet").write_bytes(whole)
     table = read_table(tmp_path)
     assert sorted(set(table["experiment"].to_pylist())) == sorted(e.hash for e in mixed.planned)
-    assert sum(kind == "run" for kind in table["row"].to_pylist()) == 16
+    assert sum(kind == "run" for kind in table["row"].to_pylist()) == 8
     told = json.loads(table.schema.metadata[PROVENANCE_KEY])
     assert told == [provenance()]
     assert told[0]["cpu"]
@@ -150,9 +150,9 @@ def test_an_interrupted_campaign_is_gone_on_with(
     mixed: CampaignPlan, whole: bytes, tmp_path: Path
 ) -> None:
     told: list[tuple[int, int]] = []
-    shards = shards_of(mixed, 4)
+    shards = shards_of(mixed, 2)
     stopped = run_campaign(mixed, tmp_path, Interrupted(2), shards)
-    assert (stopped.done, stopped.stopped, stopped.table) == (8, True, None)
+    assert (stopped.done, stopped.stopped, stopped.table) == (4, True, None)
     before = {path: path.stat().st_mtime_ns for path in (tmp_path / "shards").iterdir()}
     assert len(before) == 2
     finished = run_campaign(
@@ -162,19 +162,19 @@ def test_an_interrupted_campaign_is_gone_on_with(
         shards,
         progress=lambda done, total, left: told.append((done, total)),
     )
-    assert [done for done, _ in told] == [8, 12, 16]
+    assert [done for done, _ in told] == [4, 6, 8]
     assert finished.table is not None
     assert table_bytes(tmp_path) == whole
     for path, time in before.items():
         assert path.stat().st_mtime_ns == time
     # Once more: nothing is left to do, and the table is as it was.
     again = run_campaign(mixed, tmp_path, Interrupted(0), shards)
-    assert again.done == 16
+    assert again.done == 8
     assert table_bytes(tmp_path) == whole
 
 
 def test_a_stop_in_mid_shard_gives_it_up(mixed: CampaignPlan) -> None:
-    (shard, *_) = shards_of(mixed, 16)
+    (shard, *_) = shards_of(mixed, 8)
     flag = StopFlag()
     flag.set()
     assert list(SerialExecutor(1).run([work_of(shard, None)], flag, print)) == []
@@ -325,11 +325,11 @@ def test_a_full_disk_keeps_what_is_done(
     with monkeypatch.context() as patch:
         patch.setattr(folder_module, "write_whole", write)
         with pytest.raises(CampaignError, match=r"No space left on device.*what is done is kept"):
-            ran(mixed, tmp_path, size=4)
+            ran(mixed, tmp_path, size=2)
     kept = sorted(path.name for path in (tmp_path / "shards").glob("*.parquet"))
     assert len(kept) == 2
     assert list((tmp_path / "shards").glob(".*.draft"))
-    ran(mixed, tmp_path, size=4)
+    ran(mixed, tmp_path, size=2)
     assert table_bytes(tmp_path) == whole
     assert not list(tmp_path.rglob(".*.draft"))
 
@@ -373,7 +373,7 @@ class Strange(AbstractExecutor):
 def test_workers_that_are_not_what_they_should_be(
     mixed: CampaignPlan, way: str, why: str, tmp_path: Path
 ) -> None:
-    finished = run_campaign(mixed, tmp_path, Strange(way), shards_of(mixed, 4))
+    finished = run_campaign(mixed, tmp_path, Strange(way), shards_of(mixed, 2))
     assert why in finished.failures[0]
     assert not any((tmp_path / "shards").iterdir())
     assert finished.table is None

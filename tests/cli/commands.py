@@ -1,5 +1,6 @@
 """Calling the commands as a user would: what came out, what was complained of, what status."""
 
+import json
 import os
 import subprocess
 import sys
@@ -63,3 +64,43 @@ def started(
         cwd=cwd,
     )
     return Done(status=done.returncode, out=done.stdout, err=done.stderr)
+
+
+TOGETHER = """
+import contextlib, io, json, sys
+{before}
+from legbench.cli import main
+found = []
+for words in json.loads(sys.argv[1]):
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            status = main(words)
+        except SystemExit as end:
+            status = end.code or 0
+    found.append(dict(status=status, out=out.getvalue(), err=err.getvalue(), loaded=[*sys.modules]))
+print(json.dumps(found))
+"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DoneTogether(Done):
+    loaded: list[str]
+    """All modules that the process had loaded by then."""
+
+
+def started_together(
+    lines: Sequence[Sequence[str | Path]], *, before: str = "pass", cwd: Path
+) -> list[DoneTogether]:
+    """Command lines one after another in one process of their own, some code run before."""
+    words = json.dumps([[str(word) for word in line] for line in lines])
+    done = subprocess.run(
+        [sys.executable, "-c", TOGETHER.format(before=before), words],
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return [DoneTogether(**found) for found in json.loads(done.stdout)]

@@ -9,20 +9,27 @@ import sys
 from pathlib import Path
 
 import pytest
-from commands import DESIGN, MODELS, called, started
+from commands import DESIGN, MODELS, Done, called, started_together
 
+from legbench.cli import main
 from legbench.recording.reader import load
 
 TEXT = (MODELS / "table2.toml").read_text(encoding="utf-8")
-NO_SCREEN = ("DISPLAY", "WAYLAND_DISPLAY")
 
 
 @pytest.fixture(scope="module")
 def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("whole")
-    done = started("run", "jump", *DESIGN, "--duration", "1.5", "--out", out, "--json", cwd=out)
-    assert done.status == 0, done.err
-    return Path(json.loads(done.out)["run"])
+    assert main(["run", "jump", *DESIGN, "--duration", "1.5", "--out", str(out)]) == 0
+    (run,) = out.iterdir()
+    return run
+
+
+@pytest.fixture
+def no_screen(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Surroundings of a machine without a display."""
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
 
 
 @pytest.mark.parametrize(
@@ -231,47 +238,50 @@ def test_a_run_whose_manifest_is_damaged(
     assert called(capfd, "replay", run).status == 0
 
 
-def test_no_display_for_mujocos_viewer(tmp_path: Path) -> None:
-    done = started("model", *DESIGN, "--view", without=NO_SCREEN, cwd=tmp_path)
-    done.refused("no display", "--out FILE")
+@pytest.mark.usefixtures("no_screen")
+def test_no_display_for_mujocos_viewer(capfd: pytest.CaptureFixture[str]) -> None:
+    called(capfd, "model", *DESIGN, "--view").refused("no display", "--out FILE")
 
 
-def test_no_display_is_no_reason_to_lose_a_run(tmp_path: Path) -> None:
-    done = started(
-        *("run", "jump", *DESIGN, "--duration", "0.1", "--out", "runs", "--view", "--json"),
-        without=NO_SCREEN,
-        cwd=tmp_path,
-    )
+def of_a_whole_run(done: Done) -> str:
+    """The complaint of a run that went on without its view."""
     assert done.status == 0
-    assert done.err.startswith("legbench: no display: the run goes on unseen")
     assert done.err.count("\n") == 1
     assert json.loads(done.out)["status"] == "complete"
+    return done.err
 
 
-def test_no_rerun_is_no_reason_to_lose_a_run(tmp_path: Path) -> None:
-    done = started(
-        *("run", "jump", *DESIGN, "--duration", "0.1", "--out", "runs", "--view", "--json"),
-        before="sys.modules['rerun'] = None",
+@pytest.mark.usefixtures("no_screen")
+def test_no_display_is_no_reason_to_lose_a_run(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    words = ("run", "jump", *DESIGN, "--duration", "0.1", "--out", tmp_path, "--view", "--json")
+    said = of_a_whole_run(called(capfd, *words))
+    assert said.startswith("legbench: no display: the run goes on unseen")
+
+
+def test_extras_that_are_not_installed(run_folder: Path, tmp_path: Path) -> None:
+    """A run goes on without rerun; who asks for a file that needs an extra is told its name."""
+    view, *files, report = started_together(
+        [
+            ("run", "jump", *DESIGN, "--duration", "0.1", "--out", "runs", "--view", "--json"),
+            ("replay", run_folder, "--rrd", "view.rrd"),
+            ("replay", run_folder, "--figure", "phase.png"),
+            ("report", "nowhere"),
+        ],
+        before="sys.modules.update(dict.fromkeys(['rerun', 'matplotlib', 'jinja2']))",
         cwd=tmp_path,
     )
-    assert done.status == 0
-    assert "rerun is not installed" in done.err
-    assert "legbench[viz]" in done.err
-    assert done.err.count("\n") == 1
-    assert json.loads(done.out)["status"] == "complete"
-
-
-@pytest.mark.parametrize("missing", ["rerun", "matplotlib"])
-def test_an_extra_that_is_not_installed(run_folder: Path, tmp_path: Path, missing: str) -> None:
-    target = tmp_path / ("view.rrd" if missing == "rerun" else "phase.png")
-    flag = "--rrd" if missing == "rerun" else "--figure"
-    done = started(
-        *("replay", run_folder, flag, target),
-        before=f"sys.modules['{missing}'] = None",
-        cwd=tmp_path,
-    )
-    assert done.status == 1
-    assert f"legbench: {missing} is not installed" in done.err
-    assert "legbench[viz]" in done.err
-    assert done.err.count("\n") == 1
-    assert list(tmp_path.iterdir()) == []
+    said = of_a_whole_run(view)
+    assert "rerun is not installed" in said
+    assert "legbench[viz]" in said
+    for done, missing in zip(files, ("rerun", "matplotlib"), strict=True):
+        assert done.status == 1
+        assert f"legbench: {missing} is not installed" in done.err
+        assert "legbench[viz]" in done.err
+        assert done.err.count("\n") == 1
+    assert report.status == 1
+    assert report.err.startswith("legbench: jinja2 is not installed; a report needs it: ")
+    assert "pip install 'legbench[report]'" in report.err
+    assert report.err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == [tmp_path / "runs"]

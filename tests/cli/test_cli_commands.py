@@ -1,6 +1,7 @@
 import hashlib
 import json
 import math
+import sys
 from pathlib import Path
 
 import mujoco
@@ -8,7 +9,7 @@ import pytest
 from commands import DESIGN, MODELS, called, started
 
 from legbench import __version__
-from legbench.cli import COMMANDS
+from legbench.cli import COMMANDS, main
 from legbench.cli.output import print_json, write_json
 from legbench.errors import ConfigError
 from legbench.recording.reader import load
@@ -35,9 +36,9 @@ HEAVY = ("numpy", "mujoco", "tyro", "pyarrow", "scipy", "rerun", "matplotlib")
 @pytest.fixture(scope="module")
 def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("cli")
-    done = started("run", "jump", *DESIGN, "--duration", "2", "--out", out, "--json", cwd=out)
-    assert done.status == 0, done.err
-    return Path(json.loads(done.out)["run"])
+    assert main(["run", "jump", *DESIGN, "--duration", "2", "--out", str(out)]) == 0
+    (run,) = out.iterdir()
+    return run
 
 
 def test_help_loads_nothing_heavy_and_lists_every_command(tmp_path: Path) -> None:
@@ -272,9 +273,11 @@ def test_model_writes_what_runs(tmp_path: Path, capfd: pytest.CaptureFixture[str
     assert target.read_text(encoding="utf-8") == text
 
 
-def test_model_goes_through_a_pipe_that_closes_early(tmp_path: Path) -> None:
-    done = started("model", *DESIGN, before="sys.stdout.close(); sys.stdout = None", cwd=tmp_path)
-    assert "Traceback" not in done.err
+def test_model_goes_through_a_pipe_that_closes_early(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "stdout", None)
+    assert "Traceback" not in called(capfd, "model", *DESIGN).err
 
 
 def test_an_interrupt_outside_of_a_run_is_no_traceback(

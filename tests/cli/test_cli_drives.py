@@ -108,8 +108,13 @@ def test_home_calls_the_present_position_zero(drives: Drives) -> None:
 
 
 @pytest.mark.parametrize("method", ["-1", "-4", "1", "17", "23", "34"])
-def test_every_kind_of_homing_can_be_tried(method: str, drives: Drives) -> None:
-    done = drives("home", "--node", "motor1", "--method", method, "--json")
+def test_every_kind_of_homing_can_be_tried(
+    method: str, capfd: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    quick = changed(tmp_path, ('"6099:01 u32" = 12517', '"6099:01 u32" = 60_000'))
+    where = ("--interface", "legbench", "--bus", quick, *DESIGN)
+    words = ("home", "--node", "motor1", "--method", method, "--json")
+    done = called(capfd, "drives", *words, *where)
     assert done.status == 0, done.err
     told = json.loads(done.out)
     assert (told["method"], told["after_counts"]) == (int(method), 0)

@@ -6,9 +6,13 @@ import sys
 from pathlib import Path
 
 import pytest
-from commands import CALL, DESIGN
+from commands import CALL, DESIGN, called
 
+from legbench.control import Jump
+from legbench.plant.sim import SimPlant
+from legbench.recording.description import RunDescription
 from legbench.recording.reader import load
+from legbench.signals import Command, Observation
 
 TERMINAL = """
 import sys
@@ -73,40 +77,41 @@ def test_a_note_that_nobody_can_read_is_dropped(tmp_path: Path, redirect: str) -
     assert done.stdout.count("\n") == 1
 
 
+def failed(capfd: pytest.CaptureFixture[str], out: Path) -> tuple[str, RunDescription]:
+    """What a run says whose guest fails, and the description of what it leaves."""
+    done = called(capfd, "run", "jump", *DESIGN, "--json", "--duration", "0.25", "--out", out)
+    assert done.status == 1
+    assert "Traceback" not in done.err
+    (run,) = out.iterdir()
+    return done.err, load(run).description
+
+
 def test_a_controller_that_fails_is_a_message_with_its_lines_and_no_traceback(
-    tmp_path: Path,
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    before = """
-from legbench.control import Jump
-def step(self, observation, usual=Jump.step):
-    if observation.time > 0.2: raise LookupError('no such phase')
-    return usual(self, observation)
-Jump.step = step
-"""
-    done = ran(tmp_path, before=before, redirect="")
-    assert done.returncode == 1
-    assert "Traceback" not in done.stderr
-    assert "legbench: the controller failed at t = 0.201 s: LookupError: no such" in done.stderr
-    assert "in step" in done.stderr
-    (run,) = (tmp_path / "runs").iterdir()
-    manifest = load(run).manifest
-    assert (manifest["status"], manifest["cause"]) == ("fault", "controller failed")
+    usual = Jump.step
+
+    def step(self: Jump, observation: Observation) -> Command:
+        if observation.time > 0.2:
+            raise LookupError("no such phase")
+        return usual(self, observation)
+
+    monkeypatch.setattr(Jump, "step", step)
+    said, run = failed(capfd, tmp_path)
+    assert "legbench: the controller failed at t = 0.201 s: LookupError: no such" in said
+    assert "in step" in said
+    assert (run.status, run.cause) == ("fault", "controller failed")
 
 
-@pytest.mark.parametrize("where", [pytest.param("reset", marks=pytest.mark.long), "step"])
+@pytest.mark.parametrize("where", ["reset", "step"])
 def test_a_plant_that_fails_otherwise_is_a_message_and_no_traceback(
-    tmp_path: Path, where: str
+    tmp_path: Path, where: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    before = f"""
-from legbench.plant.sim import SimPlant
-def broken(*arguments): raise RuntimeError('no such body')
-SimPlant.{where} = broken
-"""
-    done = ran(tmp_path, before=before, redirect="")
-    assert done.returncode == 1
-    assert "Traceback" not in done.stderr
-    assert "legbench: the plant failed" in done.stderr
-    assert "RuntimeError: no such body" in done.stderr
-    (run,) = (tmp_path / "runs").iterdir()
-    manifest = load(run).manifest
-    assert (manifest["status"], manifest["cause"]) == ("fault", "plant failed")
+    def broken(*_: object) -> None:
+        raise RuntimeError("no such body")
+
+    monkeypatch.setattr(SimPlant, where, broken)
+    said, run = failed(capfd, tmp_path)
+    assert "legbench: the plant failed" in said
+    assert "RuntimeError: no such body" in said
+    assert (run.status, run.cause) == ("fault", "plant failed")

@@ -96,7 +96,8 @@ def test_a_leg_on_these_drives_is_configured_and_runs(call: Call, folder: Path) 
     )
     assert "0 objects differ" in done.out
     run = call(
-        "run", "jump", "--plant", "can", *emulated, "--duration", "0.4", "--out", folder / "runs"
+        *("run", "jump", "--plant", "can", *emulated, "--duration", "0.1", "--end", "stop"),
+        *("--out", folder / "runs"),
     )
     assert run.status == 0, run.err
     assert "not protected by braking on a fault; instead: the drive's own choice" in run.err

@@ -29,7 +29,7 @@ def refused(capsys: pytest.CaptureFixture[str], *words: str) -> str:
 def test_a_full_standard_output_is_told_in_a_line() -> None:
     with open("/dev/full", "w") as full:
         done = subprocess.run(
-            [sys.executable, "-m", "legbench", "check", "optimal"],
+            [sys.executable, "-m", "legbench", "drives", "budget"],
             stdout=full,
             stderr=subprocess.PIPE,
             text=True,

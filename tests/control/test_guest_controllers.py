@@ -19,7 +19,7 @@ from legbench.experiment import Experiment, record
 from legbench.guests import GuestError, module_of_file
 from legbench.loop import run
 from legbench.metrics import summarise
-from legbench.mjcf import BuildOptions
+from legbench.mjcf import BuildOptions, Linkage, LinkageKind
 from legbench.plant.batch import BatchPlant
 from legbench.plant.landing import End
 from legbench.plant.sim import SimPlant
@@ -35,7 +35,10 @@ FIXED = Setup(kind=SetupKind.FFS)
 
 def own(design: LegDesign, **choices: Any) -> Experiment:
     guest = CONTROLLERS.find(SINE)()
-    return Experiment(design=design, controller=guest, setup=FIXED, duration=1.5, **choices)
+    simple = Linkage(kind=LinkageKind.REDUCED)
+    return Experiment(
+        design=design, controller=guest, setup=FIXED, linkage=simple, duration=1.5, **choices
+    )
 
 
 @pytest.mark.parametrize(

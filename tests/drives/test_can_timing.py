@@ -55,15 +55,15 @@ def turning() -> Iterator[Turning]:
         it.angle += SPEED * 1e-9 * FINE_NS if it.turns else 0.0
         return (it.angle, it.angle), (0.0, 0.0)
 
-    network = emulate(
-        bus, [Behaviour.ideal(0.0)] * 2, body=body, body_period_ns=FINE_NS, configured=True
-    )
+    network = emulate(bus, [Behaviour.ideal(0.0)] * 2, body=body, configured=True)
     time = LateTime(network)
     session = Session(LockstepBus("leg", network=network), bus, time)
     link = session.link(SafetyLimits(), chosen.design.stiffness, read_only=True)
     with CanPlant(session, link, start, read_only=True) as plant:
         it = Turning(plant, time, network)
         plant.reset()
+        # Before the links turn, the usual steps of 1 ms do.
+        network._body_period_ns = FINE_NS
         it.turns = True
         it.watch(SETTLED)
         yield it

@@ -240,17 +240,6 @@ def test_a_missing_library_is_said_with_the_way_to_it(monkeypatch: pytest.Monkey
         sheet_of(TEXT.encode(), "it.eds")
 
 
-def test_a_command_that_reads_no_sheet_loads_no_library() -> None:
-    code = (
-        "import sys, legbench.cli.drives, legbench.drives.emulated.bus; "
-        "print('canopen' in sys.modules)"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120
-    )
-    assert done.stdout == "False\n"
-
-
 @pytest.mark.long
 def test_mutated_sheets_are_proposed_from_or_refused_in_one_line() -> None:
     command = [sys.executable, "-W", "error", str(ROOT / "scripts" / "fuzz_sheets.py")]

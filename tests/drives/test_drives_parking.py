@@ -29,7 +29,7 @@ def recorded(it: Stage, log: Path) -> list[can.Message]:
     # Before the drives are configured, which no log may hold: it would undo what `close` does.
     it.session.log_to(FileLog(log))
     it.plant._lands = False
-    assert run(it.plant, it.controller, 250).status == "complete"
+    assert run(it.plant, it.controller, 270).status == "complete"
     it.plant.close()
     return list(can.CanutilsLogReader(log))
 

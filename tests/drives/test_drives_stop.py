@@ -310,8 +310,11 @@ def test_a_run_that_is_interrupted_before_its_first_row_says_so(
     assert [drive.axis.power.state for drive in made[0].drives] == [SO, SO]
 
 
-def test_commands_that_are_interrupted_at_any_moment_leave_no_power() -> None:
-    few = ["--points", "12", "--seed", "4", "--commands", "rest", "jog", "home"]
+@pytest.mark.parametrize(
+    "commands", [["jog", "home"], pytest.param(["rest"], marks=pytest.mark.long)]
+)
+def test_commands_that_are_interrupted_at_any_moment_leave_no_power(commands: list[str]) -> None:
+    few = ["--points", "12", "--seed", "4", "--commands", *commands]
     command = [sys.executable, "-W", "error", str(SCRIPT), *few]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -215,7 +215,7 @@ def test_a_jump_on_motor_encoders_and_torques_is_rated_as_any(tmp_path: Path) ->
 
 
 def test_a_run_that_knows_no_links_says_so_and_is_null_there(tmp_path: Path) -> None:
-    found = ran(tmp_path, bus_text("motor", waived=True), PositionJumpConfig())
+    found = ran(tmp_path, bus_text("motor", waived=True), PositionJumpConfig(), 0.4)
     for name in ("joint_pos", "joint_vel", "spring_torque"):
         assert np.isnan(found[name]).all()
     assert np.isfinite(found["motor_pos"]).all()

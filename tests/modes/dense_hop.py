@@ -22,7 +22,7 @@ from legbench.analytic.equations import (
     SCALAR,
     pair_acceleration,
     pair_solve,
-    touchdown_rates,
+    touchdown,
 )
 from legbench.analytic.stops import Stop
 
@@ -174,7 +174,7 @@ class DenseHop:
             _, dz, dx = self.centre
             foot = (dx + rate[0], dz - self.gravity * (self.time - self.began) + rate[1])
             model = self.model
-            self.y[2:] = touchdown_rates(SCALAR, model.stance, model.floating, q, v, foot)
+            self.y[2:], _ = touchdown(SCALAR, model.stance, model.floating, q, v, foot)
         else:
             self.centre, self.began = (-arm[1], -rate[1], -rate[0]), self.time
             self.left = True

@@ -134,11 +134,15 @@ def _tell_next(story: Story, course: Course, law: JumpLaw) -> None:
         reach = course.apex_time()
         until = min(until, reach) if reach >= course.time else until
     course.hold(law.motor)
-    what = course.go(until, law.levels())
+    what = course.go(until, law.levels)
     value = law.probe[0] * course.q[0] + law.probe[1] * course.q[1]
+    lapsed = ("waited" if phase == "release" else "touched", law.lapse)
+    if course.time >= law.lapse and lapsed not in story.events:
+        story.events.append(lapsed)  # the law passes over it in silence
     if what is Watched.CONTACT:
         story.events.append(("touchdown" if flies else "liftoff", course.time))
         course.switch()
+        law.stands = flies
     elif what is Watched.FELL:
         story.ending = "fell"
     elif what is Watched.TURN:
@@ -149,8 +153,10 @@ def _tell_next(story: Story, course: Course, law: JumpLaw) -> None:
             told = "turned"
         elif phase == "push":
             told = "released"
-        story.events.append((told, course.time))
         law.on_event(what, value, course.time)
+        if phase == "release" and law.phase.name == "RELEASE":
+            return  # a load that comes too early
+        story.events.append((told, course.time))
         if phase == "compress" and law.phase.name == "RELEASE":  # the push begins unloaded
             story.events.append(("released", course.time))
     elif course.time >= law.alarm:
@@ -159,7 +165,7 @@ def _tell_next(story: Story, course: Course, law: JumpLaw) -> None:
         if phase == "release" and law.alarm < math.inf:  # loaded already when it begins to fly
             story.events.append(("loaded", course.time))
     elif until == reach:
-        story.ending = "apex" if law.settled else "fault"
+        story.ending = "apex" if law.settled(course.time) else "fault"
     elif course.time >= HORIZON:
         story.ending = "stands"
 
@@ -185,7 +191,7 @@ def told(tools: Tools | None, case: Case, *, mapped: bool = True) -> Story | Non
     if tools is None:
         return None
     leg, law = tools
-    if case.start.height + leg.course.foot_from_centre(case.start.angles()[0])[1] < 0.0:
+    if case.start.height + leg.course.foot_height(case.start.angles()[0]) < 0.0:
         return None
     story = told_by_compiled(leg, law, case.start)
     if mapped:

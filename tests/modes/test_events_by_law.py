@@ -13,13 +13,12 @@ from legbench.design import LegDesign, load_design
 pytest.importorskip("heyoka")
 
 from brute_basins import differing, random_question
-from random_hops import random_case, told, tools_of
+from random_hops import random_case, thrown, told, tools_of
 from reference.verdicts import judge
 
 from legbench.analytic.course import Course
-from legbench.analytic.event_detector import Levels
 from legbench.analytic.parameters import PUSHES, Event
-from legbench.analytic.taylor import MAP_TOLERANCE, TaylorLeg, Watched
+from legbench.analytic.taylor import MAP_TOLERANCE, Levels, TaylorLeg, Watched
 from legbench.modes.drive import JumpLaw, Passive
 from legbench.modes.hop import FALLEN, Apex, Ending, return_map, settle
 
@@ -65,6 +64,17 @@ def test_random_hops_are_told_as_the_reference_tells_them() -> None:
     for verdict in verdicts:
         assert verdict.grazes or (not verdict.fault and verdict.error < 1e-5), verdict
     assert np.median([verdict.error for verdict in verdicts]) < 1e-7
+
+
+@pytest.mark.parametrize("tolerance", [1e-15, MAP_TOLERANCE])
+def test_a_foot_that_lands_at_micrometres_a_second_lands_at_height_zero(tolerance: float) -> None:
+    # It lifts off at 0.48848 s and lands 0.6 ms later at 1.7 um/s: 0.1 pm of height are 60 ns.
+    case = thrown(random_case(np.random.default_rng(220)), np.random.default_rng((1, 220)))
+    story = told(tools_of(case, tolerance), case)
+    assert story
+    (verdict,) = judge([case], [story])
+    assert not verdict.fault
+    assert verdict.error < 1e-6
 
 
 def swinging() -> Course:
@@ -147,6 +157,51 @@ def test_an_impact_that_turns_the_probe_is_a_turning_point() -> None:
         turns[turned] += 1
         assert (course.go(0.2, wanted) is Watched.TURN and course.time == touchdown) == turned
     assert min(turns) >= 5
+
+
+def test_a_load_counts_only_after_the_release_and_only_if_it_lasts() -> None:
+    config = JumpConfig()
+    law = JumpLaw(config, design_of("prototype"))
+    level = law.levels.upper
+
+    def released() -> float:
+        law.restart()
+        law.stands = True
+        law.on_event(Watched.RISE, level, 0.1)
+        assert law.phase.name == "FLIGHT"
+        assert law.lapse == 0.1 + config.touchdown_time
+        law.on_event(Watched.TURN, level + 0.1, law.lapse)
+        assert law.phase.name == "COMPRESS"
+        assert law.levels.lower == level + 0.1 - config.apex_turn
+        law.on_event(Watched.FALL, law.levels.lower, 0.2)
+        assert law.phase.name == "PUSH"
+        law.on_event(Watched.FALL, law.levels.lower, 0.3)
+        assert law.phase.name == "RELEASE"
+        assert law.settled(10.0)
+        return law.lapse
+
+    over = released()
+    assert over == 0.3 + config.release_time
+    assert law.alarm == math.inf
+    law.on_event(Watched.RISE, level, over - 1e-3)  # too early: asked again when it is over
+    assert law.alarm == over
+    assert law.levels.upper > level
+    law.on_alarm(level + 0.01, over)
+    assert law.phase.name == "FLIGHT"
+    assert law.alarm == over + config.touchdown_time
+    law.on_alarm(level + 0.02, law.alarm)
+    assert law.phase.name == "COMPRESS"
+    over = released()
+    law.on_event(Watched.RISE, level, over + 1e-3)
+    assert law.settled(over + 1e-3)
+    assert not law.settled(law.lapse)
+    early = law.lapse - 1e-3
+    law.on_event(Watched.TURN, level + 0.1, early)  # the load may fall before it has lasted
+    assert law.phase.name == "FLIGHT"
+    assert law.alarm == early + 1e-3
+    law.on_event(Watched.FALL, level, early + 5e-4)
+    assert law.alarm == law.lapse == math.inf
+    assert law.levels.upper == level
 
 
 def test_a_leg_that_swings_over_between_two_events_has_fallen() -> None:

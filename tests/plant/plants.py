@@ -132,7 +132,7 @@ def emulated(setup: Setup) -> Case:
     def make(servo: ServoConfig) -> AbstractPlant:
         assert servo == ServoConfig(), "the servo is the drives' own"
         motors = [Behaviour.ideal(float(angle)) for angle in start.motor_pos]
-        body = EmulatedLeg(PROTOTYPE, built(setup), start)
+        body = EmulatedLeg(PROTOTYPE, built(setup, LinkageKind.REDUCED), start)
         session = Session(LockstepBus("leg", network=emulate(bus, motors, body=body)), bus)
         return CanPlant(session, session.link(SafetyLimits(), PROTOTYPE.stiffness), start)
 

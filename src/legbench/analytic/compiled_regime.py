@@ -11,69 +11,136 @@ until the function is `NUDGE` below zero; the event then happens that much later
 
 from typing import final
 
-from legbench.analytic.compiled import event_integrator
+from legbench.analytic.compiled import event_integrator, parameters_of, terms_of
 from legbench.analytic.equations import Pair
+from legbench.analytic.model import LegModel
 from legbench.analytic.parameters import GAIN, LEVEL, MOTOR, Event, Kind
+from legbench.analytic.state import Regime
 from legbench.signals import Floats
 
 NUDGE = 1e-13
 """Distance from zero beyond which a sign is no rounding error, in units of the readings."""
 BACK = 2.0 * NUDGE
 """Distance by which the level of a falling angle is below that of a rising one [rad]."""
+RISE, FALL, TURN, FELL, FELL_BACK = range(Event.RISE, Event.FELL_BACK + 1)
+CONTACT, RECOVER = int(Event.CONTACT), int(Event.RECOVER)
 LAST_LOWERED = int(Event.HIP_HIGH)
 """Number of the last event whose level is lowered for falling."""
 OFF = (0.0, 1.0)
 """Gain and level of an event that is not watched."""
+FALLS, RISES = (-1.0, 0.0), (1.0, 0.0)
+"""Gain and level of an event whose reading falls, or rises, through zero."""
+KINDS = {Regime.FLIGHT: Kind.FLIGHT, Regime.STANCE: Kind.STANCE}
+"""Compiled equations with which a regime begins; regimes that are not listed take `Kind.FIXED`."""
+NEVER = 1e6
+"""Level that is never reached [rad]."""
+
+
+@final
+class Levels:
+    """Values of the probe at which an integration stops.
+
+    It is no dataclass, because a hop makes several and a frozen one takes three times as long.
+
+    Attributes:
+        upper: value that stops it when the probe rises through it [rad].
+        lower: value that stops it when the probe falls through it [rad].
+        turns: whether turning points of the probe stop it, too.
+    """
+
+    __slots__ = ("lower", "turns", "upper")
+
+    def __init__(self, upper: float = NEVER, lower: float = -NEVER, turns: bool = False) -> None:
+        self.upper, self.lower, self.turns = upper, lower, turns
+
+
+SILENT = Levels()
+"""Levels that are never reached, so that no value of the probe stops an integration."""
 
 
 @final
 class CompiledRegime:
-    """A compiled regime with the parameters of one leg.
+    """A compiled regime with the parameters of one leg, given in plain floats.
 
     Attributes:
         kind: set of equations and events.
+        regime: contact regime.
+        terms: inertia and gravity of the angles.
+        free: whether touchdown or lift-off ends the regime.
+        opposite: regime on the other side of touchdown or lift-off, once the leg has been there.
         held: whether the ground pulls on a foot that would go down if it were released.
         flies: whether the leg is in the air.
-        pushed: whether a joint is beyond a limit.
+        pushed: the limits that joints were beyond when their pushes were set here, as bits.
         integrator: heyoka's integrator of (q1, q2, v1, v2).
         run: its integration to a time, or to the first event.
         state: view of its state (4,).
         pars: view of its parameters (n,).
-        slots: view of them into which single numbers are written in half the time.
+        numbers: view of the state from which single numbers are read and written fast.
+        slots: view of the parameters, for the same reason.
         gain: gain of each event.
         level: level of each event, before the guard moves it.
         moved: events whose levels the guard has moved.
-        version: version of the joint limits whose events are set here.
+        beyond: the limits that joints were beyond when their events were set here, as bits.
+        lean: largest |q1 + q2| whose events are set here [rad].
+        levels: levels of the probe whose events are set here.
     """
 
-    def __init__(self, kind: Kind, values: list[float], tolerance: float) -> None:
-        self.kind = kind
-        self.held = kind is Kind.HELD
+    __slots__ = (
+        "beyond",
+        "flies",
+        "free",
+        "gain",
+        "held",
+        "integrator",
+        "kind",
+        "lean",
+        "level",
+        "levels",
+        "moved",
+        "numbers",
+        "opposite",
+        "pars",
+        "pushed",
+        "regime",
+        "run",
+        "slots",
+        "state",
+        "terms",
+    )
+
+    def __init__(
+        self, model: LegModel, regime: Regime, probe: Pair, tolerance: float, *, held: bool
+    ) -> None:
+        kind = self.kind = Kind.HELD if held else KINDS.get(regime, Kind.FIXED)
+        self.regime, self.terms = regime, terms_of(model, regime)
+        self.free = kind is not Kind.FIXED
+        self.opposite: CompiledRegime | None = None
+        self.held = held
         self.flies = kind is Kind.FLIGHT
-        self.pushed = False
+        self.pushed = 0
         self.integrator = event_integrator(kind, tolerance)
         self.run = self.integrator.propagate_until
         self.state: Floats = self.integrator.state
         self.pars: Floats = self.integrator.pars
-        self.pars[:] = values[: len(self.pars)]
-        self._state, self.slots = _slots(self.state), _slots(self.pars)
+        self.pars[:] = parameters_of(model, regime, probe)[: len(self.pars)]
+        self.numbers, self.slots = _slots(self.state), _slots(self.pars)
         self.gain, self.level = [0.0] * len(Event), [1.0] * len(Event)
-        self._laid = list(self.level)
         self.moved: list[int] = []
-        self.version = -1
+        self.beyond = -1
+        self.lean, self.levels = 0.0, SILENT
+        if self.free:
+            self.lay(CONTACT, *(RISES if held else FALLS))
+        if held:
+            self.lay(RECOVER, *RISES)
 
     def put(self, q: Pair, v: Pair, motor: Pair) -> None:
         """Set angles [rad], rates [rad/s] and motors [rad] at time zero of the integrator."""
-        state = self._state
-        state[0], state[1] = q
-        state[2], state[3] = v
-        self.hold(motor)
+        numbers, slots = self.numbers, self.slots
+        numbers[0], numbers[1] = q
+        numbers[2], numbers[3] = v
+        slots[MOTOR], slots[MOTOR + 1] = motor
         self.integrator.time = 0.0
         self.integrator.reset_cooldowns()
-
-    def hold(self, motor: Pair) -> None:
-        """Set the motor positions [rad]."""
-        self.slots[MOTOR], self.slots[MOTOR + 1] = motor
 
     def lay(self, event: int, gain: float, level: float) -> None:
         """Set an event to the rise of `gain * reading` through a level."""
@@ -81,37 +148,47 @@ class CompiledRegime:
         self.slots[GAIN + event] = gain
         if gain < 0.0 and event <= LAST_LOWERED:
             level += BACK
-        self.slots[LEVEL + event] = self._laid[event] = level
+        self.slots[LEVEL + event] = level
 
-    def lay_bounds(self, fall: int, rise: int, lower: float, upper: float, never: float) -> None:
-        """Set two events: a reading falls through `lower`, and rises through `upper`.
+    def lay_levels(self, levels: Levels) -> None:
+        """Set the levels of the probe: it rises through `upper`, and falls through `lower`.
 
-        An event whose level is as far from zero as `never` is switched off.
+        A level as far from zero as `NEVER` switches its event off.
         """
-        gain, level = self.gain, self.level
-        if upper >= never:
-            if gain[rise] != 0.0:
-                self.lay(rise, *OFF)
-        elif upper != level[rise] or gain[rise] == 0.0:
-            self.lay(rise, 1.0, upper)
-        if lower <= -never:
-            if gain[fall] != 0.0:
-                self.lay(fall, *OFF)
-        elif -lower != level[fall] or gain[fall] == 0.0:
-            self.lay(fall, -1.0, -lower)
+        self.levels, upper, lower = levels, levels.upper, levels.lower
+        gain, level, slots = self.gain, self.level, self.slots
+        if upper < NEVER:
+            gain[RISE] = slots[GAIN + RISE] = 1.0
+            level[RISE] = slots[LEVEL + RISE] = upper
+        elif gain[RISE] != 0.0:
+            self.lay(RISE, *OFF)
+        if lower > -NEVER:
+            gain[FALL] = slots[GAIN + FALL] = -1.0
+            level[FALL] = -lower
+            slots[LEVEL + FALL] = BACK - lower
+        elif gain[FALL] != 0.0:
+            self.lay(FALL, *OFF)
+
+    def lay_lean(self, lean: float) -> None:
+        """Set the largest |q1 + q2| of a leg that has not fallen [rad]; `NEVER` for none."""
+        self.lean = lean
+        for event, gain in ((FELL, 1.0), (FELL_BACK, -1.0)):
+            self.lay(event, *((gain, lean) if lean < NEVER else OFF))
 
     def restore(self) -> None:
         """Restore the levels that the guard has moved."""
         for event in self.moved:
-            self.slots[LEVEL + event] = self._laid[event]
-        self.moved.clear()
+            lowered = self.gain[event] < 0.0 and event <= LAST_LOWERED
+            self.slots[LEVEL + event] = self.level[event] + (BACK if lowered else 0.0)
+        self.moved = []
 
     def guard(self, event: int, reading: float) -> bool:
         """Make an event's function negative; true if it was positive by more than rounding."""
-        ahead = self.gain[event] * reading - self.level[event]
+        reading *= self.gain[event]
+        ahead = reading - self.slots[LEVEL + event]
         if ahead <= -NUDGE:
             return False
-        self.slots[LEVEL + event] = self.gain[event] * reading + NUDGE
+        self.slots[LEVEL + event] = reading + NUDGE
         self.moved.append(event)
         return ahead > NUDGE
 

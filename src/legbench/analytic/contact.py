@@ -1,6 +1,6 @@
 """Contact with the ground on plain numbers: impact, lift-off, and overdue changes of regime."""
 
-from legbench.analytic.equations import Pair, touchdown_rates
+from legbench.analytic.equations import Pair, touchdown
 from legbench.analytic.model import LegModel
 from legbench.analytic.state import LegState, Regime
 
@@ -37,7 +37,7 @@ def land(model: LegModel, state: LegState) -> LegState:
     q, v = state.q, state.v
     relative = model.foot_vel_from_hip(q, v)
     foot_vel = state.trunk_vel[0] + relative[0], state.trunk_vel[1] + relative[1]
-    after = touchdown_rates(model.ops, model.stance, model.floating, q, v, foot_vel)
+    after, _ = touchdown(model.ops, model.stance, model.floating, q, v, foot_vel)
     relative = model.foot_vel_from_hip(q, after)
     return state._replace(
         regime=Regime.STANCE,

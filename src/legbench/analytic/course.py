@@ -1,7 +1,7 @@
 """Integration of one compiled leg from event to event, each in its order and once.
 
     course = Course(model, probe=(-0.7, 0.7))
-    course.start(state)
+    course.fly(q, v, centre, velocity)
     course.hold(motor)
     what = course.go(until, Levels(upper=0.5))   # Watched, or None at `until`
     if what is Watched.CONTACT:
@@ -15,69 +15,58 @@ angles and rates are dual: the variational equations then follow piece by piece 
 from typing import final
 
 from legbench.analytic._heyoka import heyoka as hy
-from legbench.analytic.compiled import (
-    TOLERANCE,
-    foot_from_centre,
-    parameters_of,
-    steady_point,
-    terms_of,
-)
-from legbench.analytic.compiled_regime import CompiledRegime
-from legbench.analytic.contact import MIN_PHASE
-from legbench.analytic.dual import DUAL, floats, without_gradients
-from legbench.analytic.equations import Pair, sweep, sweep_rate, touchdown_rates
-from legbench.analytic.event_detector import (
+from legbench.analytic.compiled import TOLERANCE
+from legbench.analytic.compiled_regime import (
     CONTACT,
-    HIP_HIGH,
-    KINDS,
+    FELL_BACK,
     NEVER,
     RECOVER,
-    SEEN,
     SILENT,
-    TIE,
     TURN,
-    EventDetector,
+    CompiledRegime,
     Levels,
 )
+from legbench.analytic.contact import MIN_PHASE
+from legbench.analytic.contact_watch import ContactWatch
+from legbench.analytic.dual import DUAL, floats
+from legbench.analytic.equations import Pair, sweep_height, sweep_motion, touchdown
+from legbench.analytic.event_detector import HIP_HIGH, SEEN, EventDetector
 from legbench.analytic.model import LegModel
-from legbench.analytic.parameters import HEIGHT, SPEED, Event, Kind, Watched
-from legbench.analytic.state import LegState, Regime
-from legbench.analytic.stop_switches import StopSwitches
+from legbench.analytic.moving_leg import MovingLeg
+from legbench.analytic.parameters import HEIGHT, MOTOR, SPEED, Event, Watched
+from legbench.analytic.state import Regime
 from legbench.analytic.variation import Variation
 from legbench.errors import PlantFault
 
-MAX_EVENTS = 10_000
-"""Largest number of events that one integration may pass [-]."""
+EVENT_BUDGET = range(10_000)
+"""Events that one integration may pass at most."""
 MAX_STEPS = 100_000
 """Largest number of steps of one integration [-]; a leg takes about a hundred a second, a diverging
 one any number."""
 TIME_LIMIT = int(hy.taylor_outcome.time_limit)
 EVENTS = len(Event)
 """Number of events that an integrator may watch [-]."""
-TOUCHED, TURNED = Watched.CONTACT, Watched.TURN
+TOUCHED, FLIGHT, STANCE = Watched.CONTACT, Regime.FLIGHT, Regime.STANCE
 
 
 @final
-class Course:
+class Course(MovingLeg):
     """Leg that is integrated through its regimes.
 
     Attributes:
-        model: the leg.
-        plain: the leg without derivatives, on which decisions are made; so are `plain_q`, `plain_v`
-            and `plain_motor`.
-        time: present time [s].
-        regime: regime whose equations hold.
-        q: angles [rad].
-        v: rates [rad/s].
-        motor: motor positions [rad].
-        since: time at which the regime began [s].
-        point: steady point of the angles at the beginning of the piece (forward, up) [m].
-        drift: velocity of the steady point then [m/s].
-        compiled: the compiled regime.
-        stop_switches: the joint stops.
+        contact: the watch over touchdown and lift-off.
         detector: the events that are watched.
-        told: the state that `state` last returned; None once the leg has moved on.
     """
+
+    __slots__ = (
+        "_air",
+        "_min_phase",
+        "_regimes",
+        "_tolerance",
+        "_variation",
+        "contact",
+        "detector",
+    )
 
     def __init__(
         self,
@@ -87,30 +76,17 @@ class Course:
         tolerance: float = TOLERANCE,
         min_phase: float = MIN_PHASE,
     ) -> None:
-        self.model: LegModel = model
-        self.plain: LegModel = without_gradients(model)
-        self.probe: Pair = probe or (0.0, 0.0)
-        self.stop_switches = StopSwitches(self.plain)
+        super().__init__(model, probe)
         self._tolerance, self._min_phase = tolerance, min_phase
-        self._arm = foot_from_centre(model)
         self._regimes: dict[tuple[Regime, bool], CompiledRegime] = {}
-        self._terms = {regime: terms_of(self.plain, regime) for regime in Regime}
+        self._air: CompiledRegime | None = None
         self._variation = Variation(tolerance) if model.ops is DUAL else None
-        self.detector = EventDetector(self, self.plain, min_phase)
-        self.motor: Pair = (0.0, 0.0)
-        self.told: LegState | None = None
+        self.contact = ContactWatch(self, min_phase)
+        self.detector = EventDetector(self, self.contact)
 
-    def start(self, state: LegState) -> None:
-        """Set the state of the leg."""
-        ops, along = self.model.ops, steady_point(self.model, state.regime)
-        x, z = sweep(ops, state.q, along)
-        height = 0.0 if state.regime.stands else state.trunk_pos[1] + z
-        point, drift = (state.trunk_pos[0] + x, height), (0.0, 0.0)
-        if state.regime is Regime.FLIGHT:
-            x, z = sweep_rate(ops, state.q, state.v, along)
-            drift = state.trunk_vel[0] + x, state.trunk_vel[1] + z
-        self.time, self.since = state.time, state.since
-        self._put(state.regime, state.q, state.v, point, drift)
+    def begin(self, regime: Regime, q: Pair, v: Pair, point: Pair, drift: Pair) -> None:
+        """Set angles and rates, and the steady point with its velocity, at the present `time`."""
+        self._put(self._compiled_for(regime), q, v, point, drift, NEVER)
 
     def fly(self, q: Pair, v: Pair, centre: Pair, velocity: Pair, lean: float = NEVER) -> None:
         """Begin a flight at time zero, from the place and velocity of the centre of mass.
@@ -118,63 +94,48 @@ class Course:
         `lean` is the largest |q1 + q2|, twice the polar angle, of a leg that has not fallen [rad].
         """
         self.time, self.since = 0.0, -self._min_phase
-        self._put(Regime.FLIGHT, q, v, centre, velocity, lean)
-
-    def state(self) -> LegState:
-        """State of the leg at the present time."""
-        ops, along = self.model.ops, steady_point(self.model, self.regime)
-        (x, z), (dx, dz) = self.centre() if self.compiled.flies else (self.point, self.drift)
-        inner, inner_vel = sweep(ops, self.q, along), sweep_rate(ops, self.q, self.v, along)
-        self.told = LegState(
-            time=self.time,
-            regime=self.regime,
-            q=self.q,
-            v=self.v,
-            trunk_pos=(x - inner[0], z - inner[1]),
-            trunk_vel=(dx - inner_vel[0], dz - inner_vel[1]),
-            since=self.since,
-        )
-        return self.told
-
-    def centre(self) -> tuple[Pair, Pair]:
-        """Place [m] and velocity [m/s] of the centre of mass in flight."""
-        (x, z), (dx, dz) = self.point, self.drift
-        elapsed = self.time - self.began
-        fallen = self.model.floating.gravity * elapsed
-        return (x + dx * elapsed, z + (dz - 0.5 * fallen) * elapsed), (dx, dz - fallen)
+        air = self._air = self._air or self._compiled_for(FLIGHT)
+        self._put(air, q, v, centre, velocity, lean)
 
     def apex_time(self) -> float:
         """Time at which the centre of mass is highest in this flight [s]."""
         return self.began + self.drift[1] / self.model.floating.gravity
 
-    def foot_from_centre(self, q: Pair) -> Pair:
-        """Foot tip seen from the centre of mass (forward, up) [m]."""
-        return sweep(self.model.ops, q, self._arm)
+    def foot_height(self, q: Pair) -> float:
+        """Height of the foot tip over the centre of mass [m]."""
+        return sweep_height(self.model.ops, q, self.arm)
 
     def hold(self, motor: Pair) -> None:
         """Set the motor positions, which are held until the next call [rad]."""
         if motor != self.motor:
-            self.motor, self.plain_motor = motor, floats(motor)
-            self.compiled.hold(self.plain_motor)
-            self._decide()
+            self.motor = self.plain_motor = motor
+            if self._variation is not None:
+                self.plain_motor = floats(motor)
+            slots = self.compiled.slots
+            slots[MOTOR], slots[MOTOR + 1] = self.plain_motor
+            if self.stop_switches.touched:
+                self._decide()
 
     def switch(self) -> None:
         """Apply a touchdown or lift-off: change the regime, and the rates by eq. (12)."""
-        ops, model = self.model.ops, self.model
-        arm, arm_vel = sweep(ops, self.q, self._arm), sweep_rate(ops, self.q, self.v, self._arm)
-        if self.compiled.flies:
-            (x, _), (dx, dz) = self.centre()
+        ops, model, compiled = self.model.ops, self.model, self.compiled
+        arm, arm_vel = sweep_motion(ops, self.q, self.v, self.arm)
+        if compiled.flies:
+            (x, _), (dx, dz), elapsed = self.point, self.drift, self.time - self.began
             # The height is zero by definition, also if the foot went below it while unwatched.
-            self.point, self.drift = (x + arm[0], 0.0), (0.0, 0.0)
-            foot_vel = dx + arm_vel[0], dz + arm_vel[1]
-            self.v = touchdown_rates(ops, model.stance, model.floating, self.q, self.v, foot_vel)
-            regime = Regime.STANCE
+            self.point, self.drift = (x + dx * elapsed + arm[0], 0.0), (0.0, 0.0)
+            foot_vel = dx + arm_vel[0], dz - model.floating.gravity * elapsed + arm_vel[1]
+            self.v, lost = touchdown(ops, model.stance, model.floating, self.q, self.v, foot_vel)
+            self.lost += lost
+            self.plain_v = self.v if self._variation is None else floats(self.v)
         else:
             self.point = self.point[0] - arm[0], self.point[1] - arm[1]
             self.drift = -arm_vel[0], -arm_vel[1]
-            regime = Regime.FLIGHT
         self.since = self.time
-        self._enter(regime)
+        if compiled.opposite is None:
+            compiled.opposite = self._compiled_for(STANCE if compiled.flies else FLIGHT)
+        self.contact.enter(self.since)
+        self._load(compiled.opposite)
 
     def go(self, until: float, levels: Levels = SILENT) -> Watched | None:
         """Integrate to `until`, or to the first watched event, which is not yet applied.
@@ -183,21 +144,24 @@ class Course:
             PlantFault: the integration failed.
         """
         self.told = None
-        detector = self.detector
+        detector, contact = self.detector, self.contact
         if levels is not detector.levels:
             detector.lay(levels)
-        for _ in range(MAX_EVENTS):
+        for _ in EVENT_BUDGET:
             event = detector.due()
             if event is None:
-                end = detector.blind if self.time < detector.blind < until else until
+                end = contact.earliest if contact.masked and contact.earliest < until else until
                 if end > self.time:
                     event = self._piece(end)
-            if event is not None:
-                seen = self._meaning(event)
-                if seen is not None:
-                    return seen
-            elif self.time >= until:
-                return None
+            if event is None:
+                if self.time >= until:
+                    return None
+            elif event <= FELL_BACK:
+                if event == TURN:
+                    detector.turned()
+                return SEEN[event]
+            elif self._handle(event):
+                return TOUCHED
         why = f"integration failed at t = {self.time:.6f} s: the leg chatters"
         raise PlantFault("integration failed", why)
 
@@ -205,96 +169,85 @@ class Course:
         """Compiled regimes in which the leg has been so far."""
         return list(self._regimes.values())
 
-    def march(self, step: float, count: int) -> None:
-        """Take `count` steps of a fixed length, without error control and without events."""
-        for _ in range(count):
-            self.compiled.integrator.step(step)
-        self.time = self.began + count * step
-        q1, q2, v1, v2 = self.compiled.state.tolist()
-        self.q = self.plain_q = (q1, q2)
-        self.v = self.plain_v = (v1, v2)
-
     def _piece(self, until: float) -> int | None:
         """Integrate to `until` or to the next event."""
         compiled = self.compiled
+        length = until - self.began
         # max_steps is passed by position: a keyword costs a fifth of a short call.
-        outcome = int(compiled.run(float(until - self.began), MAX_STEPS)[0])
-        event = None if outcome == TIME_LIMIT else -outcome - 1
-        if event is not None and not 0 <= event < EVENTS:
-            at = self.began + float(compiled.integrator.time)
-            why = f"integration failed at t = {at:.6f} s: the state runs away"
-            raise PlantFault("integration failed", why)
-        q1, q2, v1, v2 = compiled.state.tolist()
-        self.plain_q, self.plain_v = (q1, q2), (v1, v2)
-        if self._variation is not None:
-            self._variation.carry(self, self.plain_q, self.plain_v, until, event)
-            return event
-        self.q, self.v = self.plain_q, self.plain_v
-        # Exactly `until`, since a time that is short of it by rounding would never be reached.
-        self.time = until if event is None else self.began + compiled.integrator.time
+        outcome = compiled.run(length, MAX_STEPS)[0].value
+        q1, q2, v1, v2 = compiled.numbers
+        q = self.plain_q = (q1, q2)
+        v = self.plain_v = (v1, v2)
+        if outcome == TIME_LIMIT:
+            # Exactly `until`, since a time that is short of it by rounding is never reached.
+            event, self.elapsed, time = None, length, until
+        else:
+            event, self.elapsed = -outcome - 1, compiled.integrator.time
+            time = self.began + self.elapsed
+            if not 0 <= event < EVENTS:
+                why = f"integration failed at t = {time:.6f} s: the state runs away"
+                raise PlantFault("integration failed", why)
+        if self._variation is None:
+            self.q, self.v, self.time = q, v, time
+        else:
+            self._variation.carry(self, q, v, until, event)
         return event
 
-    def _meaning(self, event: int) -> Watched | None:
-        """Event as the caller sees it; those of stops and held feet are handled here, for None."""
+    def _handle(self, event: int) -> bool:
+        """Handle an event of a stop, a held foot or the ground; true if contact is to change."""
         compiled = self.compiled
-        if event in SEEN:
-            return SEEN[event]
-        if event == TURN:
-            self.detector.turned()
-            return TURNED
         if event <= HIP_HIGH:
-            self.stop_switches.cross(event)
-            self.stop_switches.lay(compiled)
+            self.stop_switches.cross(compiled, event)
             self._decide()
         elif event == RECOVER:
-            self._load(held=False)
+            self._load(self._compiled_for(self.regime))
         elif event != CONTACT:
             self.stop_switches.flip(compiled, event)
-        elif compiled.flies or compiled.held or self.detector.released() > -TIE:
-            return TOUCHED
-        else:
-            self._load(held=True)
-        return None
+        elif (beginning := self.contact.repeats()) is not None:
+            self._go_back(*beginning)
+            self.contact.mask()
+        elif self.contact.ends_regime():
+            return True
+        elif not self.contact.masked:
+            self._load(self._compiled_for(self.regime, held=True))
+        return False
+
+    def _go_back(self, time: float, q: Pair, v: Pair, point: Pair, drift: Pair) -> None:
+        """Go back to the beginning of the last piece, which is to be taken again."""
+        self.time, self.q, self.v, self.point, self.drift = time, q, v, point, drift
+        self.plain_q, self.plain_v = floats(q), floats(v)
+        self._load(self.compiled)
 
     def _put(
-        self, regime: Regime, q: Pair, v: Pair, point: Pair, drift: Pair, lean: float = NEVER
+        self, compiled: CompiledRegime, q: Pair, v: Pair, point: Pair, drift: Pair, lean: float
     ) -> None:
-        self.q, self.v, self.point, self.drift = q, v, point, drift
-        self.detector.begin(lean)
-        self.stop_switches.find(floats(q), floats(v))
-        self._enter(regime)
-
-    def _enter(self, regime: Regime) -> None:
-        """Begin a regime at the present time."""
-        self.regime, self.told = regime, None
-        self.terms = self._terms[regime]
-        self.detector.enter(regime, self.since)
-        self._load(held=False)
-
-    def _load(self, *, held: bool) -> None:
-        """Load the present state into the integrator of the regime."""
-        compiled = self.compiled = self._compiled_for(held=held)
-        self.plain_q, self.plain_v, self.plain_motor = self.q, self.v, self.motor
+        self.q, self.v, self.point, self.drift, self.lost = q, v, point, drift, 0.0
+        self.plain_q, self.plain_v, self.plain_motor = q, v, self.motor
         if self._variation is not None:
-            self.plain_q, self.plain_v = floats(self.q), floats(self.v)
-            self.plain_motor = floats(self.motor)
-        self.began = self.time
+            self.plain_q, self.plain_v, self.plain_motor = floats(q), floats(v), floats(self.motor)
+        self.detector.begin(lean)
+        self.stop_switches.find(self.plain_q, self.plain_v)
+        self.contact.enter(self.since)
+        self._load(compiled)
+
+    def _load(self, compiled: CompiledRegime) -> None:
+        """Load the present state into a compiled regime."""
+        self.compiled, self.regime, self.terms = compiled, compiled.regime, compiled.terms
+        self.began, self.elapsed, self.told = self.time, 0.0, None
         compiled.put(self.plain_q, self.plain_v, self.plain_motor)
         if compiled.flies:
             compiled.slots[HEIGHT], compiled.slots[SPEED] = self.point[1], self.drift[1]
         self.detector.move_to(compiled)
-        self._decide()
+        if self.stop_switches.touched or compiled.pushed:
+            self._decide()
 
     def _decide(self) -> None:
-        """Decide which stops push, after something has jumped."""
-        switches, compiled = self.stop_switches, self.compiled
-        if switches.touched or compiled.pushed:
-            switches.decide(compiled, self.terms, self.plain_motor, self.plain_q, self.plain_v)
+        """Set which stops push, after something has jumped."""
+        self.stop_switches.decide(self.compiled, self.plain_motor, self.plain_q, self.plain_v)
 
-    def _compiled_for(self, *, held: bool) -> CompiledRegime:
-        found = self._regimes.get((self.regime, held))
+    def _compiled_for(self, regime: Regime, *, held: bool = False) -> CompiledRegime:
+        found = self._regimes.get((regime, held))
         if found is None:
-            kind = Kind.HELD if held else KINDS.get(self.regime, Kind.FIXED)
-            values = parameters_of(self.plain, self.regime, self.probe)
-            found = self._regimes[self.regime, held] = CompiledRegime(kind, values, self._tolerance)
+            found = CompiledRegime(self.plain, regime, self.probe, self._tolerance, held=held)
+            self._regimes[regime, held] = found
         return found

@@ -62,15 +62,6 @@ def guide_torque(ops: Ops, reach: float, guide: Pair, q: Pair, v: Pair) -> Pair:
     )
 
 
-def pair_bias(ops: Ops, terms: PairTerms, q: Pair, v: Pair) -> Pair:
-    """`C(q, qdot) qdot + g(q)` of Appendix I [N m]."""
-    swirl = ops.sin(q[0] - q[1])
-    return (
-        terms.coupling * (swirl * (v[1] * v[1])) + terms.moment[0] * ops.sin(q[0]),
-        -terms.coupling * (swirl * (v[0] * v[0])) + terms.moment[1] * ops.sin(q[1]),
-    )
-
-
 def pair_solve(ops: Ops, terms: PairTerms, q: Pair, right: Pair) -> Pair:
     """`M(q)^-1 right` for the inertia matrix of Appendix I, by Cramer's rule."""
     (i1, i2), mixed = terms.inertia, terms.coupling
@@ -95,9 +86,15 @@ def pair_share(ops: Ops, terms: PairTerms, q: Pair, along: Pair) -> Pair:
 
 
 def pair_acceleration(ops: Ops, terms: PairTerms, q: Pair, v: Pair, torque: Pair) -> Pair:
-    """Eq. (1) solved for the accelerations: `M^-1 (tau - C qdot - g)` [rad/s^2]."""
-    bias = pair_bias(ops, terms, q, v)
-    return pair_solve(ops, terms, q, (torque[0] - bias[0], torque[1] - bias[1]))
+    """Eq. (1) solved for the accelerations: `M^-1 (tau - C qdot - g)` [rad/s^2].
+
+    `C(q, qdot) qdot + g(q)` is that of Appendix I.
+    """
+    (q1, q2), (v1, v2), mixed, moment = q, v, terms.coupling, terms.moment
+    swirl = ops.sin(q1 - q2)
+    bias_1 = mixed * (swirl * (v2 * v2)) + moment[0] * ops.sin(q1)
+    bias_2 = -mixed * (swirl * (v1 * v1)) + moment[1] * ops.sin(q2)
+    return pair_solve(ops, terms, q, (torque[0] - bias_1, torque[1] - bias_2))
 
 
 def pair_kinetic(ops: Ops, terms: PairTerms, q: Pair, v: Pair) -> Term:
@@ -133,6 +130,16 @@ def sweep_rate(ops: Ops, q: Pair, v: Pair, along: Pair) -> Pair:
     return (
         along[0] * ops.cos(q[0]) * v[0] + along[1] * ops.cos(q[1]) * v[1],
         along[0] * ops.sin(q[0]) * v[0] + along[1] * ops.sin(q[1]) * v[1],
+    )
+
+
+def sweep_motion(ops: Ops, q: Pair, v: Pair, along: Pair) -> tuple[Pair, Pair]:
+    """`sweep` and `sweep_rate` together."""
+    s1, c1, s2, c2 = ops.sin(q[0]), ops.cos(q[0]), ops.sin(q[1]), ops.cos(q[1])
+    along_1, along_2 = along
+    return (
+        (along_1 * s1 + along_2 * s2, -along_1 * c1 - along_2 * c2),
+        (along_1 * c1 * v[0] + along_2 * c2 * v[1], along_1 * s1 * v[0] + along_2 * s2 * v[1]),
     )
 
 
@@ -172,18 +179,21 @@ def free_foot_acceleration(ops: Ops, terms: FloatingTerms, q: Pair, v: Pair, a: 
     return trunk[0] + inner[0], trunk[1] + inner[1]
 
 
-def touchdown_rates(
+def touchdown(
     ops: Ops, stance: PairTerms, terms: FloatingTerms, q: Pair, v: Pair, foot_vel: Pair
-) -> Pair:
+) -> tuple[Pair, Term]:
     """Eq. (12) in closed form: joint rates after the foot, at `foot_vel` before, has stopped.
 
     The impulse acts on the foot alone, so in coordinates (foot, q) the momentum of q stays:
     `M qdot+ = M qdot- + B v_foot`, `B_i = (first_i - m l2) dir'(q_i)^T`, M of Appendix I.
+
+    Returns the rates and the energy that is lost, `(m v_foot^2 - (qdot+ - qdot-) . B v_foot) / 2`,
+    in rad/s and J.
     """
-    h1, h2 = terms.above_foot
-    kick = (
-        h1 * (ops.cos(q[0]) * foot_vel[0] + ops.sin(q[0]) * foot_vel[1]),
-        h2 * (ops.cos(q[1]) * foot_vel[0] + ops.sin(q[1]) * foot_vel[1]),
-    )
-    change = pair_solve(ops, stance, q, kick)
-    return v[0] + change[0], v[1] + change[1]
+    (h1, h2), (q1, q2), (forward, up) = terms.above_foot, q, foot_vel
+    kick_1 = h1 * (ops.cos(q1) * forward + ops.sin(q1) * up)
+    kick_2 = h2 * (ops.cos(q2) * forward + ops.sin(q2) * up)
+    change_1, change_2 = pair_solve(ops, stance, q, (kick_1, kick_2))
+    whole = terms.mass * (forward * forward + up * up)
+    lost = 0.5 * (whole - change_1 * kick_1 - change_2 * kick_2)
+    return (v[0] + change_1, v[1] + change_2), lost

@@ -8,14 +8,14 @@ stop can pull.
 """
 
 import math
-from operator import is_
 from typing import final
 
 from legbench.analytic.compiled_regime import NUDGE, OFF, CompiledRegime
 from legbench.analytic.equations import SCALAR, Ops, Pair, Term, pair_acceleration, pair_share
+from legbench.analytic.float_leg import FloatLeg
 from legbench.analytic.model import LegModel
 from legbench.analytic.parameters import FREE_PUSHES, PUSHES, Event
-from legbench.analytic.stops import TIME_CONSTANT, Stop
+from legbench.analytic.stops import SQUARE, Stop
 from legbench.analytic.terms import PairTerms
 
 AT_LIMIT = 1e-12
@@ -24,6 +24,10 @@ FIRST = int(Event.KNEE_LOW)
 """Number of the first of the four events in which a joint meets or leaves a limit."""
 KNEE_PUSH, KNEE_FREE = int(Event.KNEE_PUSH), int(Event.KNEE_FREE)
 """Numbers of the events of the knee's stop; those of the hip's come next."""
+
+Acting = tuple[int, Stop]
+"""Joint that is beyond a limit, 0 for the knee and 1 for the hip, and the stop that acts on it."""
+Bounds = tuple[float, float, float, float]
 
 
 @final
@@ -34,74 +38,100 @@ class StopSwitches:
 
     Attributes:
         touched: whether a joint is beyond a limit.
+        beyond: the limits that joints are beyond, as bits.
+        clear: angles of knee and hip between which no event of a limit is near: lowest and highest
+            of the knee, then of the hip [rad].
     """
 
-    def __init__(self, model: LegModel) -> None:
-        self._model, self._stops = model, model.stops
-        self._touched = [False] * len(model.stops)
-        self._pushing, self._free = [False, False], [False, False]
-        self._acting: list[Stop | None] = [None, None]
-        """Stop that acts on each joint, or none within the limits."""
-        self.touched, self._version = False, 0
-        self._asked_at: tuple[PairTerms, Pair, Pair, Pair] | None = None
-        """Objects for which `_answer` has been computed."""
-        self._answer: list[float] = [0.0, 0.0]
-        ends = [stop.limit + stop.sign * NUDGE for stop in model.stops]
-        self._ends = tuple(ends) or (-math.inf, math.inf) * 2
+    __slots__ = (
+        "_acting",
+        "_answer",
+        "_floats",
+        "_free",
+        "_joints",
+        "_model",
+        "_pushing",
+        "_range",
+        "_sets",
+        "_stops",
+        "beyond",
+        "clear",
+        "touched",
+    )
 
-    def clear(self, knee: float, hip: float) -> bool:
-        """Whether no joint at these angles [rad] is at a limit or beyond one."""
-        knee_low, knee_high, hip_low, hip_high = self._ends
-        return not self.touched and knee_low < knee < knee_high and hip_low < hip < hip_high
+    def __init__(self, model: LegModel, floats: FloatLeg) -> None:
+        self._model, self._stops, self._floats = model, model.stops, floats
+        self._pushing, self._free = [False, False], [False, False]
+        self._sets = tuple(self._set_of(beyond) for beyond in range(1 << len(model.stops)))
+        self._answer: tuple[float, float] | None = None
+        """Readings on which the last decision was made, until they have been guarded."""
+        self._change(0)
+        (low, high, back, front), margin = self.clear, 2.0 * AT_LIMIT
+        self._range = (low + margin, high - margin, back + margin, front - margin)
+
+    def _set_of(self, beyond: int) -> tuple[tuple[Acting, ...], list[Stop | None], Bounds]:
+        """Joints at work, and angles that are clear, while some limits are exceeded."""
+        acting: list[Stop | None] = [None, None]
+        bounds = [-math.inf, math.inf, -math.inf, math.inf]
+        for index, stop in enumerate(self._stops):
+            exceeded = beyond >> index & 1
+            if exceeded:
+                acting[index // 2] = stop
+            # A lower end bounds a joint from below, and one that is exceeded from above. Either way
+            # a joint that has just crossed is clear, since levels are lower for falling.
+            place = index ^ exceeded
+            pick = min if place % 2 else max
+            bounds[place] = pick(bounds[place], stop.limit - NUDGE)
+        low, high, back, front = bounds
+        joints = tuple((joint, stop) for joint, stop in enumerate(acting) if stop is not None)
+        return joints, acting, (low, high, back, front)
 
     def find(self, q: Pair, v: Pair) -> None:
         """Determine by the law which limits a joint is beyond, for a leg set to a new state."""
-        found = []
-        for stop in self._stops:
-            depth = stop.depth(q)
-            found.append(depth > AT_LIMIT or (depth > -AT_LIMIT and stop.speed(v) > 0.0))
-        if found != self._touched:
-            self._touched = found
-            self._changed()
+        low, high, back, front = self._range
+        beyond = 0
+        if not (low < q[1] - q[0] < high and back < q[0] < front):
+            for index, stop in enumerate(self._stops):
+                depth = stop.depth(q)
+                if depth > AT_LIMIT or (depth > -AT_LIMIT and stop.speed(v) > 0.0):
+                    beyond |= 1 << index
+        if beyond != self.beyond:
+            self._change(beyond)
 
     def lay(self, compiled: CompiledRegime) -> None:
         """Set the four events of the limits: to go beyond each, or to come back from beyond it."""
-        if compiled.version == self._version:
-            return
-        compiled.version = self._version
-        for event, (stop, beyond) in enumerate(zip(self._stops, self._touched, strict=True), FIRST):
-            gain = stop.sign if beyond else -stop.sign
-            if compiled.gain[event] != gain:
-                compiled.lay(event, gain, gain * stop.limit)
+        compiled.beyond = self.beyond
+        for index in range(len(self._stops)):
+            self._lay_limit(compiled, index)
 
-    def cross(self, event: int) -> None:
-        """Note that a joint has gone beyond a limit, or has come back."""
-        self._touched[event - FIRST] ^= True
-        self._changed()
+    def _lay_limit(self, compiled: CompiledRegime, index: int) -> None:
+        stop = self._stops[index]
+        gain = stop.sign if self.beyond >> index & 1 else -stop.sign
+        compiled.lay(FIRST + index, gain, gain * stop.limit)
 
-    def _changed(self) -> None:
-        self._acting = [None, None]
-        for index, (stop, beyond) in enumerate(zip(self._stops, self._touched, strict=True)):
-            if beyond:
-                self._acting[index // 2] = stop
-        self.touched = True in self._touched
-        self._version += 1
-        self._asked_at = None
+    def cross(self, compiled: CompiledRegime, event: int) -> None:
+        """Note that a joint has gone beyond a limit, or has come back, and watch the way back."""
+        index = event - FIRST
+        self._change(self.beyond ^ 1 << index)
+        self._lay_limit(compiled, index)
+        compiled.beyond = self.beyond
 
-    def decide(
-        self, compiled: CompiledRegime, terms: PairTerms, motor: Pair, q: Pair, v: Pair
-    ) -> None:
+    def _change(self, beyond: int) -> None:
+        """Set which limits a joint is beyond."""
+        self._joints, self._acting, self.clear = self._sets[beyond]
+        self.beyond, self.touched = beyond, beyond != 0
+
+    def decide(self, compiled: CompiledRegime, motor: Pair, q: Pair, v: Pair) -> None:
         """Set the switches of the pushes by the law, after something has jumped."""
-        if not self.touched:
-            if compiled.pushed:
-                self._silence(compiled)
-            return
-        compiled.pushed = True
-        asked = self._asked(terms, motor, q, v)
-        self._pushing = [push > 0.0 for push in asked]
-        if compiled.held:
-            asked = self._asked(self._model.falling, motor, q, v)
-            self._free = [push > 0.0 for push in asked]
+        if self.touched:
+            self._answer = knee, hip = self._ask(compiled.terms, motor, q, v)
+            self._pushing = [knee > 0.0, hip > 0.0]
+            if compiled.held:
+                knee, hip = self._ask(self._model.falling, motor, q, v)
+                self._free = [knee > 0.0, hip > 0.0]
+        if compiled.pushed & ~self.beyond:
+            self._silence(compiled)
+        compiled.pushed = self.beyond
         self._switch(compiled)
 
     def flip(self, compiled: CompiledRegime, event: int) -> None:
@@ -112,45 +142,40 @@ class StopSwitches:
             self._pushing[event - KNEE_PUSH] ^= True
         self._switch(compiled)
 
-    def guard(
-        self, compiled: CompiledRegime, terms: PairTerms, motor: Pair, q: Pair, v: Pair
-    ) -> None:
-        """Set and guard the events of the pushes, for the joints that are beyond a limit."""
-        found = [(KNEE_PUSH, terms, self._pushing)]
+    def guard(self, compiled: CompiledRegime, motor: Pair, q: Pair, v: Pair) -> None:
+        """Guard the events of the pushes, for the joints that are beyond a limit."""
+        asked = self._answer or self._ask(compiled.terms, motor, q, v)
+        self._answer = None
+        for joint, stop in self._joints:
+            compiled.guard(KNEE_PUSH + joint, stop.sign * asked[joint])
         if compiled.held:
-            found.append((KNEE_FREE, self._model.falling, self._free))
-        for first, inertia, pushing in found:
-            asked = self._asked(inertia, motor, q, v)
-            for joint in (0, 1):
-                stop, event = self._acting[joint], first + joint
-                if stop is None:
-                    if compiled.gain[event] != 0.0:
-                        compiled.lay(event, *OFF)
-                    continue
-                gain = -stop.sign if pushing[joint] else stop.sign
-                if compiled.gain[event] != gain:
-                    compiled.lay(event, gain, 0.0)
-                compiled.guard(event, stop.sign * asked[joint])
+            asked = self._ask(self._model.falling, motor, q, v)
+            for joint, stop in self._joints:
+                compiled.guard(KNEE_FREE + joint, stop.sign * asked[joint])
 
     def _silence(self, compiled: CompiledRegime) -> None:
-        """Switch all pushes and their events off, as no joint is beyond a limit."""
-        compiled.pushed = False
-        compiled.slots[PUSHES] = compiled.slots[PUSHES + 2] = 0.0
-        for event in (KNEE_PUSH, KNEE_PUSH + 1):
-            compiled.lay(event, *OFF)
-        if compiled.held:
-            compiled.slots[FREE_PUSHES] = compiled.slots[FREE_PUSHES + 1] = 0.0
-            for event in (KNEE_FREE, KNEE_FREE + 1):
-                compiled.lay(event, *OFF)
+        """Switch off the pushes, and their events, of joints that are within their limits."""
+        for joint, stop in enumerate(self._acting):
+            if stop is None and compiled.gain[KNEE_PUSH + joint] != 0.0:
+                compiled.slots[PUSHES + 2 * joint] = 0.0
+                compiled.lay(KNEE_PUSH + joint, *OFF)
+                if compiled.held:
+                    compiled.slots[FREE_PUSHES + joint] = 0.0
+                    compiled.lay(KNEE_FREE + joint, *OFF)
 
     def _switch(self, compiled: CompiledRegime) -> None:
-        for joint in (0, 1):
-            stop = self._acting[joint]
-            place = PUSHES + 2 * joint
-            compiled.slots[place] = float(stop is not None and self._pushing[joint])
-            compiled.slots[place + 1] = 0.0 if stop is None else stop.limit
+        """Set the switches of joints beyond a limit, and the events in which they change."""
+        slots = compiled.slots
+        for joint, stop in self._joints:
+            pushes, place = self._pushing[joint], PUSHES + 2 * joint
+            slots[place], slots[place + 1] = 1.0 if pushes else 0.0, stop.limit
+            gain = -stop.sign if pushes else stop.sign
+            if compiled.gain[KNEE_PUSH + joint] != gain:
+                compiled.lay(KNEE_PUSH + joint, gain, 0.0)
             if compiled.held:
-                compiled.slots[FREE_PUSHES + joint] = float(stop is not None and self._free[joint])
+                pushes = self._free[joint]
+                slots[FREE_PUSHES + joint] = 1.0 if pushes else 0.0
+                compiled.lay(KNEE_FREE + joint, -stop.sign if pushes else stop.sign, 0.0)
 
     def turns(
         self, ops: Ops, terms: PairTerms, torque: Pair, q: Pair, v: Pair, *, free: bool = False
@@ -163,17 +188,27 @@ class StopSwitches:
         """
         return self._turns(ops, terms, torque, q, v, self._free if free else self._pushing)
 
+    def accelerations(self, terms: PairTerms, motor: Pair, q: Pair, v: Pair) -> Pair:
+        """Accelerations of the angles, with the stops that are switched on [rad/s^2]."""
+        if not self.touched:
+            return self._floats.accelerations(terms, motor, q, v)
+        return self.turns(SCALAR, terms, self._floats.torque(motor, q, v), q, v)[1]
+
     def released(self, terms: PairTerms, torque: Pair, q: Pair, v: Pair) -> Pair:
         """Accelerations of the angles where every touched stop acts that would push [rad/s^2]."""
         return self._turns(SCALAR, terms, torque, q, v, None)[1]
 
-    def _asked(self, terms: PairTerms, motor: Pair, q: Pair, v: Pair) -> list[float]:
+    def _ask(self, terms: PairTerms, motor: Pair, q: Pair, v: Pair) -> tuple[float, float]:
         """Readings of the events of each joint's stop where every stop acts that would push."""
-        at = (terms, motor, q, v)
-        if self._asked_at is None or not all(map(is_, at, self._asked_at)):
-            torque = self._model.torque(motor, q, v)
-            self._asked_at, self._answer = at, self._turns(SCALAR, terms, torque, q, v, None)[0]
-        return self._answer
+        knee, hip = self._acting
+        if knee is not None and hip is not None:
+            torque = self._floats.torque(motor, q, v)
+            first, second = self._turns(SCALAR, terms, torque, q, v, None)[0]
+            return first, second
+        a = self._floats.accelerations(terms, motor, q, v)
+        if knee is not None:
+            return SQUARE * knee.turn(q, v, a), 0.0
+        return 0.0, SQUARE * hip.turn(q, v, a) if hip is not None else 0.0
 
     def _turns(
         self,
@@ -191,7 +226,7 @@ class StopSwitches:
             if stop is None:
                 continue
             turn = stop.turn(q, v, a)
-            found[joint] = TIME_CONSTANT**2 * turn
+            found[joint] = SQUARE * turn
             if pushing[joint] if pushing is not None else turn > 0.0:
                 share = pair_share(ops, terms, q, stop.normal)
                 a = a[0] + share[0] * turn, a[1] + share[1] * turn

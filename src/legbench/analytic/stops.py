@@ -18,6 +18,8 @@ from legbench.design import Limits
 
 TIME_CONSTANT = 0.01
 """Time constant T of a stop [s]."""
+DAMPING, SQUARE = 2.0 / TIME_CONSTANT, TIME_CONSTANT**2
+"""Factor of the speed in the law of a stop [1/s], and divisor of the depth [s^2]."""
 IMPEDANCE = 0.95
 """Impedance d: share of the acceleration that the stop decides, not the leg itself [-]."""
 
@@ -61,9 +63,11 @@ class Stop:
             v: their rates [rad/s].
             a: their accelerations without this stop [rad/s^2].
         """
-        n1, n2 = self.normal
-        back = 2.0 / TIME_CONSTANT * self.speed(v) + self.depth(q) / TIME_CONSTANT**2
-        return back - IMPEDANCE * (n1 * a[0] + n2 * a[1])
+        (on_1, on_2), sign = self.on, self.sign
+        speed = -sign * (on_1 * v[0] + on_2 * v[1])
+        depth = sign * (self.limit - on_1 * q[0] - on_2 * q[1])
+        back = DAMPING * speed + depth / SQUARE
+        return back - IMPEDANCE * (sign * on_1 * a[0] + sign * on_2 * a[1])
 
     def push(self, q: Pair, v: Pair, a: Pair, answer: Pair) -> Term:
         """Torque on a joint beyond its limit by the law [N m]; below zero the stop does not act.

@@ -8,12 +8,12 @@ faster if the states at events are not needed. `varied` is the same leg on dual 
 from dataclasses import replace
 from typing import final
 
-from legbench.analytic.compiled import TOLERANCE, event_integrator
+from legbench.analytic.compiled import TOLERANCE, event_integrator, steady_point
+from legbench.analytic.compiled_regime import KINDS, SILENT, Levels
 from legbench.analytic.contact import MIN_PHASE
 from legbench.analytic.course import Course
 from legbench.analytic.dual import DUAL
-from legbench.analytic.equations import Pair
-from legbench.analytic.event_detector import KINDS, SILENT, Levels
+from legbench.analytic.equations import Pair, sweep_motion
 from legbench.analytic.model import LegModel
 from legbench.analytic.parameters import Kind, Watched
 from legbench.analytic.state import LegState, Regime, Transition
@@ -83,7 +83,7 @@ class TaylorLeg:
             state, what = self.watch(state, until, motor, SILENT)
             if what is Watched.CONTACT:
                 self.course.switch()
-                after = self.course.state()
+                after = self._state()
                 happened.append(Transition(time=state.time, before=state, after=after))
                 state = after
         return state, happened
@@ -98,10 +98,10 @@ class TaylorLeg:
         """
         course = self.course
         if state is not course.told:
-            course.start(state)
+            self._start(state)
         course.hold(motor)
         what = course.go(until, levels)
-        return course.state(), what
+        return self._state(), what
 
     def order(self, regime: Regime) -> int:
         """Order of the Taylor series that the tolerance asks for."""
@@ -110,7 +110,40 @@ class TaylorLeg:
 
     def fixed_steps(self, state: LegState, step: float, count: int, motor: Pair) -> LegState:
         """Take steps of one length without error control and events, to measure the order."""
-        self.course.start(state)
-        self.course.hold(motor)
-        self.course.march(step, count)
-        return self.course.state()
+        course = self.course
+        self._start(state)
+        course.hold(motor)
+        for _ in range(count):
+            course.compiled.integrator.step(step)
+        course.time = course.began + count * step
+        q1, q2, v1, v2 = course.compiled.state.tolist()
+        course.q, course.v = (q1, q2), (v1, v2)
+        return self._state()
+
+    def _start(self, state: LegState) -> None:
+        """Set the course to a state."""
+        ops, along = self.model.ops, steady_point(self.model, state.regime)
+        inner, inner_vel = sweep_motion(ops, state.q, state.v, along)
+        height = 0.0 if state.regime.stands else state.trunk_pos[1] + inner[1]
+        point, drift = (state.trunk_pos[0] + inner[0], height), (0.0, 0.0)
+        if state.regime is Regime.FLIGHT:
+            drift = state.trunk_vel[0] + inner_vel[0], state.trunk_vel[1] + inner_vel[1]
+        self.course.time, self.course.since = state.time, state.since
+        self.course.begin(state.regime, state.q, state.v, point, drift)
+
+    def _state(self) -> LegState:
+        """State of the leg at the present time of the course."""
+        course = self.course
+        along = steady_point(self.model, course.regime)
+        point, drift = course.centre() if course.compiled.flies else (course.point, course.drift)
+        inner, inner_vel = sweep_motion(self.model.ops, course.q, course.v, along)
+        course.told = LegState(
+            time=course.time,
+            regime=course.regime,
+            q=course.q,
+            v=course.v,
+            trunk_pos=(point[0] - inner[0], point[1] - inner[1]),
+            trunk_vel=(drift[0] - inner_vel[0], drift[1] - inner_vel[1]),
+            since=course.since,
+        )
+        return course.told

@@ -6,19 +6,17 @@ an event occurs at a zero of its function, which on dual numbers gives the shift
 over events this is the product of transition and saltation matrices.
 """
 
-from typing import TYPE_CHECKING, final
+from typing import final
 
 import numpy as np
 
 from legbench.analytic.compiled import parameters_of, varied_integrator
 from legbench.analytic.dual import Dual, gradient
 from legbench.analytic.equations import SCALAR, Pair
+from legbench.analytic.moving_leg import MovingLeg
 from legbench.analytic.parameters import HEIGHT, MOTOR, PROBE, SMOOTH, SPEED
 from legbench.analytic.readings import read
 from legbench.signals import Floats
-
-if TYPE_CHECKING:
-    from legbench.analytic.course import Course
 
 STATES = 4
 """Number of states, two angles and their rates [-]."""
@@ -34,41 +32,41 @@ class Variation:
     def __init__(self, tolerance: float) -> None:
         self._integrator = varied_integrator(tolerance)
 
-    def carry(self, course: "Course", q: Pair, v: Pair, until: float, event: int | None) -> None:
-        """Carry the derivatives of a course through a piece, and begin the next one at its end.
+    def carry(self, leg: MovingLeg, q: Pair, v: Pair, until: float, event: int | None) -> None:
+        """Carry the derivatives of a leg through a piece, and begin the next one at its end.
 
         Args:
-            course: dual numbers at the beginning of the piece.
+            leg: dual numbers at the beginning of the piece.
             q: angles at the end [rad].
             v: rates at the end [rad/s].
             until: time at which the piece was to end [s].
             event: the event that ended it, if one did.
         """
-        compiled, plain = course.compiled, course.plain
-        time = float(compiled.integrator.time)
-        varied = parameters_of(course.model, course.regime, course.probe)[:MOTOR]
-        start = [*course.q, *course.v]
-        moved = self._moved(start, compiled.pars, time, [*varied, *course.motor])
-        torque = plain.torque(course.plain_motor, q, v)
-        a = course.stop_switches.turns(SCALAR, course.terms, torque, q, v)[1]
+        compiled, plain = leg.compiled, leg.plain
+        time = float(leg.elapsed)
+        varied = parameters_of(leg.model, leg.regime, leg.probe)[:MOTOR]
+        start = [*leg.q, *leg.v]
+        moved = self._moved(start, compiled.pars, time, [*varied, *leg.motor])
+        torque = plain.torque(leg.plain_motor, q, v)
+        a = leg.stop_switches.turns(SCALAR, leg.terms, torque, q, v)[1]
         values, rates = [*q, *v], np.array([*v, *a])
         if event is None:
-            shift = gradient(until - course.began)
+            shift = gradient(until - leg.began)
         else:
             gain, level = compiled.gain[event], compiled.level[event]
-            reading = read(course, event, _duals(values, moved), time)
+            reading = read(leg, event, _duals(values, moved), time)
             change = gradient(gain * reading - level)
             timed, elapsed = _duals(values, rates[:, np.newaxis]), Dual(time, np.ones(1))
-            reading = read(course, event, timed, elapsed, plain=True)
+            reading = read(leg, event, timed, elapsed, plain=True)
             shift = -change / (gain * gradient(reading)[0])
         q1, q2, v1, v2 = _duals(values, moved + np.multiply.outer(rates, shift))
-        course.q, course.v = (q1, q2), (v1, v2)
-        course.time = until if event is None else course.began + Dual(time, shift)
+        leg.q, leg.v = (q1, q2), (v1, v2)
+        leg.time = until if event is None else leg.began + Dual(time, shift)
         if compiled.flies:
-            course.point, course.drift = course.centre()
-            compiled.pars[HEIGHT], compiled.pars[SPEED] = course.point[1], course.drift[1]
-        course.began = course.time
-        compiled.integrator.time = 0.0
+            leg.point, leg.drift = leg.centre()
+            compiled.pars[HEIGHT], compiled.pars[SPEED] = leg.point[1], leg.drift[1]
+        leg.began = leg.time
+        compiled.integrator.time = leg.elapsed = 0.0
 
     def _moved(self, start: list[float], pars: Floats, time: float, varied: list[float]) -> Floats:
         """Derivative of the state at a fixed time by the seeds (4, m).

@@ -26,7 +26,6 @@ from legbench.campaign.shards import (
     PROVENANCE_KEY,
     Shard,
     check_version,
-    parquet_bytes,
     read_shard,
     told_of,
 )
@@ -34,6 +33,7 @@ from legbench.campaign.table import TABLE, whole_table
 from legbench.campaign.work import work_of
 from legbench.errors import CampaignError, RecordingError
 from legbench.interrupts import StopFlag
+from legbench.recording.sealed import sealed_bytes
 
 Progress = Callable[[int, int, float | None], None]
 """Function that is called with experiments done, experiments in all, and the time left [s] or
@@ -217,5 +217,5 @@ def _assembled(plan: CampaignPlan, folder: Path, shards: Sequence[Shard]) -> Pat
             json.dumps(found, sort_keys=True).encode(),
         )
         path = folder / TABLE
-        write_into(path, parquet_bytes(table))
+        write_into(path, sealed_bytes(table))
     return path

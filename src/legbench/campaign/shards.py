@@ -4,7 +4,6 @@ A shard's name is the hash of what is in it, so that a file that is there is a f
 """
 
 import hashlib
-import io
 import json
 import math
 from collections.abc import Hashable, Iterable, Mapping, Sequence
@@ -13,7 +12,6 @@ from pathlib import Path
 from typing import Any, Final
 
 import pyarrow as pa
-from pyarrow import parquet
 
 from legbench.campaign.plan import CampaignPlan, Planned, cost_of
 from legbench.campaign.provenance import provenance, versions
@@ -21,6 +19,7 @@ from legbench.campaign.rows import Row
 from legbench.campaign.table import FORMAT_KEY, PROVENANCE_KEY, TABLE_FORMAT, measured_table
 from legbench.errors import CampaignError
 from legbench.experiment.alike import alike, runs_in_batch
+from legbench.recording.sealed import UNREADABLE, opened, sealed_bytes
 from legbench.writing import reason
 
 SHARDS: Final = "shards"
@@ -97,14 +96,7 @@ def shard_bytes(name: str, rows: Sequence[Row]) -> bytes:
         NAME_KEY: name.encode(),
         PROVENANCE_KEY: json.dumps(provenance(), sort_keys=True).encode(),
     }
-    return parquet_bytes(table.replace_schema_metadata(metadata))
-
-
-def parquet_bytes(table: pa.Table) -> bytes:
-    """Return a table as a Parquet file; equal tables give equal bytes."""
-    buffer = io.BytesIO()
-    parquet.write_table(table, buffer, compression="zstd")
-    return buffer.getvalue()
+    return sealed_bytes(table.replace_schema_metadata(metadata))
 
 
 def told_of(content: Path | bytes) -> Mapping[bytes, bytes]:
@@ -114,9 +106,9 @@ def told_of(content: Path | bytes) -> Mapping[bytes, bytes]:
         CampaignError: it cannot be read.
     """
     try:
-        source = io.BytesIO(content) if isinstance(content, bytes) else str(content)
-        return parquet.read_schema(source).metadata or {}
-    except (OSError, pa.ArrowException) as error:
+        with opened(content) as file:
+            return file.schema_arrow.metadata or {}
+    except UNREADABLE as error:
         where = "a shard" if isinstance(content, bytes) else str(content)
         raise CampaignError(
             f"{where} is damaged: {reason(error)}; remove it, and it is run again"
@@ -145,9 +137,9 @@ def check_version(told: Mapping[bytes, bytes], where: str) -> None:
 def read_shard(path: Path) -> pa.Table:
     """Read the rows of a shard; raises CampaignError."""
     try:
-        with parquet.ParquetFile(str(path)) as file:
+        with opened(path) as file:
             return file.read()
-    except (OSError, pa.ArrowException) as error:
+    except UNREADABLE as error:
         raise CampaignError(
             f"{path} is damaged: {reason(error)}; remove it, and it is run again"
         ) from error

@@ -5,11 +5,11 @@ from pathlib import Path
 from typing import Any, Final
 
 import pyarrow as pa
-from pyarrow import parquet
 
 from legbench.campaign.rows import KINDS, Row
 from legbench.errors import ConfigError, FormatError, RecordingError
 from legbench.experiment.toml_text import toml_value
+from legbench.recording.sealed import UNREADABLE, opened
 from legbench.writing import reason
 
 TABLE: Final = "table.parquet"
@@ -149,9 +149,9 @@ def read_table(folder: Path | str) -> pa.Table:
             " with legbench campaign"
         )
     try:
-        with parquet.ParquetFile(str(path)) as file:
+        with opened(path) as file:
             table = file.read()
-    except (OSError, pa.ArrowException) as error:
+    except UNREADABLE as error:
         raise RecordingError(f"{path} is damaged: {reason(error)}") from error
     found = (table.schema.metadata or {}).get(FORMAT_KEY, b"none").decode()
     if found != str(TABLE_FORMAT):

@@ -28,8 +28,8 @@ from legbench.plants import BUS_LOG, EMULATED, LIMITS_NAME, CanChoice, Leg, Open
 from legbench.recording.reader import load
 from legbench.recording.writer import RunWriter
 
-CYCLES = 900
-"""Number of cycles of a trial that nothing ends."""
+CYCLES = 650
+"""Number of cycles of a trial that nothing ends, about 150 of them after its fault."""
 SILENCE_NS = 200_000_000
 """Time for which the drives are watched after the master has gone [ns]."""
 POWERED = (

@@ -33,6 +33,7 @@ def write_parquet(recording: Recording, path: Path, progress: Progress) -> None:
         compression="snappy",
         use_dictionary=False,
         data_page_version="1.0",
+        write_page_checksum=True,
     ) as writer:
         for part in recording.windows(GROUP_ROWS):
             writer.write_table(arrow_table(part.columns, units, {}))

@@ -1,6 +1,8 @@
 """Second opinion on stiffness and damping: `mujoco.sysid` on the same runs, in MuJoCo's own model.
 
-Controls are expanded to the step of the model, and there is one model for each setup.
+Controls are expanded to the step of the model, and there is one model for each run. The posture
+in which a run begins is free where ours is: taken from a noisy encoder instead, it bends the
+stiffness by several standard errors.
 """
 
 import sys
@@ -29,6 +31,8 @@ FREED: Final = ("k1", "k2", "d1", "d2")
 """Parameters that the peer can free."""
 LEAST, MOST = 0.2, 5.0
 """Bounds of the peer's search, as factors of the design [-]."""
+START_REACH: Final = 0.05
+"""Largest way of a link at the start from where its encoder shows it [rad]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,11 +71,15 @@ def ask_peer(task: IdentificationTask) -> PeerAnswer:
     parameters = sysid.ParameterDict()
     for name in task.free.names:
         parameters.add(_parameter(sysid, name, task.design))
-    sequences = [_sequence(sysid, trial, task) for trial in task.trials]
-    residual = sysid.build_residual_fn(
-        models_sequences=sequences,
-        modify_residual=_residual_of(task.bars is not None),
-    )
+    for trial in task.trials if task.free.start else ():
+        for name, angle in zip(_start_names(trial), _first(trial).tolist(), strict=True):
+            parameters.add(sysid.Parameter(name, angle, angle - START_REACH, angle + START_REACH))
+    each = [_residual_of_run(sysid, trial, task) for trial in task.trials]
+
+    def residual(vector: Floats, known: Any, **options: Any) -> tuple[list[Any], ...]:
+        parts = [residual_of_run(vector, known, **options) for residual_of_run in each]
+        return tuple([one for part in parts for one in part[place]] for place in range(3))
+
     before = time.perf_counter()
     with redirect_stdout(sys.stderr):  # what it says of its progress is no result
         found, _ = sysid.optimize(parameters, residual, verbose=False)
@@ -112,6 +120,44 @@ def _damps(joint: int) -> Callable[[mujoco.MjSpec, Any], None]:
     return write
 
 
+def _start_names(trial: FitTrial) -> tuple[str, str]:
+    """Names of the parameters that are the link angles at the start of a run."""
+    return f"start_1 of {trial.name}", f"start_2 of {trial.name}"
+
+
+def _first(trial: FitTrial) -> Floats:
+    """Mean of the measured link angles before the motors first move (2,) [rad]."""
+    still = max(1, int(rows_before_change(trial.motor_pos)))
+    return trial.joint_pos[:still].mean(axis=0)
+
+
+def _residual_of_run(sysid: Any, trial: FitTrial, task: IdentificationTask) -> Callable[..., Any]:
+    """Residual of one run, which begins at rest where its own parameters say."""
+    return sysid.build_residual_fn(
+        models_sequences=[_sequence(sysid, trial, task)],
+        modify_residual=_residual_of(task.bars is not None),
+        custom_rollout=_rollout(sysid, trial, task.design) if task.free.start else None,
+    )
+
+
+def _rollout(sysid: Any, trial: FitTrial, design: LegDesign) -> Callable[..., Any]:
+    """Rollout whose initial state follows from the start parameters of a run."""
+
+    def roll(models: Any, initial_states: Any, param_dicts: Any, **options: Any) -> Any:
+        states = [
+            sysid.create_initial_state(
+                model,
+                rest_qpos(
+                    model, design, np.array([known[name].value[0] for name in _start_names(trial)])
+                ),
+            )
+            for model, known in zip(models, param_dicts, strict=True)
+        ]
+        return sysid.sysid_rollout(models=models, initial_states=states, **options)
+
+    return roll
+
+
 def _sequence(sysid: Any, trial: FitTrial, task: IdentificationTask) -> Any:
     """Model and measurement of one run, with the motors at every step of the model."""
     bars = task.bars
@@ -137,13 +183,11 @@ def _sequence(sysid: Any, trial: FitTrial, task: IdentificationTask) -> Any:
     held = np.concatenate([trial.motor_pos[1:], trial.motor_pos[-1:]])
     motors = np.repeat(held, parts, axis=0)
     times = model.opt.timestep * np.arange(len(motors))
-    still = max(1, int(rows_before_change(trial.motor_pos)))
-    first = trial.joint_pos[:still].mean(axis=0)
     return sysid.ModelSequences(
         trial.name,
         spec,
         trial.name,
-        sysid.create_initial_state(model, rest_qpos(model, task.design, first)),
+        sysid.create_initial_state(model, rest_qpos(model, task.design, _first(trial))),
         sysid.TimeSeries.from_control_names(times, motors, model),
         sysid.TimeSeries.from_names(trial.time, trial.joint_pos, model),
     )

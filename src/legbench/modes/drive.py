@@ -6,17 +6,20 @@ from typing import final
 
 import numpy as np
 
+from legbench.analytic.compiled_regime import NEVER, SILENT, Levels
 from legbench.analytic.equations import Pair
-from legbench.analytic.event_detector import NEVER
-from legbench.analytic.taylor import SILENT, Levels, Watched
+from legbench.analytic.parameters import Watched
 from legbench.control import JumpConfig, LegTargets
 from legbench.control.jump_rules import JumpPhase, phase_exits
 from legbench.design import LegDesign
 from legbench.design.statics import Support
 from legbench.kinematics import ModalConvention
 
-SCALE = math.sqrt(0.5)
-FLIGHT, COMPRESS, PUSH = JumpPhase.FLIGHT, JumpPhase.COMPRESS, JumpPhase.PUSH
+SCALE, INF = math.sqrt(0.5), math.inf
+CROSSED = 1e-9
+"""Largest reading beyond a level that has been crossed and not jumped over [rad]."""
+FLIGHT, COMPRESS = JumpPhase.FLIGHT, JumpPhase.COMPRESS
+PUSH, RELEASE = JumpPhase.PUSH, JumpPhase.RELEASE
 RISE, FALL, TURN = Watched.RISE, Watched.FALL, Watched.TURN
 """Members that are asked for at every event; the enumerations themselves take longer."""
 
@@ -30,14 +33,14 @@ class AbstractDrive(ABC):
     """Factors p1, p2 of the probe `p1 q1 + p2 q2` that the law watches [-]."""
     alarm: float
     """Time at which `on_alarm` is to be called [s]."""
+    levels: Levels
+    """Probe values at which `on_event` is to be called; the same object as long as they stay."""
+    stands: bool = False
+    """Whether the foot is on the ground: a hint at what comes next, the law is the same."""
 
     @abstractmethod
     def restart(self) -> None:
         """Begin at the apex of a flight."""
-
-    @abstractmethod
-    def levels(self) -> Levels:
-        """Probe values at which `on_event` is to be called."""
 
     @abstractmethod
     def on_event(self, what: Watched, value: float, time: float) -> None:
@@ -47,9 +50,8 @@ class AbstractDrive(ABC):
     def on_alarm(self, value: float, time: float) -> None:
         """Handle the alarm."""
 
-    @property
     @abstractmethod
-    def settled(self) -> bool:
+    def settled(self, time: float) -> bool:
         """Whether the law keeps no state from the stance, so that the leg's state is complete."""
 
 
@@ -58,22 +60,18 @@ class Passive(AbstractDrive):
     """Motors that are held in place."""
 
     probe = (-SCALE, SCALE)
-    alarm = math.inf
+    alarm = INF
+    levels = SILENT
 
     def __init__(self, motor: Pair) -> None:
         self.motor = motor
 
-    @property
-    def settled(self) -> bool:
+    def settled(self, time: float) -> bool:
         """Whether the law is without state, which is always so."""
         return True
 
     def restart(self) -> None:
         """Do nothing, as there is no state."""
-
-    def levels(self) -> Levels:
-        """No levels, as there is nothing to watch."""
-        return SILENT
 
     def on_event(self, what: Watched, value: float, time: float) -> None:
         """Do nothing, as no event is watched."""
@@ -89,6 +87,14 @@ class JumpLaw(AbstractDrive):
     Fold and load are both `y = s (k2 q2 - k1 q1) / k`, shifted by the motor position, so every
     threshold of the controller is a level of y, and every extreme one of its turning points.
 
+    A time that only has to pass is no alarm as long as nothing can depend on it: the law passes
+    over it in silence, and an event before it sets the alarm.
+
+    Attributes:
+        phase: phase of the controller, which may have changed at `lapse` without notice.
+        lapse: time that is passed over in silence [s]: a release is over, or a rising load has
+            lasted. Infinity if there is none.
+
     Raises:
         ConfigError: settings that the controller itself refuses for this leg.
     """
@@ -98,7 +104,8 @@ class JumpLaw(AbstractDrive):
             designs=design, support=Support.FOOT, convention=ModalConvention.ORTHONORMAL
         )
         config.build(targets)
-        self._exits, self._turn = phase_exits(config), config.apex_turn
+        exits, self._turn = phase_exits(config), config.apex_turn
+        self._dwell = {phase: exits[phase].dwell for phase in (FLIGHT, RELEASE)}
         k1, k2 = design.stiffness
         self._k = min(k1, k2)
         self._stiffness = (k1, k2)
@@ -110,90 +117,98 @@ class JumpLaw(AbstractDrive):
         rest = targets.link_at_rest(folded)
         torque = np.asarray(design.stiffness) * (folded - rest)
         standing = -float(targets.radial(torque))
-        self._at_load = {
-            phase: self._load_level(end.load * standing, self._motor_in(phase))
-            for phase, end in self._exits.items()
-        }
-        self._in_flight = Levels(upper=self._at_load[FLIGHT])
-        self._in_doubt = Levels(lower=self._at_load[FLIGHT])
-        self._extreme, self._loaded = 0.0, False
-        self._levels: Levels | None = None
+        self._loaded, self._unloaded = (
+            self._load_level(exits[phase].load * standing, motor)
+            for phase, motor in ((FLIGHT, self._folded), (PUSH, self._stretched))
+        )
+        self._in_flight, self._in_doubt = Levels(upper=self._loaded), Levels(lower=self._loaded)
+        self._rising = Levels(lower=self._loaded, turns=True)
+        self._extreme = 0.0
         self._enter(FLIGHT)
 
     def restart(self) -> None:
         """Begin in flight, unloaded and settled."""
+        self.stands = False
         self._enter(FLIGHT)
-
-    def levels(self) -> Levels:
-        """Levels that end the phase; the same object as long as they do not change."""
-        if self._levels is None:
-            self._levels = self._new_levels()
-        return self._levels
-
-    def _new_levels(self) -> Levels:
-        if self.phase is FLIGHT:
-            return self._in_doubt if self._loaded else self._in_flight
-        if self.phase is COMPRESS:
-            return Levels(NEVER, self._extreme - self._turn, True)
-        if self.phase is PUSH:
-            return Levels(self._extreme + self._turn, self._at_load[PUSH], True)
-        return SILENT
 
     def on_event(self, what: Watched, value: float, time: float) -> None:
         """Advance the phase after an event of the probe."""
-        self._levels = None
-        if self.phase is FLIGHT:
-            if what is RISE:
-                self._load(time)
-            elif what is FALL:
-                self._enter(FLIGHT)
-        elif self.phase is COMPRESS:
-            if what is TURN:
-                self._extreme = max(self._extreme, value)
-            elif what is FALL:
-                self._leave(value)
-                if value < self._at_load[PUSH]:
-                    self._release(time)
+        if what is TURN:
+            self._turned(value, time)
         elif self.phase is PUSH:
-            if what is TURN:
-                self._extreme = min(self._extreme, value)
-            else:
+            self._release(time)
+        elif self.phase is COMPRESS:
+            self._leave(value)
+            if value < self._unloaded:
                 self._release(time)
+        elif what is FALL:
+            self._enter(FLIGHT)
+        elif self.phase is RELEASE and time < self.lapse:
+            self.levels, self.alarm, self.lapse = SILENT, self.lapse, INF
+        else:
+            self.phase = FLIGHT
+            self._load(time, rises=self.stands and value - self._loaded < CROSSED)
 
     def on_alarm(self, value: float, time: float) -> None:
         """Advance the phase after the alarm: the release is over, or a load has lasted."""
-        self._levels = None
-        if self._loaded:
+        if self.phase is FLIGHT:
             self._leave(value)
             return
         self._enter(FLIGHT)
-        if value > self._at_load[FLIGHT]:
-            self._load(time)
+        if value > self._loaded:
+            self._load(time, rises=False)
 
-    @property
-    def settled(self) -> bool:
+    def settled(self, time: float) -> bool:
         """Whether the leg is in flight, or about to be."""
-        return self.phase in (JumpPhase.FLIGHT, JumpPhase.RELEASE)
+        return self.phase is RELEASE or (self.phase is FLIGHT and time < self.lapse)
 
-    def _load(self, time: float) -> None:
-        self._loaded, self.alarm = True, time + self._exit.dwell
+    def _turned(self, value: float, time: float) -> None:
+        """Note an extreme of the probe."""
+        if self.phase is COMPRESS:
+            if value > self._extreme:
+                self._search(value)
+        elif self.phase is PUSH:
+            if value < self._extreme:
+                self._search(value)
+        elif time >= self.lapse:
+            self._leave(value)
+        else:
+            self.levels, self.alarm, self.lapse = self._in_doubt, self.lapse, INF
+
+    def _load(self, time: float, *, rises: bool) -> None:
+        """Wait for a load to last; one that rises can only fall after a turn."""
+        lasted = time + self._dwell[FLIGHT]
+        if rises:
+            self.levels, self.alarm, self.lapse = self._rising, INF, lasted
+        else:
+            self.levels, self.alarm, self.lapse = self._in_doubt, lasted, INF
 
     def _release(self, time: float) -> None:
-        self._enter(self._exit.to)
-        self.alarm = time + self._exit.dwell
+        """Let the motors go back, and watch for a load, which counts after some time only."""
+        self._enter(RELEASE)
+        self.lapse = time + self._dwell[RELEASE]
 
     def _leave(self, value: float) -> None:
         """Go on to the next phase, whose extreme is searched from `value` on."""
-        self._enter(self._exit.to)
-        self._extreme = value
+        self.alarm = self.lapse = INF
+        if self.phase is FLIGHT:
+            self.phase = COMPRESS
+        else:
+            self.phase, self.motor = PUSH, self._stretched
+        self._search(value)
+
+    def _search(self, extreme: float) -> None:
+        """Watch for the turn that ends the phase, after the extreme so far."""
+        self._extreme = extreme
+        if self.phase is COMPRESS:
+            self.levels = Levels(NEVER, extreme - self._turn, True)
+        else:
+            self.levels = Levels(extreme + self._turn, self._unloaded, True)
 
     def _enter(self, phase: JumpPhase) -> None:
-        self.phase, self._exit = phase, self._exits[phase]
-        self.motor = self._motor_in(phase)
-        self.alarm, self._loaded, self._levels = math.inf, False, None
-
-    def _motor_in(self, phase: JumpPhase) -> Pair:
-        return self._stretched if phase is PUSH else self._folded
+        """Enter a phase in which the leg is in the air, or about to be."""
+        self.phase, self.motor, self.levels = phase, self._folded, self._in_flight
+        self.alarm = self.lapse = INF
 
     def _load_level(self, load: float, motor: Pair) -> float:
         """The y of a load [N m] at a motor position."""

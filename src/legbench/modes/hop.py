@@ -7,11 +7,12 @@ not depend on the place along the ground, so six numbers are the state of the le
 import math
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import NamedTuple
 
 import numpy as np
 
 from legbench.analytic.course import Course
-from legbench.analytic.equations import Pair, pair_kinetic
+from legbench.analytic.equations import Pair
 from legbench.analytic.model import LegModel
 from legbench.analytic.state import LegState, flying
 from legbench.analytic.taylor import TaylorLeg, Watched
@@ -25,6 +26,7 @@ FALLEN = 1.2
 """Polar angle |x1| at which the leg counts as fallen [rad]."""
 CALLS = 400
 """Largest number of events in one hop [-]."""
+BUDGET = range(CALLS)
 NAMES = ("height", "speed", "z1", "z2", "dz1", "dz2")
 SCALE = math.sqrt(0.5)
 CONTACT, FELL = Watched.CONTACT, Watched.FELL
@@ -41,6 +43,9 @@ class Ending(StrEnum):
     """The leg leans so far that it has fallen."""
     FAULT = "fault"
     """The integration failed, or the hop has too many events."""
+
+
+APEX, FAULT = Ending.APEX, Ending.FAULT
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,9 +114,8 @@ def apex_of(model: LegModel, state: LegState) -> Apex:
     return Apex.at(height, speed, state.q, state.v)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Hop:
-    """Result of one hop."""
+class Hop(NamedTuple):
+    """Result of one hop; a tuple, because a map makes thousands a second."""
 
     ending: Ending
     after: Apex | None
@@ -132,57 +136,56 @@ def hop(leg: TaylorLeg, drive: AbstractDrive, start: Apex) -> Hop:
     Raises:
         ConfigError: a start below the ground.
     """
-    course = leg.course
+    course, (p1, p2) = leg.course, drive.probe
     _launch(course, start)
     touchdown = liftoff = math.nan
-    lost, landed, flew, ending = 0.0, False, False, None
+    apex, landed, ending = math.inf, False, FAULT
     try:
-        for _ in range(CALLS):
-            what, ending = _pause(course, drive, flew=flew)
-            if ending is not None:
+        for _ in BUDGET:
+            alarm = drive.alarm
+            until = alarm if alarm < HORIZON else HORIZON
+            if course.time <= apex <= until:
+                until = apex
+            if drive.motor is not course.motor:
+                course.hold(drive.motor)
+            what = course.go(until, drive.levels)
+            if what is CONTACT:
+                course.switch()
+                drive.stands = not course.compiled.flies
+                if not drive.stands:
+                    liftoff, apex = course.time, course.apex_time()
+                else:
+                    touchdown, landed = touchdown if landed else course.time, True
+                    apex = math.inf
+            elif what is FELL:
+                ending = Ending.FELL
                 break
-            if what is None:
-                drive.on_alarm(_probe(drive, course.q), course.time)
-            elif what is not CONTACT:
-                drive.on_event(what, _probe(drive, course.q), course.time)
-            elif course.compiled.flies:
-                lost += _kinetic(course)
-                course.switch()
-                lost -= _kinetic(course)
-                touchdown, landed = touchdown if landed else course.time, True
+            elif what is not None:
+                q1, q2 = course.q
+                drive.on_event(what, p1 * q1 + p2 * q2, course.time)
+            elif course.time >= alarm:
+                q1, q2 = course.q
+                drive.on_alarm(p1 * q1 + p2 * q2, course.time)
             else:
-                course.switch()
-                liftoff, flew = course.time, True
+                ending = _end(drive, course.time, reached=until == apex)
+                break
     except PlantFault:
-        ending = Ending.FAULT
+        ending = FAULT
     return Hop(
-        ending=ending or Ending.FAULT,
-        after=_reached(course) if ending is Ending.APEX else None,
+        ending=ending,
+        after=_reached(course) if ending is APEX else None,
         duration=course.time,
         touchdown=touchdown,
         liftoff=liftoff,
-        impact=lost,
+        impact=course.lost,
     )
 
 
-def _pause(
-    course: Course, drive: AbstractDrive, *, flew: bool
-) -> tuple[Watched | None, Ending | None]:
-    """Go on to the next event, alarm or ending; `flew` if the leg has lifted off."""
-    alarm = drive.alarm
-    until = alarm if alarm < HORIZON else HORIZON
-    apex = course.apex_time() if flew and course.compiled.flies else math.inf
-    if course.time <= apex <= until:
-        until = apex
-    course.hold(drive.motor)
-    what = course.go(until, drive.levels())
-    if what is FELL:
-        return what, Ending.FELL
-    if what is not None or course.time >= alarm:
-        return what, None
-    if until == apex:
-        return what, Ending.APEX if drive.settled else Ending.FAULT
-    return what, Ending.STANDS
+def _end(drive: AbstractDrive, time: float, *, reached: bool) -> Ending:
+    """How a hop ends at its horizon, or at an apex that it has `reached`."""
+    if not reached:
+        return Ending.STANDS
+    return APEX if drive.settled(time) else FAULT
 
 
 def _launch(course: Course, start: Apex) -> None:
@@ -192,7 +195,7 @@ def _launch(course: Course, start: Apex) -> None:
         ConfigError: the foot would be below the ground.
     """
     q, v = start.angles()
-    if start.height + course.foot_from_centre(q)[1] < 0.0:
+    if start.height + course.foot_height(q) < 0.0:
         start.state(course.model)  # says so
     course.fly(q, v, (0.0, start.height), (start.speed, 0.0), 2.0 * FALLEN)
 
@@ -201,20 +204,6 @@ def _reached(course: Course) -> Apex:
     """Apex of a leg that has reached it."""
     (_, height), (speed, _) = course.centre()
     return Apex.at(height, speed, course.q, course.v)
-
-
-def _kinetic(course: Course) -> float:
-    """Kinetic energy of a leg in flight or stance [J]."""
-    model, ops = course.model, course.model.ops
-    if not course.compiled.flies:
-        return pair_kinetic(ops, model.stance, course.q, course.v)
-    dx, dz = course.centre()[1]
-    own = 0.5 * model.floating.mass * (dx * dx + dz * dz)
-    return own + pair_kinetic(ops, model.falling, course.q, course.v)
-
-
-def _probe(drive: AbstractDrive, q: Pair) -> float:
-    return drive.probe[0] * q[0] + drive.probe[1] * q[1]
 
 
 def return_map(leg: TaylorLeg, drive: AbstractDrive, start: Apex) -> Hop:

@@ -31,7 +31,7 @@ def write_paths(paths: list[OrbitPath], path: Path) -> None:
     }
     columns |= {name: pa.array(rows[:, place]) for place, name in enumerate(COLUMNS)}
     sink = pa.BufferOutputStream()
-    parquet.write_table(pa.table(columns), sink)
+    parquet.write_table(pa.table(columns), sink, write_page_checksum=True)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, sink.getvalue().to_pybytes())

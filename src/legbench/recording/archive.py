@@ -10,6 +10,7 @@ from pyarrow import parquet
 
 from legbench.errors import RecordingError
 from legbench.recording.layout import ARCHIVE
+from legbench.recording.sealed import UNREADABLE, opened, seal
 from legbench.recording.stream import WholeBatches, carrying, schema_for
 from legbench.writing import put_in_place, reason
 
@@ -58,10 +59,13 @@ def _write(draft: Path, batches: WholeBatches, schema: pa.Schema) -> int:
         compression="zstd",
         use_dictionary=False,
         column_encoding=column_encodings(schema),
+        write_page_checksum=True,
     ) as writer:
         for group in _groups(batches, schema):
             writer.write_table(group)
             rows += group.num_rows
+    with draft.open("r+b") as file:
+        seal(file)
     return rows
 
 
@@ -92,7 +96,7 @@ def _groups(batches: WholeBatches, schema: pa.Schema) -> Iterator[pa.Table]:
 
 def count_rows(path: Path) -> int:
     """Return the rows of a Parquet file by decoding all of them; raises as pyarrow does."""
-    with parquet.ParquetFile(str(path)) as file:
+    with opened(path) as file:
         return sum(batch.num_rows for batch in file.iter_batches(batch_size=GROUP_ROWS))
 
 
@@ -105,12 +109,13 @@ def read_archive(run: Path) -> pa.Table:
     path = run / ARCHIVE
     try:
         # Not `read_table`, which imports pyarrow's datasets: slow, and of no use to one file.
-        with parquet.ParquetFile(str(path)) as file:
+        with opened(path) as file:
             return file.read()
-    except (OSError, pa.ArrowException) as error:
+    except UNREADABLE as error:
         raise RecordingError(f"{path} is damaged: {reason(error)}") from error
 
 
 def read_schema(run: Path) -> pa.Schema:
     """Return the schema of the archive, with the manifest in its metadata; raises as pyarrow."""
-    return parquet.read_schema(str(run / ARCHIVE))
+    with opened(run / ARCHIVE) as file:
+        return file.schema_arrow

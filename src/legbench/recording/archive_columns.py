@@ -10,11 +10,11 @@ from weakref import finalize
 
 import numpy as np
 import pyarrow as pa
-from pyarrow import parquet
 
 from legbench.errors import RecordingError
 from legbench.recording.archive import write_archive
 from legbench.recording.layout import ARCHIVE
+from legbench.recording.sealed import UNREADABLE, opened
 from legbench.recording.stream import WholeBatches
 from legbench.writing import reason
 
@@ -36,10 +36,10 @@ class ArchiveColumns(Mapping[str, np.ndarray]):
         """Read the footer of the archive at a path."""
         self._path = path
         try:
-            with parquet.ParquetFile(str(path)) as file:
+            with opened(path) as file:
                 self.schema: pa.Schema = file.schema_arrow
                 self.rows: int = file.metadata.num_rows
-        except (OSError, pa.ArrowException) as error:
+        except UNREADABLE as error:
             raise RecordingError(f"{path} is damaged: {reason(error)}") from error
 
     def __getitem__(self, name: str) -> np.ndarray:
@@ -47,9 +47,11 @@ class ArchiveColumns(Mapping[str, np.ndarray]):
         if name not in self.schema.names:
             raise KeyError(name)
         try:
-            with parquet.ParquetFile(str(self._path)) as file:
-                return column_values(file.read([name])[name])
-        except (OSError, pa.ArrowException) as error:
+            with opened(self._path) as file:
+                values = column_values(file.read([name])[name])
+            self._require_every_row(len(values))
+            return values
+        except UNREADABLE as error:
             raise RecordingError(f"{self._path} is damaged: {reason(error)}") from error
 
     def __contains__(self, name: object) -> bool:
@@ -63,13 +65,21 @@ class ArchiveColumns(Mapping[str, np.ndarray]):
 
     def windows(self, rows: int) -> Iterator[dict[str, np.ndarray]]:
         """All columns of consecutive rows, at most `rows` of them at a time."""
+        found = 0
         try:
-            with parquet.ParquetFile(str(self._path)) as file:
+            with opened(self._path) as file:
                 for batch in file.iter_batches(batch_size=rows):
                     table = pa.Table.from_batches([batch])
                     yield {name: column_values(table[name]) for name in table.column_names}
-        except (OSError, pa.ArrowException) as error:
+                    found += batch.num_rows
+            self._require_every_row(found)
+        except UNREADABLE as error:
             raise RecordingError(f"{self._path} is damaged: {reason(error)}") from error
+
+    def _require_every_row(self, found: int) -> None:
+        """Refuse a column that ends early, as at a page whose kind is none; raises OSError."""
+        if found != self.rows:
+            raise OSError(f"it gave back {found} of {self.rows} rows")
 
 
 @final

@@ -1,7 +1,7 @@
 """Making a torn run whole: every whole batch kept, every torn byte set aside, nothing lost."""
 
 import os
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from legbench.recording.files import lock
 from legbench.recording.layout import ARCHIVE, COMPLETE, RECOVERED, RUNNING, STREAM, TIME, TORN
 from legbench.recording.manifest import Manifest, read_manifest, write_manifest
 from legbench.recording.reader import run_folder
+from legbench.recording.sealed import UNREADABLE
 from legbench.recording.stream import WholeBatches, carried_manifest
 from legbench.writing import reason
 
@@ -80,7 +81,7 @@ def recover(path: Path) -> RecoveryReport:
             return _recover(run)
         except RecordingError:
             raise
-        except (OSError, pa.ArrowException) as error:
+        except UNREADABLE as error:
             raise RecordingError(f"{run} could not be recovered: {reason(error)}") from error
 
 
@@ -145,10 +146,11 @@ def _ended(manifest: Manifest, found: _Finding) -> Manifest:
 
 
 def _archive(run: Path, found: _Finding, manifest: Manifest) -> None:
-    """Write the archive, unless one with every row of the stream is there already."""
+    """Write the archive, unless a whole one with every row of the stream is there already."""
     path = run / ARCHIVE
-    if path.is_file() and count_rows(path) >= found.rows:
-        return
+    with suppress(*UNREADABLE):  # A damaged one is written anew.
+        if path.is_file() and count_rows(path) >= found.rows:
+            return
     write_archive(run, WholeBatches(run / STREAM), manifest)
 
 

@@ -21,6 +21,7 @@ from legbench.recording.events import encode_event
 from legbench.recording.layout import ARCHIVE, EVENTS
 from legbench.recording.manifest import write_manifest
 from legbench.recording.reader import Recording
+from legbench.recording.sealed import seal
 from legbench.recording.stream import schema_for
 from legbench.writing import put_in_place, reason
 
@@ -74,5 +75,8 @@ def _write_samples(recording: Recording, left_out: Sequence[str], path: Path) ->
         compression_level=LEVEL,
         use_dictionary=False,
         column_encoding=column_encodings(table.schema),
+        write_page_checksum=True,
     )
+    with draft.open("r+b") as file:
+        seal(file)
     put_in_place(draft, path)

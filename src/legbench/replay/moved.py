@@ -13,6 +13,8 @@ from legbench.signals import Command, Floats
 
 STILL: Final = 1e-3
 """Way of a motor from its first position that ends the rest before a run's first action [rad]."""
+SAME: Final = 1e-9
+"""Difference below which two readings are the same count, computed twice [rad]."""
 MOST_REST: Final = 500
 """Largest number of rows at rest that are looked at."""
 
@@ -35,6 +37,8 @@ class Moved:
         stale: rows in which each drive had not answered, so that its last answer is repeated
             (n, 2).
         first: positions of the motors before the first row (2,) [rad].
+        measured: whether the motors go where they were measured.
+        joint_pos: measured link angles (n, 2) [rad].
     """
 
     def __init__(self, recording: Recording, source: MotionSource) -> None:
@@ -44,7 +48,7 @@ class Moved:
             ConfigError: its commands were never sent.
             RecordingError: it does not know its motors in every row.
         """
-        run, self._measured = recording.description, source is MotionSource.MOTORS
+        run, self.measured = recording.description, source is MotionSource.MOTORS
         self.on_drives = run.plant == DRIVES
         if source is MotionSource.COMMANDS and run.looks_only:
             raise ConfigError(
@@ -53,7 +57,7 @@ class Moved:
             )
         self._command = recording["command_pos"]
         self._sent = recording["applied_pos"] if self.on_drives else None
-        needed = recording["motor_pos"] if self._measured else self._command
+        needed = recording["motor_pos"] if self.measured else self._command
         if not np.isfinite(needed).all():
             raise RecordingError(
                 f"{recording.path} does not know its {source.value} in every row: it cannot be "
@@ -62,13 +66,13 @@ class Moved:
         self.stale = unanswered(recording)
         self._motor_pos = between_answers(recording["motor_pos"], self.stale)
         known = run.initial_state
-        measured = self.on_drives and self._measured
+        measured = self.on_drives and self.measured
         start = None if known is None or measured else np.array(known.motor_pos)
         self.first: Floats = self._motor_pos[0] if start is None else start
         names = [signal.name for signal in run.layout.own]
         own = [recording[name].reshape(len(needed), -1) for name in names]
         self._own = np.concatenate(own, axis=1) if own else None
-        self._phase, self._joint_pos = recording["phase"], recording["joint_pos"]
+        self._phase, self.joint_pos = recording["phase"], recording["joint_pos"]
 
     def command(self, row: int) -> Command:
         """Command of a row as it was recorded."""
@@ -78,7 +82,7 @@ class Moved:
 
     def between(self, row: int, steps: int) -> Iterator[Floats]:
         """Positions (2,) on the way from a row to the next one, in a number of steps [rad]."""
-        if not self._measured:
+        if not self.measured:
             # What the limits let through of a command is recorded in the row after it.
             sent = self._command[row] if self._sent is None else self._sent[row + 1]
             yield from (sent for _ in range(steps))
@@ -88,8 +92,16 @@ class Moved:
             yield start + (step / steps) * (end - start)
         yield end
 
+    @property
+    def count(self) -> float | None:
+        """Count of the link encoders [rad], the smallest difference of two readings; none if
+        nothing was read but one value.
+        """
+        apart = np.concatenate([np.diff(np.unique(each)) for each in self.joint_pos.T])
+        return float(apart.min()) if len(apart := apart[apart > SAME]) else None
+
     def rest(self) -> Floats:
         """Link angles of the rows before the motors first move (m, 2) [rad]."""
         away = np.any(np.abs(self._motor_pos - self._motor_pos[0]) > STILL, axis=1)
         rows = int(np.argmax(away)) if away.any() else len(away)
-        return self._joint_pos[: min(rows, MOST_REST)]
+        return self.joint_pos[: min(rows, MOST_REST)]

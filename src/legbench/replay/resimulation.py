@@ -1,6 +1,6 @@
 """Recorded commands, or measured motor positions, through a plant in virtual time."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -26,6 +26,8 @@ from legbench.replay.comparison import Replayed, columns_of
 from legbench.replay.moved import MotionSource, Moved
 from legbench.replay.observations import exact_times, require_every_row
 from legbench.replay.recorded import RecordedLeg
+from legbench.replay.start_estimate import StartEstimate
+from legbench.replay.start_search import find_start
 from legbench.servo import ServoConfig
 from legbench.signals import Bools, Command, Floats
 
@@ -43,9 +45,6 @@ RESPONSES: Final = (
     "loop_gap",
 )
 """Signals of a plant that answer to its motors."""
-LONGEST_REST: Final = 2.0
-"""Longest time for which a leg that was on drives stands before its first row [s]: it is put to
-rest by its equations, from which bars and encoders keep it some counts away, and swings out."""
 MOVING: Final = 0.1
 """Link speed above which a run begins in motion [rad/s]; plants begin at rest."""
 FIRST_ROWS: Final = 20
@@ -95,7 +94,11 @@ def resimulate(
     run = MemoryRun(_manifest(recording, leg), name=f"resimulated-{recording.path.name}")
     with opened.plant as plant:
         _require_virtual(opened, leg)
-        fault = _drive(plant, moved, times, run, progress)
+        steps = np.maximum(1, np.round(np.diff(times) / plant.period)).astype(int).tolist()
+        start = None
+        if moved.on_drives:
+            start = _guarded(lambda: find_start(plant, moved, steps), 0.0)
+        fault = _drive(plant, moved, start, (times, steps), run, progress)
     if fault is not None and run.rows == 0:
         raise fault
     run.close(COMPLETE if fault is None else FAULT, None if fault is None else fault.cause)
@@ -105,7 +108,7 @@ def resimulate(
         recording=given,
         signals=_compared(recording, given, moved.stale),
         fault=None if fault is None else str(fault),
-        notes=tuple(_notes(recording, moved)),
+        notes=tuple(_notes(recording, moved, start)),
     )
 
 
@@ -118,8 +121,14 @@ def _require_virtual(opened: OpenPlant, leg: RecordedLeg) -> None:
         )
 
 
-def _notes(recording: Recording, moved: Moved) -> Iterator[str]:
+def _notes(recording: Recording, moved: Moved, start: StartEstimate | None) -> Iterator[str]:
     """Sentences about what the run does not tell."""
+    if start is not None and start.rows is not None:
+        until = float(recording.time[start.rows - 1] - recording.time[0])
+        yield (
+            f"how the leg swung at its start was estimated from its links in the first {until:.3g} "
+            "s: an error of it grows from hop to hop"
+        )
     unanswered = moved.stale.sum(axis=0).tolist()
     if any(unanswered):
         yield (
@@ -176,22 +185,35 @@ def _without_limits(plant: PlantSettings) -> PlantSettings:
 
 
 def _drive(
-    plant: AbstractPlant, moved: Moved, times: Floats, run: MemoryRun, progress: Progress | None
+    plant: AbstractPlant,
+    moved: Moved,
+    start: StartEstimate | None,
+    grid: tuple[Floats, Sequence[int]],
+    run: MemoryRun,
+    progress: Progress | None,
 ) -> PlantFault | None:
-    """Step the plant from row to row; returns the fault that ended it early."""
+    """Step the plant from row to row; returns the fault that ended it early.
+
+    Args:
+        plant: the leg.
+        moved: rows of the run.
+        start: what the motors do before the first of them, none if the leg begins at rest.
+        grid: time of each row (n,) [s], and number of periods from each to the next (n - 1).
+        run: where the rows go.
+        progress: told now and then how far it is.
+    """
+    times, steps = grid
     count = len(times)
-    hold = Command.holding(moved.first)
     try:
         seen = _guarded(plant.reset, 0.0)
-        if moved.on_drives:
-            for _ in range(_periods_at_rest(plant, moved, hold)):
-                seen = _guarded(lambda: plant.step(hold), 0.0)
+        for motor_pos in () if start is None else start.motor_pos():
+            hold = Command.holding(motor_pos)
+            seen = _guarded(lambda hold=hold: plant.step(hold), 0.0)
         for row, time in enumerate(times.tolist()):
             command = moved.command(row)
             run.append(command, replace(seen, time=time), 0.0, 0.0)
             if row + 1 < count:
-                steps = max(1, round((times[row + 1] - time) / plant.period))
-                for motor_pos in moved.between(row, steps):
+                for motor_pos in moved.between(row, steps[row]):
                     sent = Command(motor_pos=motor_pos, phase=command.phase)
                     seen = _guarded(lambda sent=sent: plant.step(sent), time)
             if progress is not None and ((row + 1) % PROGRESS_EVERY == 0 or row + 1 == count):
@@ -199,19 +221,6 @@ def _drive(
     except PlantFault as fault:
         return fault
     return None
-
-
-def _periods_at_rest(plant: AbstractPlant, moved: Moved, hold: Command) -> int:
-    """Number of periods after which a leg that stands fits the first rows of a run best.
-
-    A leg on drives has stood for a while when its run begins, how long is not recorded; it swings
-    by some counts of its encoders, which a jump enlarges a hundred times. The plant is reset.
-    """
-    rest, most = moved.rest(), round(LONGEST_REST / plant.period)
-    swing = np.array([plant.step(hold).joint_pos for _ in range(most + len(rest))])
-    plant.reset()
-    apart = [np.sum((swing[first : first + len(rest)] - rest) ** 2) for first in range(most)]
-    return most if np.isnan(apart).any() else 1 + int(np.argmin(apart))
 
 
 def _guarded(act: Callable[[], Any], time: float) -> Any:
