@@ -21,13 +21,14 @@ import random
 import re
 import sys
 import tomllib
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 os.environ.update(OPENBLAS_NUM_THREADS="1", OMP_NUM_THREADS="1")
+from choosing import BUDGET, at_import, file_of, imports, in_function, runs_at_import, span
 from edits import Mutation, mutations
-from tracing import CACHE, PACKAGE, ROOT, Passed, Timed, digest
+from tracing import CACHE, PACKAGE, ROOT, Passed, digest
 from trial import Fault, Trials, prepare
 
 EQUIVALENT = Path(__file__).with_name("equivalent.toml")
@@ -54,71 +55,6 @@ STRICT = (
 """Files of the package that a stop depends on: 97 % must be noticed there, 93 % elsewhere."""
 STRICT_BOUND, BOUND = 0.97, 0.93
 ROOMS = ("limits", "drives", "commissioning", "recording", "metrics")
-BUDGET = 4.0
-"""Tests that run a changed line are tried for so long, timed under the trace [s]."""
-IMPORTING_FILES = 8
-"""A fault that an import runs is tried with the tests of so many files."""
-
-
-def _span(tree: ast.Module, line: int) -> tuple[int, int]:
-    """First and last line of the statement at a line; of one that holds others, its head."""
-    first, last = line, line
-    for node in ast.walk(tree):
-        if isinstance(node, ast.stmt) and node.lineno <= line <= (node.end_lineno or 0):
-            body = getattr(node, "body", None)
-            end = body[0].lineno - 1 if body else node.end_lineno
-            if end is not None and end >= line and node.lineno >= first - 30:
-                first, last = node.lineno, max(end, node.lineno)
-    return first, last
-
-
-def _affordable(tests: Iterable[Timed], before: Collection[str] = ()) -> list[Timed]:
-    """The fastest of some tests, those of some files before all others, for a budget's time."""
-    reached = sorted(tests, key=lambda test: (_file_of(test) not in before, test.seconds))
-    spent = itertools.accumulate(test.seconds for test in reached)
-    kept = [test for test, so_far in zip(reached, spent, strict=True) if so_far <= BUDGET]
-    # Tests of one speed and file stay together, so that their fixtures are made once.
-    return sorted(
-        kept, key=lambda test: (sum(test.seconds > s for s in (0.03, 0.3, 1.0)), test.name)
-    )
-
-
-def _in_function(tests: Sequence[Passed], module: str, first: int, last: int) -> list[Timed]:
-    return _affordable(passed.test for passed in tests if passed.runs(module, first, last))
-
-
-def _at_import(tests: Sequence[Passed], module: str, name: str) -> list[Timed]:
-    """Tests of a module, of those files first that say the name that is changed, or import it."""
-    seconds: dict[str, float] = {}
-    for passed in tests:
-        if module in passed.lines:
-            file = _file_of(passed.test)
-            seconds[file] = seconds.get(file, 0.0) + passed.test.seconds
-    every = {_file_of(passed.test) for passed in tests}
-    near = {file for file in every if _imports(ROOT / file, module)}
-    named = {file for file in near | seconds.keys() if _says(ROOT / file, name)}
-
-    def order(file: str) -> tuple[bool, bool, float]:
-        return file not in named, file not in near, seconds.get(file, 0.0)
-
-    chosen = sorted(near | seconds.keys(), key=order)[:IMPORTING_FILES]
-    return _affordable((p.test for p in tests if _file_of(p.test) in chosen), named)
-
-
-def _says(file: Path, name: str) -> bool:
-    return re.search(rf"\b{re.escape(name)}\b", file.read_text()) is not None
-
-
-def _file_of(test: Timed) -> str:
-    return test.name.split("::")[0]
-
-
-def _imports(file: Path, module: str) -> bool:
-    """Whether a file of tests imports a module of the package by its name."""
-    name = "legbench." + module.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
-    room, _, last = name.rpartition(".")
-    text = file.read_text()
-    return bool(re.search(rf"\b{name}\b|from {room} import .*\b{last}\b", text))
 
 
 def _equivalent(module: str) -> dict[tuple[str, str, str], str]:
@@ -142,23 +78,27 @@ def _sample(path: Path, seed: int, count: int) -> list[Mutation]:
     return [edit for edit, key in drawn if key not in known][:count]
 
 
-def _faults(path: Path, edits: Sequence[Mutation], tests: Sequence[Passed]) -> list[Fault]:
+def _faults(
+    path: Path, edits: Sequence[Mutation], tests: Sequence[Passed], budget: float
+) -> list[Fault]:
     source, module = path.read_text(), path.relative_to(PACKAGE).as_posix()
     tree = ast.parse(source)
     faults: list[Fault] = []
     for edit in edits:
         line = edit.line_number(source)
         before, after = edit.lines(source)
-        if edit.at_import:
+        importing = edit.at_import or runs_at_import(tree, tests, module, line)
+        if importing:
             # The constant, field or member that a line begins with.
-            chosen = _at_import(tests, module, before.split(maxsplit=1)[0].rstrip(":,"))
+            name = re.findall(r"\w+", before)[0]
+            chosen = at_import(tests, budget, module, name, edit.scope)
         else:
-            chosen = _in_function(tests, module, *_span(tree, line))
+            chosen = in_function(tests, budget, module, *span(tree, line))
         place = f"{path.relative_to(ROOT)}:{line} {edit.scope}"
         fault = Fault(
             path=path,
             changed=edit.apply(source),
-            scope="" if edit.at_import else edit.scope,
+            scope="" if importing else edit.scope,
             line=line,
             text=f"{place}\n  - {before}\n  + {after}",
             tests=chosen,
@@ -195,14 +135,16 @@ def _key(fault: Fault) -> tuple[str, str]:
 
 
 def _state(fault: Fault) -> str:
-    files = {ROOT / _file_of(test) for test in fault.tests}
+    files = {ROOT / file_of(test) for test in fault.tests}
     return digest(files)[:12] if files else "-"
 
 
-def _try_file(path: Path, edits: Sequence[Mutation], trials: Trials, results: _Results) -> bool:
+def _try_file(
+    path: Path, edits: Sequence[Mutation], trials: Trials, results: _Results, budget: float
+) -> bool:
     """Print the score of a file and what was not noticed; whether its bound is kept."""
     name, module = path.relative_to(ROOT), path.relative_to(PACKAGE).as_posix()
-    faults = _faults(path, edits, trials.tests)
+    faults = _faults(path, edits, trials.tests, budget)
     seen: list[str] = []
     fresh: list[tuple[Fault, str]] = []
     for fault in faults:
@@ -249,7 +191,7 @@ def _tests_of(path: Path) -> tuple[Path, ...]:
 
 def _near(suite: Sequence[Path], paths: Sequence[Path]) -> list[Path]:
     modules = [path.relative_to(PACKAGE).as_posix() for path in paths]
-    return [file for file in suite if any(_imports(file, module) for module in modules)]
+    return [file for file in suite if any(imports(file, module) for module in modules)]
 
 
 def _files(names: Sequence[str]) -> list[Path]:
@@ -268,6 +210,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1, help="of the sample")
     parser.add_argument("--tests", nargs="+", type=Path, help="these files only, not the room")
     parser.add_argument("--near", action="store_true", help="only tests that import a file")
+    parser.add_argument("--budget", type=float, default=BUDGET, metavar="S", help="of a fault")
     parser.add_argument("--results", type=Path, default=CACHE / "results.txt", help="text file")
     chosen = parser.parse_args()
     named = tuple((ROOT / file).resolve() for file in chosen.tests or ())
@@ -282,7 +225,7 @@ def main() -> int:
         trials = Trials(_near(suite, paths) if chosen.near else suite)
         try:
             for path in paths:
-                kept = _try_file(path, samples[path], trials, results) and kept
+                kept = _try_file(path, samples[path], trials, results, chosen.budget) and kept
         finally:
             trials.close()
     return int(not kept)

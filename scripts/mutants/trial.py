@@ -28,9 +28,10 @@ HEAVY = (
     *("can", "canopen", "durand", "serial", "numpy", "scipy.integrate", "pyarrow.parquet"),
     *("mujoco", "tyro", "hypothesis", "_hypothesis_pytestplugin", "unittest.mock", "pdb"),
 )
-TIMES, GRACE = 3.0, 5.0
-"""A child may take this many times the time of its tests without faults, and this long more [s]."""
-COLLECTING = 15.0
+TIMES, GRACE = 1.0, 2.0
+"""A child may take this many times the time of its tests without faults, and this long more [s].
+That time was taken under the trace, which makes it two to four times as long."""
+COLLECTING = 8.0
 """The time that it may take to import and to collect the files of a few tests [s]."""
 UNNOTICED = (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED)
 NOT_SO = 71
@@ -131,6 +132,7 @@ class _Serve:
     def __init__(self, wishes: Connection, failed: Path) -> None:
         self._wishes = wishes
         self._failed = failed
+        self._trials = 0
 
     def pytest_sessionstart(self) -> None:
         """A failing example is enough, it need not be the smallest."""
@@ -145,6 +147,10 @@ class _Serve:
         gc.freeze()
         self._wishes.send(None)
         while (wish := self._wishes.recv()) is not None:
+            self._trials += 1
+            files = self._failed.with_name(f"s{self._trials}")
+            # What an earlier child left running may still write where its tests had their files.
+            vars(session.config)["_tmp_path_factory"]._given_basetemp = files
             if isinstance(wish, Fault):
                 chosen = [items[test.name] for test in wish.tests]
                 seconds = GRACE + TIMES * sum(test.seconds for test in wish.tests)
@@ -153,6 +159,7 @@ class _Serve:
             else:
                 chosen = [item for item in session.items if item.path == wish]
                 self._wishes.send(in_fork(_trace_and_save(wish, chosen), 600.0))
+            shutil.rmtree(files, ignore_errors=True)
         return True
 
 
@@ -219,7 +226,9 @@ def _pytest(folder: Path, files: Iterable[str], plugin: object, *more: str) -> i
     os.chdir(ROOT)
     # A failure is not explained, only noticed: that takes ten times as long as to find it.
     usual = ["-q", "--assert=plain", "--tb=native", "-p", "no:cacheprovider", *more]
-    return pytest.main([*usual, f"--basetemp={folder / 't'}", *files], plugins=[plugin])
+    return pytest.main(
+        [*usual, f"--basetemp={folder / f't{os.getpid()}'}", *files], plugins=[plugin]
+    )
 
 
 class Trials:
@@ -272,12 +281,13 @@ class Trials:
         if status == NOT_SO:
             seconds = COLLECTING + TIMES * sum(test.seconds for test in fault.tests)
             status = in_fork(lambda: self._import_and_run(fault), seconds)
-        if status in UNUSABLE:
-            sys.exit(f"{fault.path}: pytest ended with {status} under {fault.text}")
         if status in UNNOTICED:
             return None
+        # What a test leaves may fail, too, when it is taken down.
         if self._failed.exists():
             return self._failed.read_text()
+        if status in UNUSABLE:
+            sys.exit(f"{fault.path}: pytest ended with {status} under {fault.text}")
         return TIME if status is None else IMPORT
 
     def _import_and_run(self, fault: Fault) -> int:

@@ -1,7 +1,7 @@
 """The bring-up question by question, with two drives that are no more than a table of objects."""
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import can
 import pytest
@@ -9,10 +9,13 @@ from drives_rig import MS, config, node
 from object_tables import NO_OBJECT, Objects
 
 from legbench.drives.errors import BusError, DriveError, SdoAbortError
+from legbench.drives.master.bring_up import BringUp
+from legbench.drives.master.port import Port
 from legbench.drives.protocol.datatypes import DataType, pack
 from legbench.drives.protocol.pdo import Mapped
 from legbench.drives.setup.configuration import configuration
 from legbench.drives.setup.needs import Need, row_of
+from legbench.drives.setup.quirks import Quirks
 
 NAMES = ("hip", "knee")
 NO_SUB_INDEX, GENERAL, HARDWARE = 0x06090011, 0x08000000, 0x06060000
@@ -239,6 +242,31 @@ def test_a_mode_that_lags_is_waited_for_50_times_10_ms(place: int) -> None:
             up.configure(node(place))
         # A look and a rest, fifty times, and the look that comes too late.
         assert it.time_ns - began[0] == 50 * (10 * MS + MS // 10) + MS // 10
+
+
+@pytest.mark.parametrize("place", [0, 1])
+def test_patience_with_a_mode_ends_with_its_last_nanosecond(place: int) -> None:
+    slow = replace(node(place), quirks=Quirks(mode_patience_ms=91))
+    it = Objects()
+    configurable(it, place)
+    it.tables[place][0x6061, 0] = 6
+    with pytest.raises(DriveError, match=r"stays in mode 6 .* for 91 ms"):
+        it.bring_up().configure(slow)
+    # An answer after 0.1 ms, and nine times 10.1 ms until the next: 91 ms to the nanosecond.
+    assert it.asked.count((place, 0x6061, 0)) == 10
+
+
+def test_frames_that_have_come_by_now_are_passed_on() -> None:
+    it = Objects()
+    came = [
+        can.Message(arbitration_id=cob_id, data=b"\x05", is_extended_id=False)
+        for cob_id in (0x702, 0x701, 0x282)
+    ]
+    waiting, heard = list(came), list[can.Message]()
+    take: Any = lambda timeout=None: waiting.pop(0) if waiting else None  # noqa: E731
+    it.recv = take
+    BringUp(Port(cast(Any, it), it), config(), heard.append).poll_frames()
+    assert heard == came
 
 
 # --- power and warmth ------------------------------------------------------------------------

@@ -1,12 +1,15 @@
 """SocketCAN interfaces, as the kernel and `ip` describe them."""
 
 import json
+import subprocess
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from drives_rig import config
 
 from legbench.drives.errors import BusError
+from legbench.drives.transport import interface as interface_module
 from legbench.drives.transport import open_bus
 from legbench.drives.transport.interface import ask_ip, bitrate_of, check_interface
 from legbench.drives.transport.open_bus import Adapter
@@ -61,6 +64,32 @@ def test_the_real_tools_of_this_machine_are_asked_and_may_be_missing(
     assert bitrate_of(ask_ip("lo")) is None
     monkeypatch.setenv("PATH", "")
     assert ask_ip("lo") == ""
+
+
+def test_an_interface_of_which_nothing_is_told_is_brought_up_with_a_bitrate(tmp_path: Path) -> None:
+    system = interface(tmp_path, DOWN)
+    for text in ("", "{", "[]", '[{"linkinfo": null}]'):
+        words = "ip link set can0 up type can bitrate 1000000 restart-ms 100`$"
+        with pytest.raises(BusError, match=words):
+            check_interface(config(), "can0", system, lambda _, text=text: text)
+
+
+@pytest.mark.parametrize("failure", [None, OSError(), subprocess.TimeoutExpired("ip", 5.0)])
+def test_the_tool_is_asked_once_and_waited_for_5_s(
+    failure: Exception | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[tuple[tuple[str, ...], dict[str, object]]] = []
+
+    def answer(command: tuple[str, ...], **how: object) -> SimpleNamespace:
+        asked.append((command, how))
+        if failure is not None:
+            raise failure
+        return SimpleNamespace(stdout="told", returncode=1)
+
+    monkeypatch.setattr(interface_module.subprocess, "run", answer)
+    assert ask_ip("can0") == ("told" if failure is None else "")
+    how = {"capture_output": True, "text": True, "timeout": 5.0, "check": False}
+    assert asked == [(("ip", "-json", "-details", "link", "show", "can0"), how)]
 
 
 def test_it_is_looked_at_before_it_is_opened(monkeypatch: pytest.MonkeyPatch) -> None:

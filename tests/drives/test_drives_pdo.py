@@ -70,6 +70,13 @@ def test_maps_that_cannot_be_are_refused() -> None:
         PdoMap([Mapped(0x6077, 0, DataType.INTEGER16)]).pack([1, 2])
 
 
+def test_the_object_whose_value_does_not_fit_is_named_among_those_that_do() -> None:
+    layout = PdoMap([Mapped(0x6040, 0, DataType.UNSIGNED16), Mapped(0x607A, 0, DataType.INTEGER32)])
+    for fits in (0, 0xFFFF):
+        with pytest.raises(CodecError, match=r"^2147483648 does not fit 607Ah:00; it holds -2"):
+            layout.pack([fits, 1 << 31])
+
+
 def test_mapping_words_of_the_standard() -> None:
     assert Mapped(0x6040, 0, DataType.UNSIGNED16).word == 0x60400010
     assert Mapped(0x607A, 0, DataType.INTEGER32).word == 0x607A0020

@@ -201,6 +201,35 @@ def test_the_ends_themselves_are_reached(
     assert check(monkeypatch, limits, START, place, by) is None
 
 
+def ending_at(value: float, gap: float) -> float:
+    """The number that with a gap makes a value to the last bit."""
+    guess = value - gap
+    near = (guess, math.nextafter(guess, math.inf), math.nextafter(guess, -math.inf))
+    return next(number for number in near if number + gap == value)
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_what_may_be_outside_before_a_jog_is_2_mrad_and_not_less(
+    side: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    units = [node.motor for node in BENCH.nodes]
+    there = [one.to_rad(one.to_counts(at)) for one, at in zip(units, START, strict=True)]
+    inward: Any = {"place": 1, "by": -0.01 * side}
+    for knee in (False, True):
+        value = there[1] - there[0] if knee else there[1]
+        end = ending_at(value, 0.002 * side)
+        one = (end, 9.0) if side < 0 else (-9.0, end)
+        wide = (-9.0, 9.0)
+        ranges = [wide, wide] if knee else [wide, one]
+        limits: Any = SimpleNamespace(motor_range=ranges, motor_knee_range=one if knee else wide)
+        assert check(monkeypatch, limits, START, **inward) is None
+        beyond = math.nextafter(end, -side * math.inf)
+        ranges[1] = wide if knee else (beyond, 9.0) if side < 0 else (-9.0, beyond)
+        if knee:
+            limits.motor_knee_range = (beyond, 9.0) if side < 0 else (-9.0, beyond)
+        assert check(monkeypatch, limits, START, **inward) is not None
+
+
 def test_limits_of_another_number_of_motors_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     limits: Any = SimpleNamespace(motor_range=[(-9.0, 9.0)], motor_knee_range=(-9.0, 9.0))
     with pytest.raises(ValueError, match="zip"):

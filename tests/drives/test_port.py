@@ -340,3 +340,22 @@ def test_a_value_of_another_type_is_named(wire: Wire) -> None:
         sdo.get(0x6064, 0, DataType.INTEGER16)
     with pytest.raises(DriveError, match=r"node 1, 1008h:00 .* is no number"):
         sdo.get_int(0x1008, 0, DataType.VISIBLE_STRING)
+
+
+def test_the_bus_is_looked_at_before_each_write_and_before_no_question(wire: Wire) -> None:
+    looks: list[int] = []
+    sdo = SdoPort(
+        Port(wire, wire.clock),
+        1,
+        timeout_ms=10,
+        retries=2,
+        before_write=lambda: looks.append(len(wire.sent)),
+    )
+    with pytest.raises(NoAnswerError):
+        sdo.get_int(0x6064, 0, DataType.INTEGER32)
+    assert looks == []
+    wire.sent.clear()
+    with pytest.raises(NoAnswerError):
+        sdo.put(0x607A, 0, DataType.INTEGER32, 5)
+    # Before the first try and before the second, behind the abort of the first.
+    assert looks == [0, 2]

@@ -212,6 +212,27 @@ def test_a_scan_ends_with_its_last_node_and_one_that_answers_is_enough() -> None
         assert [one.node_id for one in scan(session, 1)] == [1]
 
 
+def test_a_node_that_is_not_there_is_asked_twice_for_15_ms() -> None:
+    session, network = alone(BENCH.nodes[0])
+    with session:
+        assert [one.node_id for one in scan(session, 2)] == [1]
+    asked = [(at_ns, one.data.hex()) for at_ns, one in network.log or [] if one.cob_id == 0x602]
+    # A question that was not answered in time is given up by its abort (05040000h).
+    question, given_up = "4000100000000000", "8000100000000405"
+    assert [data for _, data in asked] == [question, given_up, question]
+    assert asked[2][0] - asked[0][0] == pytest.approx(15 * MS, rel=0.01)
+
+
+def test_drives_are_told_apart_by_the_answers_to_their_serial_number() -> None:
+    session, network = alone(BENCH.nodes[0])
+    with session:
+        list(scan(session, 1))
+    asked = [one.data.hex() for _, one in network.log or [] if one.cob_id == 0x601]
+    # Device type and identity (1018h:01 to :04) once, then three times what differs.
+    identity = [f"401810{sub:02x}00000000" for sub in (1, 2, 3, 4)]
+    assert asked == ["4000100000000000", *identity, *[identity[3]] * 3]
+
+
 def test_two_drives_with_one_node_id_are_counted() -> None:
     session, _ = alone(BENCH.nodes[0], serial(BENCH.nodes[0], 9))
     with session:

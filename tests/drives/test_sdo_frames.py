@@ -8,7 +8,8 @@ import random
 
 import pytest
 
-from legbench.drives.errors import SdoAbortError
+from legbench.drives.errors import CodecError, SdoAbortError
+from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.sdo import Abort
 from legbench.drives.protocol.sdo_client import Download, Progress, Upload
 from legbench.drives.protocol.sdo_server import SdoServer
@@ -268,3 +269,40 @@ def test_a_write_that_the_object_refuses_is_aborted_with_its_reason() -> None:
     for request, _ in download(bytes(9))[:-1]:
         server.feed(request)
     assert server.feed(download(bytes(9))[-1][0]) == abort(Abort.TOO_HIGH)
+
+
+def test_four_bytes_for_a_shorter_number_repeat_its_sign_or_are_zero() -> None:
+    expedited = {True: 0b010_0_00_1_1, False: 0b010_0_00_1_0}
+    for content, kind, sized, value in (
+        ("05000000", DataType.INTEGER8, True, 5),
+        ("FB000000", DataType.INTEGER8, True, -5),
+        ("FBFFFFFF", DataType.INTEGER8, True, -5),
+        ("FFFEFFFF", DataType.INTEGER16, True, -257),
+        ("05FFFFFF", DataType.INTEGER8, True, None),
+        ("FBFFFF00", DataType.INTEGER8, True, None),
+        ("05010000", DataType.UNSIGNED8, True, None),
+        # Without a size the rest of the frame means nothing.
+        ("05FFFFFF", DataType.INTEGER8, False, 5),
+        ("05010000", DataType.UNSIGNED8, False, 5),
+    ):
+        whole = Upload(INDEX, SUB)
+        data = bytes.fromhex(content)
+        assert whole.feed(bytes((expedited[sized],)) + MUX + data) is Progress.DONE
+        transfers = [whole]
+        if sized:
+            # In a segment the four bytes are the object's, too.
+            transfers.append(Upload(INDEX, SUB))
+            transfers[1].feed(b"\x41" + MUX + (4).to_bytes(4, "little"))
+            assert transfers[1].feed(b"\x07" + data + bytes(3)) is Progress.DONE
+        for transfer in transfers:
+            if value is None:
+                with pytest.raises(CodecError, match="4 bytes are no"):
+                    transfer.value(kind)
+            else:
+                assert transfer.value(kind) == value
+
+
+def test_a_segment_before_any_object_is_aborted_for_no_object() -> None:
+    nothing = bytes(3)
+    for request in (b"\x00" + EMPTY, b"\x60" + EMPTY):
+        assert Object().server.feed(request) == abort(Abort.COMMAND, nothing)

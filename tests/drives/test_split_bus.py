@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import can
 import pytest
@@ -149,3 +150,49 @@ def test_channels_are_opened_together_and_closed_when_one_is_not_there() -> None
     first = ChannelLock.of_channel("virtual", NAMES[0])
     first.acquire()
     first.release()
+
+
+class Part:
+    """An interface that cannot be waited for and has a frame at the second look."""
+
+    def __init__(self, name: str, *, fails: bool = False) -> None:
+        self.channel_info, self.fails, self.looks, self.ends = name, fails, 0, 0
+
+    def fileno(self) -> int:
+        raise NotImplementedError
+
+    def recv(self, timeout: float) -> can.Message | None:
+        assert timeout == 0.0
+        self.looks += 1
+        return frame(0x181) if self.looks == 2 else None
+
+    def shutdown(self) -> None:
+        self.ends += 1
+        if self.fails:
+            raise can.CanOperationError(self.channel_info)
+
+
+def test_a_time_of_less_than_a_second_is_waited_for_too() -> None:
+    parts: Any = [Part("left"), Part("right")]
+    bus = SplitBus(parts, two())
+    try:
+        assert bus.recv(0.0) is None
+        assert [part.looks for part in parts] == [1, 1]
+        later: Any = [Part("left"), Part("right")]
+        bus.parts = tuple(later)
+        message = bus.recv(0.9)
+        assert message is not None
+        assert message.arbitration_id == 0x181
+        assert sum(part.looks for part in later) == 3
+    finally:
+        bus.shutdown()
+
+
+@pytest.mark.parametrize("failing", [0, 1])
+def test_every_channel_is_shut_down_and_the_bus_knows(failing: int) -> None:
+    parts: Any = [Part(name, fails=place == failing) for place, name in enumerate(NAMES)]
+    bus = SplitBus(parts, two())
+    with pytest.raises(can.CanOperationError, match=NAMES[failing]):
+        bus.shutdown()
+    assert [part.ends for part in parts] == [1, 1]
+    assert bus._is_shutdown

@@ -8,12 +8,12 @@ import itertools
 
 import pytest
 
-from legbench.drives.emulated import axis, connection, drive, reception
+from legbench.drives.emulated import axis, connection, dictionary, drive, reception
 from legbench.drives.emulated.alarms import register_of
 from legbench.drives.emulated.power import POWERED as POWERED_INSIDE
 from legbench.drives.emulated.power import PowerStage
 from legbench.drives.errors import CodecError
-from legbench.drives.protocol import emcy, frame, nmt, sdo
+from legbench.drives.protocol import emcy, frame, lss, memory, nmt, objects, sdo
 from legbench.drives.protocol.cia402 import (
     HOLD,
     POWERED,
@@ -29,6 +29,7 @@ from legbench.drives.protocol.cia402 import (
     next_controlword,
 )
 from legbench.drives.protocol.datatypes import DataType, pack, range_of, size_of, unpack
+from legbench.drives.protocol.objects import OBJECTS
 from legbench.drives.setup.config import (
     CONTROLWORD,
     LINK_POSITION,
@@ -398,6 +399,56 @@ def test_an_emergency_has_eight_bytes_code_register_vendor() -> None:
     assert emcy.emcy_frame(bare) == frame.Frame(0x0FF, bytes.fromhex("0010010000000000"))
 
 
+def test_storing_has_the_objects_signatures_and_parts_of_the_standard() -> None:
+    # CiA 301, 7.5.2.13 and .14: "save" and "load", least significant byte first.
+    assert (memory.STORE, memory.RESTORE) == (0x1010, 0x1011)
+    assert (memory.SAVE_SIGNATURE, memory.LOAD_SIGNATURE) == (0x65766173, 0x64616F6C)
+    assert (memory.ON_COMMAND, memory.BY_ITSELF) == (0b01, 0b10)
+    # Sub-index 1 is everything, 2 communication (1000h to 1FFFh), 3 the profile (6000h to 9FFFh).
+    parts = {1: (0x1000, 0xFFFF), 2: (0x1000, 0x1FFF), 3: (0x6000, 0x9FFF)}
+    for part in range(6):
+        first, last = parts.get(part, (0, -1))
+        for index in (0, 0xFFF, 0x1000, 0x1FFF, 0x2000, 0x5FFF, 0x6000, 0x9FFF, 0xA000, 0xFFFF):
+            assert memory.in_part((index, 3), part) is (first <= index <= last)
+        assert not memory.in_part((0x10000, 0), part)
+
+
+def test_layer_setting_services_have_the_numbers_of_cia_305() -> None:
+    assert (lss.REQUEST_ID, lss.ANSWER_ID) == (0x7E5, 0x7E4)
+    assert (lss.FRAME, lss.UNCONFIGURED, lss.WORDS, lss.RESET_SCAN) == (8, 0xFF, 4, 0x80)
+    assert {specifier.name: int(specifier) for specifier in lss.Lss} == {
+        "SWITCH_GLOBAL": 4,
+        "CONFIGURE_NODE_ID": 17,
+        "CONFIGURE_BIT_TIMING": 19,
+        "ACTIVATE_BIT_TIMING": 21,
+        "STORE": 23,
+        "SELECT_VENDOR": 64,
+        "SELECT_SERIAL": 67,
+        "SELECTED": 68,
+        "IDENTIFY_VENDOR": 70,
+        "IDENTIFY_SERIAL_HIGH": 75,
+        "IDENTIFY_UNCONFIGURED": 76,
+        "IDENTIFIED": 79,
+        "UNCONFIGURED_IDENTIFIED": 80,
+        "FAST_SCAN": 81,
+        "INQUIRE_VENDOR": 90,
+        "INQUIRE_SERIAL": 93,
+        "INQUIRE_NODE_ID": 94,
+    }
+    assert [int(mode) for mode in (lss.LssMode.WAITING, lss.LssMode.CONFIGURATION)] == [0, 1]
+    errors = lss.LssError
+    assert [int(e) for e in (errors.NONE, errors.OUT_OF_RANGE, errors.STORE_FAILED)] == [0, 1, 2]
+    words = (0x11223344, 0x55667788, 0x99AABBCC, 0xDDEEFF00)
+    assert [frame.hex() for frame in lss.select_frames(words)] == [
+        "4044332211000000",
+        "4188776655000000",
+        "42ccbbaa99000000",
+        "4300ffeedd000000",
+    ]
+    assert lss.scan_frame(0x11223344, 31, 2, 3).hex() == "51443322111f0203"
+    assert lss.lss_frame(lss.Lss.INQUIRE_NODE_ID).hex() == "5e00000000000000"
+
+
 EMERGENCIES = {
     # CiA 301, table 26; CiA 402-2, 603Fh; FFxxh are the emulated drive's own.
     0x0000: "error reset",
@@ -481,3 +532,68 @@ def test_process_data_map_the_objects_of_the_profile() -> None:
     signed = (POSITION_ACTUAL, TARGET_POSITION, LINK_POSITION, LINK_POSITION_SHORT)
     assert {entry.kind.name[:3] for entry in signed} == {"INT"}
     assert {entry.kind.name[:3] for entry in (CONTROLWORD, STATUSWORD)} == {"UNS"}
+
+
+def test_a_drive_has_four_command_and_four_answer_frames_of_eight_objects_each() -> None:
+    # CiA 301, 7.5.2.33 to .38 and table 38: all switched off, sent at events, and mapping nothing.
+    expected: dict[tuple[int, int], tuple[str, DataType, str, int]] = {}
+    for base, first in ((0x1400, 0x200), (0x1800, 0x180)):
+        for number in range(4):
+            sender = "TPDO" if base == 0x1800 else "RPDO"
+            inhibited = "rw" if base == 0x1800 else "ro"
+            name, comm, mapped = f"{sender}{number + 1}", base + number, base + 0x200 + number
+            cob_id = (1 << 31) + first + 0x100 * number
+            u8, u16, u32 = DataType.UNSIGNED8, DataType.UNSIGNED16, DataType.UNSIGNED32
+            expected[comm, 0] = (f"{name} parameter count", u8, "const", 5)
+            expected[comm, 1] = (f"{name} COB-ID", u32, "rw", cob_id)
+            expected[comm, 2] = (f"{name} transmission type", u8, "rw", 255)
+            expected[comm, 3] = (f"{name} inhibit time [100 us]", u16, inhibited, 0)
+            expected[comm, 5] = (f"{name} event timer [ms]", u16, "rw", 0)
+            expected[mapped, 0] = (f"{name} mapped objects", u8, "rw", 0)
+            for sub in range(1, 9):
+                expected[mapped, sub] = (f"{name} mapping {sub}", u32, "rw", 0)
+    found = {
+        key: (entry.name, entry.kind, entry.access.value, entry.default)
+        for key, entry in OBJECTS.items()
+        if 0x1400 <= key[0] < 0x1C00
+    }
+    assert found == expected
+    assert list(OBJECTS) == sorted(OBJECTS)
+    assert (objects.PDO_COUNT, objects.LAST_PDO, objects.MAX_MAPPED) == (4, 512, 8)
+    assert (objects.LINK_SHORT, objects.TEMPERATURE) == (0x2064, 0x2070)
+
+
+@pytest.mark.parametrize(
+    ("key", "name", "kind", "access", "default", "mappable"),
+    [
+        ((0x1000, 0), "Device type", "UNSIGNED32", "const", 0x00020192, False),
+        ((0x1001, 0), "Error register", "UNSIGNED8", "ro", 0, True),
+        (
+            (0x1008, 0),
+            "Manufacturer device name",
+            "VISIBLE_STRING",
+            "const",
+            "legbench-drive",
+            False,
+        ),
+        ((0x6040, 0), "Controlword", "UNSIGNED16", "rw", 0, True),
+        ((0x6065, 0), "Following error window", "UNSIGNED32", "rw", 0xFFFFFFFF, False),
+        ((0x607A, 0), "Target position", "INTEGER32", "rw", 0, True),
+        ((0x60C2, 2), "Interpolation time index", "INTEGER8", "rw", -2, False),
+        ((0x6502, 0), "Supported drive modes", "UNSIGNED32", "const", 0xA0, False),
+    ],
+)
+def test_a_row_of_the_table_is_read_as_it_stands(
+    key: tuple[int, int], name: str, kind: str, access: str, default: int | str, mappable: bool
+) -> None:
+    entry = OBJECTS[key]
+    assert (entry.key, entry.name, entry.kind.name) == (key, name, kind)
+    assert (entry.access.value, entry.default, entry.mappable) == (access, default, mappable)
+    assert objects.name_of(*key) == f"{key[0]:04X}h:{key[1]:02X} {name}"
+    assert objects.name_of(0x5FFF, 3) == "5FFFh:03"
+
+
+def test_an_emulated_drive_knows_its_objects_by_the_numbers_of_the_standard() -> None:
+    assert dictionary.MAX_SPEED == (0x6080, 0)
+    assert (dictionary.MODE, dictionary.MODE_DISPLAY) == ((0x6060, 0), (0x6061, 0))
+    assert dictionary.CYCLIC == 8

@@ -5,8 +5,10 @@ from typing import Any
 import pytest
 from service_rig import BENCH, MS, opened, written
 
+from legbench.commissioning import store as store_module
 from legbench.commissioning.store import store
 from legbench.drives.errors import DriveError, NoAnswerError
+from legbench.drives.master.sdo_port import SdoPort
 from legbench.drives.protocol.cia402 import DriveState
 from legbench.drives.protocol.frame import Frame
 from legbench.drives.protocol.sdo import Abort
@@ -84,9 +86,19 @@ def test_a_drive_that_never_answers_to_the_signature_is_told_as_unknown() -> Non
             real(frame, now_ns)
 
     drive.receive = receive
-    with session, pytest.raises(NoAnswerError, match=r"within 3 s, so whether it has stored"):
-        store(session, session.config.nodes, timeout=3.0)
-    assert len([frame for frame in written(network) if frame.data[1:3] == b"\x10\x10"]) == 1
+    with session:
+        for timeout in (0.5, 0.125):
+            said = rf"within {timeout:g} s, so whether it has stored"
+            with pytest.raises(NoAnswerError, match=said):
+                store(session, session.config.nodes, timeout=timeout)
+            saves = [
+                at_ns
+                for at_ns, frame in network.log or []
+                if frame.cob_id == 0x601 and frame.data[:3] == b"\x23\x10\x10"
+            ]
+            assert network.now_ns - saves[-1] == pytest.approx(1e9 * timeout, rel=0.01)
+    # Written once each time.
+    assert len(saves) == 2
 
 
 @pytest.mark.parametrize(
@@ -124,12 +136,23 @@ def test_command_frames_are_off_before_a_part_that_holds_them_is_stored(
         assert not [key for key, _ in told[first:] if key[:2] == b"\x00\x14"]
 
 
-def test_a_drive_that_stores_by_itself_says_so() -> None:
+@pytest.mark.parametrize(("settings", "wait_ms"), [({}, 10_000), ({"timeout": 60.0}, 60_000)])
+def test_a_drive_that_stores_by_itself_says_so(
+    settings: dict[str, Any], wait_ms: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     session, network = opened()
     network.drives[1]._values[0x1010, 1] = 3
+    waits: list[int] = []
+
+    def patient(*args: Any, timeout_ms: int, **more: Any) -> SdoPort:
+        waits.append(timeout_ms)
+        return SdoPort(*args, timeout_ms=timeout_ms, **more)
+
+    monkeypatch.setattr(store_module, "SdoPort", patient)
     with session:
-        done = store(session, session.config.nodes, timeout=60.0)
+        done = store_module.store(session, session.config.nodes, **settings)
     assert [one.by_itself for one in done] == [False, True]
+    assert waits == [wait_ms] * 2
 
 
 def test_the_last_part_may_be_asked_for() -> None:

@@ -74,3 +74,35 @@ def test_a_position_is_the_nearest_that_shows_the_same(bits: int) -> None:
         # Half the range and beyond is nearer from the other side.
         assert nearest(wrap(near + half, bits), near) == near - half
     assert nearest(-half if bits == 32 else 7, 0) == (-half if bits == 32 else 7)
+
+
+def test_a_position_of_64_bits_is_as_far_from_zero_as_it_holds() -> None:
+    for bits, most in ((16, (1 << 31) - 1), (32, (1 << 31) - 1), (64, (1 << 63) - 1)):
+        for offset in (most, -most):
+            assert axis(bits=bits, offset_counts=offset).offset_counts == offset
+        for offset in (most + 1, -most - 1):
+            with pytest.raises(ConfigError, match=f"offset_counts is {offset}; .* {bits} bits"):
+                axis(bits=bits, offset_counts=offset)
+
+
+def test_a_position_repeats_within_what_its_object_shows() -> None:
+    for modulus, low in (
+        (16, -(1 << 15)),
+        (16, (1 << 16) - 16),
+        (1 << 16, 0),
+        (1 << 16, -(1 << 15)),
+    ):
+        units = axis(bits=16, modulus_counts=modulus, lowest_count=low)
+        assert (units.modulus, units.lowest) == (modulus, low)
+    for modulus in (15, (1 << 16) + 1):
+        with pytest.raises(ConfigError, match=f"modulus_counts is {modulus}; .* 16 to 65536"):
+            axis(bits=16, modulus_counts=modulus)
+    for low in (-(1 << 15) - 1, (1 << 16) - 15):
+        with pytest.raises(ConfigError, match=f"lowest_count is {low}; .* -32768 to 65520"):
+            axis(bits=16, modulus_counts=16, lowest_count=low)
+
+
+def test_a_count_is_wrapped_into_the_signed_range_of_its_object() -> None:
+    for counts in (0, 1, 127, 128, 200, 255, 256, -1, -128, -129, -1000):
+        signed = int.from_bytes((counts % 256).to_bytes(1, "little"), "little", signed=True)
+        assert wrap(counts, 8) == signed

@@ -3,15 +3,16 @@
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pytest
-from pyarrow import parquet
+from pyarrow import ipc, parquet
 from recorded_rows import append_rows
 
 from legbench.errors import RecordingError
 from legbench.recording import archive
-from legbench.recording.archive import count_rows, write_archive
+from legbench.recording.archive import count_rows, read_schema, write_archive
 from legbench.recording.reader import load
-from legbench.recording.stream import WholeBatches
+from legbench.recording.stream import WholeBatches, carried_manifest
 from legbench.recording.writer import RunWriter
 
 
@@ -59,6 +60,25 @@ def test_columns_are_encoded_by_what_they_hold(tmp_path: Path) -> None:
     assert "BYTE_STREAM_SPLIT" in found["joint_pos_1"].encodings
     assert not {"BYTE_STREAM_SPLIT", "DELTA_BINARY_PACKED"} & set(found["phase"].encodings)
     assert not any("DICTIONARY" in name for column in columns for name in column.encodings)
+
+
+def test_an_archive_has_the_columns_of_its_stream_whatever_the_manifest_says(
+    tmp_path: Path,
+) -> None:
+    load_signal = {"name": "load", "unit": "N", "doc": "Load of the foot."}
+    own = {"format": 2, "controller": {"signals": [load_signal]}}
+    table = pa.table({"t_ns": pa.array([0, 1_000_000]), "older": pa.array([0.5, 1.5])})
+    stream = tmp_path / "samples.arrows"
+    with ipc.new_stream(str(stream), table.schema) as writer:
+        writer.write_table(table)
+    assert write_archive(tmp_path, WholeBatches(stream), own) == 2
+    schema = read_schema(tmp_path)
+    assert schema.names == ["t_ns", "older"]
+    assert carried_manifest(schema, tmp_path) == own
+    # A stream without a whole opening has no columns of its own.
+    stream.write_bytes(stream.read_bytes()[:40])
+    assert write_archive(tmp_path, WholeBatches(stream), own) == 0
+    assert read_schema(tmp_path).names[-1] == "load"
 
 
 def test_a_draft_that_is_left_over_is_written_anew_and_goes(tmp_path: Path) -> None:

@@ -12,9 +12,11 @@ import legbench
 from legbench.control import PositionJumpConfig
 from legbench.design import load_design
 from legbench.design.setup import Setup, SetupKind
+from legbench.errors import FormatError
 from legbench.experiment import Experiment
 from legbench.experiment.running import record_in_memory
 from legbench.imperfections import Imperfections
+from legbench.recording.derived import completed, derivable
 from legbench.recording.reader import Recording
 from legbench.recording.saved import save_recording
 
@@ -90,3 +92,25 @@ def test_rows_without_a_reading_stay_what_they_are(noisy: Recording, tmp_path: P
     found = legbench.load(tmp_path / "run")
     assert found.columns[TORQUES[0]].tobytes() == unread.tobytes()
     assert found.columns["motor_pos_1"].tobytes() == blind.tobytes()
+
+
+def test_torques_need_the_encoders_of_both_sides_and_the_word_of_the_file(
+    noisy: Recording,
+) -> None:
+    described = noisy.description
+    said = {"derived": {"spring_torque": "stiffness * (motor_pos - joint_pos)"}}
+    bare = {name: values for name, values in noisy.columns.items() if name not in TORQUES}
+    whole = completed(bare, said, described)
+    assert list(whole) == list(noisy.columns)
+    for missing in ("motor_pos_1", "joint_pos_1", "motor_pos_2", "joint_pos_2"):
+        rest = {name: values for name, values in noisy.columns.items() if name != missing}
+        assert derivable(rest, described) == ()
+        blind = {name: values for name, values in bare.items() if name != missing}
+        assert not set(TORQUES) & completed(blind, said, described).keys()
+    # A file that names nothing, another signal or something odd has all that it is meant to have.
+    unknown = FormatError("no leg")
+    for manifest in ({}, {"derived": {"gain": "2"}}, {"derived": ["spring_torque"]}):
+        assert completed(bare, manifest, described) is bare
+        assert completed(bare, manifest, unknown) is bare
+    assert completed(bare, said, unknown) is bare
+    assert derivable(noisy.columns, unknown) == ()

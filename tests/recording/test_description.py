@@ -1,10 +1,12 @@
 """`run.json` as one typed value: what is written comes back, what makes no sense is named."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from recorded_rows import append_rows
 
@@ -16,6 +18,7 @@ from legbench.kinematics import ModalConvention
 from legbench.phases import ControllerDescription, Counting, PhaseInfo, Role
 from legbench.recording.controller_table import controller_table
 from legbench.recording.description import InitialState, Reference, describe
+from legbench.recording.imperfections_table import parse_imperfections
 from legbench.recording.reader import load
 from legbench.recording.unlike import unlike
 from legbench.recording.writer import RunWriter
@@ -82,6 +85,21 @@ def test_what_is_written_comes_back_typed(run: Path) -> None:
     assert {"python", "numpy", "pyarrow", "mujoco-core"} == found.versions.keys()
     assert found.experiment == EXPERIMENT
     assert not found.complete
+
+
+@pytest.mark.parametrize("kind", list(SetupKind))
+def test_a_run_that_asks_for_none_is_rated_by_the_reference_of_its_setup(kind: SetupKind) -> None:
+    setup = {"kind": str(kind)}
+    suits = Reference.MOTOR if kind is SetupKind.JUMP else Reference.EQUILIBRIUM
+    for asked, reference in (
+        (None, suits),
+        ("setup", suits),
+        ("motor", Reference.MOTOR),
+        ("equilibrium", Reference.EQUILIBRIUM),
+    ):
+        conventions = {} if asked is None else {"rating_reference": asked}
+        told = EXPERIMENT | {"setup": setup, "conventions": conventions}
+        assert describe(GIVEN | {"experiment": told}).reference is reference
 
 
 def test_own_signals_of_a_described_run_are_read_by_name(run: Path) -> None:
@@ -183,6 +201,28 @@ def test_a_run_says_its_imperfections() -> None:
     assert found == Imperfections(
         trunk_mass_error=0.1, link_zero=(0.01, 0.0), motor_range=((-1.0, 1.0), (0.0, 2.5))
     )
+
+
+@pytest.mark.parametrize(
+    ("names", "fits", "shape"),
+    [
+        (("trunk_mass_error",), 0.1, "()"),
+        (("mass_error", "com_error", "inertia_error"), [0.01, 0.02, 0.03], "(3,)"),
+        (("stiffness_error", "coulomb_friction", "motor_noise"), [0.01, 0.02], "(2,)"),
+        (("motor_range",), [[-1.0, 1.0], [0.0, 2.0]], "(2, 2)"),
+    ],
+)
+def test_an_imperfection_has_as_many_numbers_as_it_has_places(
+    names: tuple[str, ...], fits: Any, shape: str
+) -> None:
+    sound = {"backlash": [0.0, 0.01]}
+    for name in names:
+        found = getattr(parse_imperfections(sound | {name: fits}), name)
+        np.testing.assert_array_equal(found, fits)
+        # A list around them, and one entry more; the entry before it is sound.
+        for other in ([fits], [*fits, fits[0]] if isinstance(fits, list) else "0.1"):
+            with pytest.raises(FormatError, match=rf"{name} is .* of shape {re.escape(shape)}"):
+                parse_imperfections(sound | {name: other})
 
 
 @pytest.mark.parametrize(

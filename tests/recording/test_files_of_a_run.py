@@ -15,6 +15,7 @@ import pytest
 from legbench import __version__
 from legbench.errors import ConfigError, FormatError, RecordingError
 from legbench.recording import files as files_module
+from legbench.recording.disk import Disk
 from legbench.recording.events import drop_torn_events, encode_event, read_events
 from legbench.recording.files import append_to, lock
 from legbench.recording.manifest import (
@@ -94,6 +95,13 @@ def test_a_file_system_without_locks_is_taken_as_it_is(
 
     monkeypatch.setattr(fcntl, "flock", refuse)
     lock(3, tmp_path, patience=9.0)
+
+
+def test_a_system_without_locks_is_taken_as_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(files_module, "fcntl", None)
+    lock(-1, tmp_path)
 
 
 def test_a_lock_that_fails_otherwise_says_so(
@@ -176,6 +184,22 @@ def test_an_event_is_one_line_whatever_it_says() -> None:
     assert line.count(b"\n") == 1
     assert line.endswith(b"\n")
     assert json.loads(line) == {"time": 0.5, "name": "notice", **detail}
+    # Text is kept as it is read, in UTF-8, in an event as in the manifest.
+    micro = "\N{GREEK SMALL LETTER MU}m".encode()
+    assert micro in encode_event(0.5, "notice", {"unit": micro.decode()})
+    assert micro in to_json({"unit": micro.decode()})
+
+
+def test_a_run_that_is_closed_holds_no_file_open(tmp_path: Path) -> None:
+    writer = RunWriter.create(tmp_path, {})
+    disk = writer._disk
+    assert isinstance(disk, Disk)
+    for file in (disk._samples, disk._events):
+        os.fstat(file.fd)
+    writer.close()
+    for file in (disk._samples, disk._events):
+        with pytest.raises(OSError, match=os.strerror(errno.EBADF)):
+            os.fstat(file.fd)
 
 
 @pytest.mark.parametrize(

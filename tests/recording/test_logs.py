@@ -19,7 +19,9 @@ from hypothesis import strategies as st
 from recorded_rows import append_rows
 
 from legbench.errors import RecordingError
-from legbench.recording.files import Appender
+from legbench.recording import logs
+from legbench.recording.files import Appender, append_to
+from legbench.recording.log_file import LogFile
 from legbench.recording.logs import ENDED_EARLY, LINES_AT_ONCE, TOO_SLOW
 from legbench.recording.process_disk import ProcessDisk
 from legbench.recording.reader import load
@@ -171,12 +173,40 @@ def test_a_log_that_cannot_be_made_is_refused(tmp_path: Path, realtime: bool) ->
 def test_a_loop_that_writes_its_own_log_loses_no_line_of_it(tmp_path: Path) -> None:
     writer = RunWriter.create(tmp_path, {})
     log = writer.log("lines.log")
-    for line in lines(LINES_AT_ONCE + 1):
+    path = writer.path / "lines.log"
+    for number, line in enumerate(lines(LINES_AT_ONCE + 1), start=1):
         log.write(line)
+        assert path.stat().st_size == (40 * 500 if number >= 500 else 0)
     writer.close()
     log.close()
     log.write(b"too late\n")
+    log.close()
     assert (writer.path / "lines.log").read_bytes() == b"".join(lines(LINES_AT_ONCE + 1))
+    assert log.error is None
+
+
+def test_a_loop_writes_its_lines_some_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert LINES_AT_ONCE == 500
+    monkeypatch.setattr(logs, "LINES_AT_ONCE", 3)
+    file = LogFile(append_to(tmp_path / "log"))
+    log = logs.LoopLog(file)
+    for number, size in enumerate((0, 0, 12, 12, 12, 24), start=1):
+        log.write(b"%03d\n" % number)
+        assert (tmp_path / "log").stat().st_size == size
+    log.close()
+
+
+@LINUX
+def test_a_log_that_is_closed_gives_its_memory_up() -> None:
+    ring = Ring.create()
+    log = logs.RingLog(ring, ring.end)
+    os.fstat(ring.fd)
+    for _ in range(2):
+        log.close()
+        with pytest.raises(OSError, match="Bad file descriptor"):
+            os.fstat(ring.fd)
     assert log.error is None
 
 

@@ -1,6 +1,7 @@
 """A run too long to be kept in memory gives what it gives in memory, column by column."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -8,7 +9,7 @@ import pytest
 from recorded_rows import append_rows
 
 from legbench.errors import RecordingError
-from legbench.recording import reader
+from legbench.recording import archive_columns, reader
 from legbench.recording.archive_columns import (
     ArchiveColumns,
     ArchiveRows,
@@ -121,3 +122,43 @@ def test_damage_is_named_where_it_is_met(tmp_path: Path, monkeypatch: pytest.Mon
     path.write_bytes(content)
     with pytest.raises(RecordingError, match=r"samples\.parquet is damaged"):
         load(writer.path)["joint_pos"]
+
+
+def test_a_run_is_long_after_four_minutes_at_a_kilohertz() -> None:
+    assert archive_columns.LONG_ROWS == 262_144
+    assert archive_columns.WINDOW_ROWS == 65_536
+
+
+def test_rows_of_rows_are_counted_and_read_only(tmp_path: Path) -> None:
+    with RunWriter.create(tmp_path, {}) as writer:
+        append_rows(writer, 130)
+    whole = ArchiveColumns(writer.path / "samples.parquet")
+    assert whole.rows == 130
+    for rows, count in ((slice(30, 90), 60), (slice(100, 500), 30), (slice(90, 20), 0)):
+        part = ArchiveRows(whole, rows)
+        assert part.rows == len(part["t_ns"]) == count
+        inner = ArchiveRows(part, slice(10, 20))
+        assert inner.rows == min(10, max(0, count - 10))
+        np.testing.assert_array_equal(inner["t_ns"], part["t_ns"][10:20])
+        for columns in (whole, part, inner):
+            for name in ("t_ns", "contact"):
+                with pytest.raises(ValueError, match="read-only"):
+                    columns[name][:] = 1
+
+
+def test_an_archive_that_cannot_be_spooled_says_why_and_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    for goes in (False, True):
+
+        def refuse(folder: Path, *_: object, goes: bool = goes) -> int:
+            if goes:
+                folder.rmdir()
+            raise RecordingError("no room")
+
+        monkeypatch.setattr(archive_columns, "write_archive", refuse)
+        stream: Any = None
+        with pytest.raises(RecordingError, match="no room"):
+            archive_columns.spooled(stream, {})
+        assert list(tmp_path.iterdir()) == []

@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +36,15 @@ def test_columns_and_signals_agree(run: Path) -> None:
     np.testing.assert_array_equal(found["t"], found["time"])
     assert found["contact"].dtype == np.bool_
     assert found["phase"].dtype == np.int64
+
+
+def test_a_signal_is_there_with_all_its_columns_or_not_at_all(run: Path) -> None:
+    found = load(run)
+    fewer = {name: found.columns[name] for name in found.columns if name != "joint_pos_2"}
+    partial = replace(found, columns=fewer)
+    assert set(found.signals) - set(partial.signals) == {"joint_pos"}
+    with pytest.raises(UnknownSignalError, match="no signal 'joint_pos'; it has t,"):
+        partial["joint_pos"]
 
 
 def test_what_was_read_cannot_be_changed_by_accident(run: Path) -> None:

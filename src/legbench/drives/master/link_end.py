@@ -36,15 +36,19 @@ class LinkEnd:
 
     def stop(self) -> None:
         """Stop all drives in this cycle, as `Link.stop` describes it."""
+        with shielded() as shield:
+            self._stop(shield)
+
+    def _stop(self, shield: Shield) -> None:
+        """Stop all drives; an interruption is raised when the shield of the caller ends."""
         parts, status = self._parts, self._status
         if status.state not in (LinkState.CYCLIC, LinkState.RUNNING, LinkState.STOPPING):
             return
-        with shielded() as shield:
-            status.state = LinkState.STOPPING
-            if parts.read_only or (not status.leads and self._led_by_another(shield)):
-                status.state = LinkState.STOPPED
-            else:
-                status.note(StopSequence(parts.cycle, shield.hold, parts.config.cycles_in).run())
+        status.state = LinkState.STOPPING
+        if parts.read_only or (not status.leads and self._led_by_another(shield)):
+            status.state = LinkState.STOPPED
+        else:
+            status.note(StopSequence(parts.cycle, shield.hold, parts.config.cycles_in).run())
 
     def close(self) -> None:
         """Stop, park the drives, release the channel, as `Link.close` describes it."""
@@ -53,7 +57,7 @@ class LinkEnd:
             return
         with shielded() as shield:
             looked = status.listening or status.state is LinkState.CONFIGURED
-            self.stop()
+            self._stop(shield)
             led = self._led_by_another(shield)
             if not ((led and not status.leads) or (parts.read_only and looked)):
                 order, nodes = parts.bring_up.pre_operational, parts.config.nodes

@@ -61,7 +61,6 @@ class PdoMap:
 
     def __init__(self, entries: Sequence[Mapped]) -> None:
         self.entries = tuple(entries)
-        self.keys = tuple(entry.key for entry in self.entries)
         reals = [str(entry) for entry in self.entries if entry.kind not in FORMATS]
         if reals:
             raise CodecError(f"{reals[0]} is no whole number; map another object")
