@@ -31,8 +31,6 @@ LEAN = 0.08
 """Angle by which a leg leans as it starts; it then sways as others do after minutes [rad]."""
 SWAYING_EARLIEST, SWAYING_LATEST = 1.1, 2.5
 """When a part of a leg that sways dies, while it still does and has done so for a second [s]."""
-SWAYING_COUNTS = (1 << 16, 1 << 20)
-"""Of its encoders; 4 096 in a turn are so coarse that a drift may take 0.2 s to be found."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,7 +78,7 @@ def drawn(dice: random.Random, *, sways: bool) -> tuple[float, ServoConfig]:
     onset = dice.uniform(*(SWAYING_EARLIEST, SWAYING_LATEST) if sways else (EARLIEST, LATEST))
     servo = ServoConfig(
         bandwidth=dice.choice(BANDWIDTHS),
-        encoder_counts=dice.choice(SWAYING_COUNTS if sways else COUNTS),
+        encoder_counts=dice.choice(COUNTS),
     )
     return round(onset, 3), servo
 
