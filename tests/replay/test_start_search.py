@@ -11,7 +11,7 @@ from legbench.errors import PlantFault
 from legbench.plant.abstract import AbstractPlant
 from legbench.recording.reader import Recording
 from legbench.replay.moved import MotionSource, Moved
-from legbench.replay.start_estimate import PULSE, StartEstimate
+from legbench.replay.start_estimate import LOST, PULSE, StartEstimate, StartTrials
 from legbench.replay.start_search import find_start
 from legbench.signals import Command, Floats, Observation
 
@@ -69,13 +69,19 @@ def motors() -> Floats:
     return np.where(np.arange(ROWS)[:, np.newaxis] < STAND, HOLD, AWAY)
 
 
-def moved_from(recording: Recording, links: Floats, source: MotionSource) -> Moved:
-    """Rows of a run on drives whose links and motors are these."""
+def moved_from(
+    recording: Recording, links: Floats, source: MotionSource, silent: Sequence[int] = ()
+) -> Moved:
+    """Rows of a run on drives whose links and motors are these; in some no drive answers."""
     columns = {name: values[:ROWS] for name, values in recording.columns.items()}
     for axis in range(2):
         columns[f"motor_pos_{axis + 1}"] = motors()[:, axis]
         columns[f"joint_pos_{axis + 1}"] = links[:, axis]
         columns[f"joint_vel_{axis + 1}"] = 1.0 + np.arange(ROWS)  # each row has its answer
+        for row in silent:
+            for name in ("motor_pos", "joint_pos", "joint_vel"):
+                column = columns[f"{name}_{axis + 1}"] = columns[f"{name}_{axis + 1}"].copy()
+                column[row] = column[row - 1]
     return Moved(replace(recording, time=recording.time[:ROWS], columns=columns), source)
 
 
@@ -122,6 +128,29 @@ def test_a_swing_is_found_to_a_part_of_a_count(can_swing: Recording) -> None:
     assert plain.rows is None
     assert np.abs(fallen(plain) - truth).max() > 10.0 * COUNT
     assert np.abs(fallen(found) - truth).max() < 2.0 * COUNT
+
+
+def test_rows_without_an_answer_tell_nothing_of_the_start(can_swing: Recording) -> None:
+    """A repeated answer of a moving leg lies far beside it, and is no reason to lose it."""
+    stood = StartEstimate(hold=HOLD, periods=30, beside=np.zeros((2, 2)))
+    links, silent = rounded(fallen(stood)), [STAND + 20, *range(ROWS - 60, ROWS - 30)]
+    moved = moved_from(can_swing, links, MotionSource.MOTORS, silent)
+    assert np.flatnonzero(moved.stale.all(axis=1)).tolist() == silent
+    assert np.abs(moved.joint_pos - links).max() > LOST * COUNT
+    trials = StartTrials(Toppling(), moved, STEPS, COUNT)
+    followed = trials.follow(stood)
+    assert (len(followed.links), followed.beside) == (ROWS, ROWS)
+    assert np.abs(trials.missing(followed.links)).max() < COUNT
+    assert not trials.missing(followed.links).reshape(ROWS, 2)[silent].any()
+    assert find_start(Toppling(), moved, STEPS).rows is None
+
+
+def test_a_leg_that_falls_beside_every_start_is_left_as_it_stands(can_swing: Recording) -> None:
+    moved = moved_from(can_swing, rounded(fallen()), MotionSource.MOTORS)
+    trials = StartTrials(Toppling(falls_at=1e-6), moved, STEPS, COUNT)
+    start = StartEstimate(hold=HOLD, periods=2 * PULSE, beside=np.zeros((2, 2)))
+    assert trials.follow(start).beside == 0
+    assert trials.better(start, 10, (1.0,)) is None
 
 
 def test_a_leg_that_stands_elsewhere_is_not_swung(can_swing: Recording) -> None:

@@ -81,19 +81,20 @@ class StartTrials:
             count: that of the link encoders [rad].
         """
         self._plant, self._moved, self._steps, self._count = plant, moved, steps, count
+        self._known = ~moved.stale
         self.rows = len(steps) + 1
 
     def follow(self, start: StartEstimate, rows: int | None = None) -> FollowedRows:
         """Move the leg from a start, over a number of rows or until it is lost."""
-        recorded, lost = self._moved.joint_pos, LOST * self._count
+        lost = LOST * self._count
         links: list[Floats] = []
         for seen in self._observed(start):
             links.append(seen)
-            far = not np.abs(seen - recorded[len(links) - 1]).max() < lost
+            far = not np.abs(self._apart(links[-1:], len(links) - 1)).max() < lost
             if len(links) == rows or (rows is None and far):
                 break
         found = np.array(links).reshape(-1, 2)
-        away = np.abs(found - recorded[: len(found)]).max(axis=1) > BESIDE * self._count
+        away = np.abs(self._apart(found)).max(axis=1) > BESIDE * self._count
         return FollowedRows(links=found, beside=int(np.argmax(away)) if away.any() else len(found))
 
     def _observed(self, start: StartEstimate) -> Iterator[Floats]:
@@ -114,8 +115,17 @@ class StartTrials:
 
         An angle by which an encoder is always beside its model is not the start's, and left out.
         """
-        apart = self._moved.joint_pos[: len(links)] - links
-        return (apart - apart.mean(axis=0)).ravel()
+        apart, known = self._apart(links), self._known[: len(links)]
+        beside = apart.sum(axis=0) / np.maximum(1, known.sum(axis=0))
+        return np.where(known, apart - beside, 0.0).ravel()
+
+    def _apart(self, links: Floats | Sequence[Floats], first: int = 0) -> Floats:
+        """Way from links (n, 2) to the recorded ones, whose first row is given (n, 2) [rad].
+
+        It is zero where a drive has not answered, so that nothing is known.
+        """
+        rows = slice(first, first + len(links))
+        return np.where(self._known[rows], self._moved.joint_pos[rows] - links, 0.0)
 
     def better(
         self, start: StartEstimate, rows: int, shares: Sequence[float]
@@ -137,6 +147,8 @@ class StartTrials:
         ]
         links = [self.follow(each, rows).links for each in (start, *probes)]
         common = min(map(len, links))
+        if common == 0:
+            return None  # Beside one of these starts the leg comes to no row.
         base, *others = (self.missing(each[:common]) for each in links)
         slopes = np.stack([base - each for each in others], axis=1) / PROBE
         # Of ways that rounded angles do not tell apart, the usual ones.

@@ -53,8 +53,9 @@ def find_start(plant: AbstractPlant, moved: Moved, steps: Sequence[int]) -> Star
     trials = StartTrials(plant, moved, steps, count)
     period = plant.period * float(np.median(steps)) if steps else plant.period
     windows = sorted({min(trials.rows, len(rest) + round(each / period)) for each in WINDOWS})
-    short = swing[: round(SHORT_REST / plant.period) + len(rest)]
-    again = replace(start, periods=_best(short, rest, PULSE * len(start.beside)))
+    least = PULSE * len(start.beside)
+    short = swing[: max(least, round(SHORT_REST / plant.period)) + len(rest)]
+    again = replace(start, periods=_best(short, rest, least))
     return _improved(trials, windows, start, again)
 
 
