@@ -84,17 +84,6 @@ class MomentumReading(NamedTuple):
     """Link angles q1, q2 [rad]."""
 
 
-class Unexplained(NamedTuple):
-    """Torque that neither springs nor damping nor weight explain."""
-
-    polar: float
-    """Part that turns q1 and q2 together [N m]."""
-    knee: float
-    """Part that turns q2 against q1; the push of a knee stop belongs to it [N m]."""
-    wound: float
-    """Torque of spring 2 less that of spring 1 [N m]."""
-
-
 class LegMotion(NamedTuple):
     """Motion of a leg and torques of its springs, which do not depend on what supports it."""
 
@@ -160,12 +149,3 @@ def left_over(support: SupportPoint, motion: LegMotion) -> tuple[float, float]:
     left_1 = i1 * a1 + m1 * sine_1 - torque_1
     left_2 = i2 * a2 + m2 * sine_2 - torque_2
     return left_1 + left_2 + coupling * polar, left_2 - left_1 - coupling * knee
-
-
-def unexplained(
-    leg: LegMomentum, support: SupportPoint, readings: Iterable[MomentumReading]
-) -> Unexplained:
-    """Return the unexplained torque at the second one of three readings."""
-    motion = motion_of(leg, readings)
-    polar, knee = left_over(support, motion)
-    return Unexplained(polar=polar, knee=knee, wound=motion.wound)
