@@ -132,7 +132,7 @@ class BasinTask:
 def fate_of(
     leg: TaylorLeg,
     drive: AbstractDrive,
-    question: BasinTask,
+    task: BasinTask,
     start: Apex,
     attraction: Attraction | None = None,
 ) -> Fate:
@@ -140,8 +140,8 @@ def fate_of(
 
     An `attraction` tells of many legs some hops earlier that they will return.
     """
-    wanted, at, before = question.centre.vector(), start, math.inf
-    for hop in range(question.hops):
+    wanted, at, before = task.centre.vector(), start, math.inf
+    for hop in range(task.hops):
         try:
             done = return_map(leg, drive, at)
         except ConfigError:
@@ -149,62 +149,62 @@ def fate_of(
         if done.after is None:
             return ENDINGS[done.ending]
         at, vector = done.after, done.after.vector()
-        if np.max(np.abs(vector - wanted) / UNITS) < question.near:
+        if np.max(np.abs(vector - wanted) / UNITS) < task.near:
             return Fate.RETURNS
         if attraction is not None:
             distance = attraction.distance(vector)
             if max(before, distance) <= attraction.radius:
-                left = question.hops - 1 - hop
-                if attraction.hops_to(question.near, distance) <= left:
+                left = task.hops - 1 - hop
+                if attraction.hops_to(task.near, distance) <= left:
                     return Fate.RETURNS
             before = distance
     return Fate.WANDERS
 
 
-def attraction_in(question: BasinTask) -> Attraction | None:
+def attraction_in(task: BasinTask) -> Attraction | None:
     """Neighbourhood of the periodic hop from which every leg returns, if there is one.
 
     Motors that are held give no derivative at a touchdown without speed, and so no neighbourhood.
     """
-    if question.jump is None:
+    if task.jump is None:
         return None
-    (leg, drive), (exact, _) = question.tools(), replace(question, tolerance=TOLERANCE).tools()
-    return find_attraction(leg, exact, drive, question.centre, question.near, question.hops)
+    (leg, drive), (exact, _) = task.tools(), replace(task, tolerance=TOLERANCE).tools()
+    return find_attraction(leg, exact, drive, task.centre, task.near, task.hops)
 
 
 _worker: tuple[BasinTask, TaylorLeg, AbstractDrive] | None = None
 
 
-def _start_worker(question: BasinTask) -> None:
+def _start_worker(task: BasinTask) -> None:
     global _worker
-    _worker = (question, *question.tools())
+    _worker = (task, *task.tools())
 
 
-def _start_process(question: BasinTask) -> None:
+def _start_process(task: BasinTask) -> None:
     # ^C goes to the whole group; a worker that dies of it takes the queue's lock along, and the
     # one who tidies up waits for ever.
     ignore_interrupts()
-    _start_worker(question)
+    _start_worker(task)
 
 
 def _row(attraction: Attraction | None, index: int) -> tuple[int, list[int]]:
     if _worker is None:
         raise RuntimeError("the worker was not started")
-    question, leg, drive = _worker
-    places = {name: NAMES.index(name) for name in (question.across.name, question.up.name)}
-    vector = question.centre.vector()
-    vector[places[question.up.name]] = question.up.values()[index]
+    task, leg, drive = _worker
+    places = {name: NAMES.index(name) for name in (task.across.name, task.up.name)}
+    vector = task.centre.vector()
+    vector[places[task.up.name]] = task.up.values()[index]
     fates = []
-    for value in question.across.values():
-        vector[places[question.across.name]] = value
-        fates.append(int(fate_of(leg, drive, question, Apex.of(vector), attraction)))
+    for value in task.across.values():
+        vector[places[task.across.name]] = value
+        fates.append(int(fate_of(leg, drive, task, Apex.of(vector), attraction)))
     return index, fates
 
 
-def _read(path: Path, question: BasinTask) -> dict[int, list[int]]:
+def _read(path: Path, task: BasinTask) -> dict[int, list[int]]:
     """Rows that an earlier run has finished; a last line that was cut off is left out."""
     lines = path.read_text(encoding="utf-8").splitlines()
-    if not lines or lines[0] != question.text():
+    if not lines or lines[0] != task.text():
         raise ConfigError(
             f"{path} belongs to another map; give a new file or remove it to start afresh"
         )
@@ -215,58 +215,58 @@ def _read(path: Path, question: BasinTask) -> dict[int, list[int]]:
             index, fates = int(entry["row"]), [int(fate) for fate in entry["fates"]]
         except (ValueError, KeyError, TypeError):
             continue
-        if len(fates) == question.across.count and 0 <= index < question.up.count:
+        if len(fates) == task.across.count and 0 <= index < task.up.count:
             rows[index] = fates
     return rows
 
 
 def map_basin(
-    question: BasinTask, path: Path, *, workers: int = 2, progress: Progress | None = None
+    task: BasinTask, path: Path, *, workers: int = 2, progress: Progress | None = None
 ) -> Ints:
     """Fates (up, across) of the whole grid; written to `path` row by row.
 
     Raises:
-        ConfigError: `path` holds the rows of another question, or cannot be written; no worker.
+        ConfigError: `path` holds the rows of another task, or cannot be written; no worker.
     """
     if workers < 1:
         raise ConfigError(f"workers is {workers}; a map needs 1 process or more")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        rows = _read(path, question) if path.exists() else {}
-        text = "\n".join([question.text(), *(_line(*row) for row in sorted(rows.items()))])
+        rows = _read(path, task) if path.exists() else {}
+        text = "\n".join([task.text(), *(_line(*row) for row in sorted(rows.items()))])
         path.write_text(text + "\n", encoding="utf-8")
-        todo = [index for index in range(question.up.count) if index not in rows]
+        todo = [index for index in range(task.up.count) if index not in rows]
         with path.open("a", encoding="utf-8") as file:
-            for index, fates in _rows(question, todo, workers):
+            for index, fates in _rows(task, todo, workers):
                 rows[index] = fates
                 file.write(_line(index, fates) + "\n")
                 file.flush()
                 if progress is not None:
-                    progress(len(rows), question.up.count)
+                    progress(len(rows), task.up.count)
     except OSError as error:
         raise UnwritableError(f"{path} cannot be written: {error}") from error
-    return np.array([rows[index] for index in range(question.up.count)], dtype=np.int64)
+    return np.array([rows[index] for index in range(task.up.count)], dtype=np.int64)
 
 
 def _line(index: int, fates: list[int]) -> str:
     return json.dumps({"row": index, "fates": fates})
 
 
-def _rows(question: BasinTask, todo: list[int], workers: int) -> Iterator[tuple[int, list[int]]]:
+def _rows(task: BasinTask, todo: list[int], workers: int) -> Iterator[tuple[int, list[int]]]:
     if not todo:
         return
-    large = len(todo) * question.across.count >= LARGE
+    large = len(todo) * task.across.count >= LARGE
     if workers == 1:
-        _start_worker(question)
-        yield from map(partial(_row, attraction_in(question) if large else None), todo)
+        _start_worker(task)
+        yield from map(partial(_row, attraction_in(task) if large else None), todo)
         return
-    with _pool(question, workers) as pool:
+    with _pool(task, workers) as pool:
         # A submission starts a worker if none is idle; one that ^C reached while it loads its
         # modules would die before it could ignore it. They load while the neighbourhood is sought.
         with children_without_interrupts():
             for _ in range(workers):
                 pool.submit(int)
-        row = partial(_row, attraction_in(question) if large else None)
+        row = partial(_row, attraction_in(task) if large else None)
         with children_without_interrupts():
             futures = [pool.submit(row, index) for index in todo]
         for future in as_completed(futures):
@@ -274,11 +274,11 @@ def _rows(question: BasinTask, todo: list[int], workers: int) -> Iterator[tuple[
 
 
 @contextmanager
-def _pool(question: BasinTask, workers: int) -> Iterator[ProcessPoolExecutor]:
+def _pool(task: BasinTask, workers: int) -> Iterator[ProcessPoolExecutor]:
     """Pool of new processes; they are not forked, since a compiled leg does not survive a fork."""
     context: Any = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(
-        workers, mp_context=context, initializer=_start_process, initargs=(question,)
+        workers, mp_context=context, initializer=_start_process, initargs=(task,)
     )
     try:
         yield pool
