@@ -1,4 +1,4 @@
-"""Watch over touchdown and lift-off of a course: their event, and conditions that hold already.
+"""Watch over touchdown and lift-off of a leg: their event, and conditions that hold already.
 
 After an event the new regime lasts a shortest time at least, at the end of which a foot that sinks
 below the ground lands, and a force that pulls lifts the foot off. The event is watched from the
@@ -21,8 +21,6 @@ from legbench.design.statics import GRAVITY
 TIE = 1e-7
 """Tolerance of acceleration over gravity and of force over weight when the foot is released [-]: on
 the radial mode both vanish together, and rounding decides their signs."""
-
-
 SLOW = 0.01
 """Landing speed below which a guarded height is noticeable: it delays landing by 1e-11 s [m/s]."""
 Beginning = tuple[float, Pair, Pair, Pair, Pair]

@@ -1,8 +1,8 @@
-"""Events that a course watches: levels of the probe, its turning points, limits and the ground.
+"""Events of a leg in motion: levels of the probe, its turning points, limits and the ground.
 
-A piece of a course begins where something has happened. Before the integration goes on, the sign of
-every event function that could be near zero there is made certain (`compiled_regime`). A condition
-that holds already, because a motor, the regime or a level has jumped, is an event at once.
+A piece of its integration begins where something has happened. Before the integration goes on, the
+sign of every event function that could be near zero there is made certain (`compiled_regime`). A
+condition that holds already, because a motor, the regime or a level has jumped, is an event at once.
 """
 
 from typing import final
@@ -33,7 +33,7 @@ SEEN = (Watched.RISE, Watched.FALL, Watched.TURN, Watched.FELL, Watched.FELL)
 
 @final
 class EventDetector:
-    """The events that one course watches.
+    """Events that are watched while one leg moves.
 
     Attributes:
         levels: levels of the probe.

@@ -16,12 +16,14 @@ class MovingLeg:
 
     Attributes:
         model: the leg.
+        probe: factors p1, p2 of the probe `p1 q1 + p2 q2` that is watched [-].
         plain: the leg without derivatives, on which decisions are made; so are `plain_q`, `plain_v`
             and `plain_motor`.
         time: present time [s].
         began: time at which the present regime or piece began, zero for its integrator [s].
         elapsed: time since then [s].
         regime: regime whose equations hold.
+        terms: inertia and gravity of the angles in this regime.
         q: angles [rad].
         v: rates [rad/s].
         motor: motor positions [rad].

@@ -24,7 +24,7 @@ STATES = 4
 
 @final
 class Variation:
-    """Derivatives along the pieces of a course, by any number of seeds m.
+    """Derivatives along the pieces of an integration, by any number of seeds m.
 
     Seeds may be in the state, in the levels of events, and in the parameters of the leg.
     """
