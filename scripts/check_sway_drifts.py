@@ -36,7 +36,7 @@ BENCH = Bench(
     design=load_design(ROOT / "models" / "optimal.toml"), bus_file=ROOT / "hardware" / "leg.toml"
 )
 COUNTS = (4096, 1 << 16)
-"""Of the encoders, in a turn."""
+"""Counts of the encoders per turn."""
 LEARNING, AFTER = 1200, 300
 """Cycles for which a watch looks on before a drift, and after it began."""
 SWAYING_TIME = 100.0
