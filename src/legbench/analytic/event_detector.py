@@ -2,7 +2,8 @@
 
 A piece of its integration begins where something has happened. Before the integration goes on, the
 sign of every event function that could be near zero there is made certain (`compiled_regime`). A
-condition that holds already, because a motor, the regime or a level has jumped, is an event at once.
+condition that holds already, because a motor, the regime or a level has jumped, is at once an
+event.
 """
 
 from typing import final
