@@ -17,6 +17,7 @@ from legbench.campaign.shards import read_shard, shard_bytes, told_of
 from legbench.campaign.table import FORMAT_KEY
 from legbench.errors import CampaignError, RecordingError
 from legbench.recording import reader
+from legbench.recording.archive import count_rows
 from legbench.recording.layout import ARCHIVE
 from legbench.recording.reader import load
 from legbench.recording.repair import recover
@@ -144,6 +145,21 @@ def test_recover_tells_damage_as_reading_does(run: Path) -> None:
             continue
         told.append(damaged)
     assert len(told) >= 30
+
+
+def test_rows_that_end_at_a_page_of_no_kind_are_not_counted_as_all(table: Path) -> None:
+    """The first page of a column says of which kind it is in its second byte."""
+    content, told = table.read_bytes(), 0
+    assert count_rows(table) == 40
+    for bit in range(8 * 5, 8 * 6):
+        damaged = bytearray(content)
+        damaged[bit // 8] ^= 1 << bit % 8
+        table.write_bytes(damaged)
+        try:
+            assert count_rows(table) == 40
+        except (OSError, pa.ArrowException) as error:
+            told += "it gave back 0 of 40 rows" in str(error)
+    assert told > 0
 
 
 def test_a_damaged_archive_beside_its_stream_is_written_anew(tmp_path: Path) -> None:

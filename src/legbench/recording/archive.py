@@ -10,7 +10,7 @@ from pyarrow import parquet
 
 from legbench.errors import RecordingError
 from legbench.recording.layout import ARCHIVE
-from legbench.recording.sealed import UNREADABLE, opened, seal
+from legbench.recording.sealed import UNREADABLE, opened, require_every_row, seal
 from legbench.recording.stream import WholeBatches, carrying, schema_for
 from legbench.writing import put_in_place, reason
 
@@ -95,9 +95,15 @@ def _groups(batches: WholeBatches, schema: pa.Schema) -> Iterator[pa.Table]:
 
 
 def count_rows(path: Path) -> int:
-    """Return the rows of a Parquet file by decoding all of them; raises as pyarrow does."""
+    """Return the rows of a Parquet file by decoding all of them.
+
+    Raises:
+        OSError, pyarrow.ArrowException: it is damaged, or ends before its last row.
+    """
     with opened(path) as file:
-        return sum(batch.num_rows for batch in file.iter_batches(batch_size=GROUP_ROWS))
+        found = sum(batch.num_rows for batch in file.iter_batches(batch_size=GROUP_ROWS))
+        require_every_row(found, file.metadata.num_rows)
+    return found
 
 
 def read_archive(run: Path) -> pa.Table:

@@ -14,7 +14,7 @@ import pyarrow as pa
 from legbench.errors import RecordingError
 from legbench.recording.archive import write_archive
 from legbench.recording.layout import ARCHIVE
-from legbench.recording.sealed import UNREADABLE, opened
+from legbench.recording.sealed import UNREADABLE, opened, require_every_row
 from legbench.recording.stream import WholeBatches
 from legbench.writing import reason
 
@@ -49,7 +49,7 @@ class ArchiveColumns(Mapping[str, np.ndarray]):
         try:
             with opened(self._path) as file:
                 values = column_values(file.read([name])[name])
-            self._require_every_row(len(values))
+            require_every_row(len(values), self.rows)
             return values
         except UNREADABLE as error:
             raise RecordingError(f"{self._path} is damaged: {reason(error)}") from error
@@ -72,14 +72,9 @@ class ArchiveColumns(Mapping[str, np.ndarray]):
                     table = pa.Table.from_batches([batch])
                     yield {name: column_values(table[name]) for name in table.column_names}
                     found += batch.num_rows
-            self._require_every_row(found)
+            require_every_row(found, self.rows)
         except UNREADABLE as error:
             raise RecordingError(f"{self._path} is damaged: {reason(error)}") from error
-
-    def _require_every_row(self, found: int) -> None:
-        """Refuse a column that ends early, as at a page whose kind is none; raises OSError."""
-        if found != self.rows:
-            raise OSError(f"it gave back {found} of {self.rows} rows")
 
 
 @final

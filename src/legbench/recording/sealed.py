@@ -57,6 +57,18 @@ def opened(source: Path | bytes) -> parquet.ParquetFile:
     return parquet.ParquetFile(str(source), page_checksum_verification=True)
 
 
+def require_every_row(found: int, told: int) -> None:
+    """Refuse rows that end early, as at a page whose kind is none, before those of the footer.
+
+    A reader of Parquet leaves the rest out without a word, if it reads one column, or in batches.
+
+    Raises:
+        OSError: there are others than were told.
+    """
+    if found != told:
+        raise OSError(f"it gave back {found} of {told} rows")
+
+
 def _check_footer(file: IO[bytes]) -> None:
     """Compare the footer of a file with its seal, if it has one; raises OSError."""
     first, footer = _footer(file)
