@@ -223,6 +223,20 @@ def test_torque_is_evidence_as_far_as_it_is_of_one_sign_and_not_explained(
     assert (doubts > 0) == doubted
 
 
+def test_evidence_from_before_the_springs_are_known_is_outweighed_by_what_is_explained() -> None:
+    """A leg that is pushed for long while it cannot be doubted yet is not doubted much later."""
+    watch = MomentumWatch(HOPPING, 0.03, PERIOD)
+    pushed, well, touched = crouched(0.0, 0.1), crouched(0.0), crouched(0.0, 0.04)
+    for reading in [pushed] * 700 + [well] * 400:
+        assert watch.see(reading) is None
+    left = []
+    for reading in [touched] * 7 + [well] * 30:
+        assert watch.see(reading) is None
+        left.append(watch.residual or 0.0)
+    assert max(left) > 4.0 * 0.03
+    assert alarm(watch, pushed, well=well) is not None
+
+
 def test_single_steps_of_coarse_encoders_are_no_evidence_against_a_leg_that_stands() -> None:
     # A leg that sways on the ground by 0.06 rad in a second, as while its drives are enabled.
     step, omega, swing = 2.0 * math.pi / 4096, 2.0 * math.pi, 0.03

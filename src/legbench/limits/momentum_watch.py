@@ -121,7 +121,9 @@ class MomentumWatch:
         place = -1 if contact.in_flight else 0
         torque, patience = left[place], self._supports[place].patience
         if torque < math.inf:
-            self._evidence += 1 if torque > 0.0 else -1
+            more = self._evidence + (1 if torque > 0.0 else -1)
+            # Just enough, since what comes before the springs are known must not outlast them.
+            self._evidence = min(max(more, -patience - 1), patience + 1)
         return abs(self._evidence) > patience
 
     def _left(self, motion: LegMotion, *, free: bool) -> list[float]:
