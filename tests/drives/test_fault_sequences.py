@@ -178,7 +178,7 @@ def test_a_drive_that_does_not_hear_its_master_has_longer() -> None:
 
 def never_stops(patch: pytest.MonkeyPatch) -> None:
     """Drives that no loss of their master stops, and a master that does not stop them."""
-    patch.setattr(LinkEnd, "stop", lambda end: setattr(end._status, "stopped", StopReport()))
+    patch.setattr(LinkEnd, "_stop", lambda end, _: setattr(end._status, "stopped", StopReport()))
     patch.setattr(PowerStage, "connection_lost", lambda _stage: None)
 
 

@@ -120,8 +120,13 @@ def test_a_swing_is_found_to_a_part_of_a_count(can_swing: Recording) -> None:
     truth = fallen()
     moved = moved_from(can_swing, rounded(truth), MotionSource.MOTORS)
     assert moved.count == pytest.approx(COUNT)
-    found = find_start(Toppling(falls_at=0.06), moved, STEPS)
+    told: list[tuple[int, int]] = []
+    found = find_start(
+        Toppling(falls_at=0.06), moved, STEPS, lambda done, total: told.append((done, total))
+    )
     assert found.rows is not None
+    assert told == sorted(set(told))
+    assert told[-1][0] <= told[-1][1] == told[0][1]
     plain = find_start(
         Toppling(), moved_from(can_swing, rounded(truth), MotionSource.COMMANDS), STEPS
     )

@@ -97,7 +97,7 @@ def resimulate(
         steps = np.maximum(1, np.round(np.diff(times) / plant.period)).astype(int).tolist()
         start = None
         if moved.on_drives:
-            start = _guarded(lambda: find_start(plant, moved, steps), 0.0)
+            start = _guarded(lambda: find_start(plant, moved, steps, progress), 0.0)
         fault = _drive(plant, moved, start, (times, steps), run, progress)
     if fault is not None and run.rows == 0:
         raise fault

@@ -13,6 +13,7 @@ from typing import Final
 
 import numpy as np
 
+from legbench.loop import Progress
 from legbench.plant.abstract import AbstractPlant
 from legbench.replay.moved import Moved
 from legbench.replay.start_estimate import BESIDE, PULSE, StartEstimate, StartTrials
@@ -32,7 +33,9 @@ SHARES: Final = (1.0, 0.5, 0.25)
 """Parts of a step that are tried."""
 
 
-def find_start(plant: AbstractPlant, moved: Moved, steps: Sequence[int]) -> StartEstimate:
+def find_start(
+    plant: AbstractPlant, moved: Moved, steps: Sequence[int], progress: Progress | None = None
+) -> StartEstimate:
     """Estimate how the leg of a run on drives stood and swung before its first row.
 
     Its swing is sought where motors were measured and the plant stands as the leg stood: another
@@ -42,6 +45,7 @@ def find_start(plant: AbstractPlant, moved: Moved, steps: Sequence[int]) -> Star
         plant: the leg; where it is left does not matter.
         moved: rows of the run.
         steps: number of periods of the plant from each row to the next.
+        progress: told after each step of the search how many rows it has been through.
     """
     rest, count = moved.rest(), moved.count
     swing = _swing(plant, moved, round(LONGEST_REST / plant.period))
@@ -56,7 +60,7 @@ def find_start(plant: AbstractPlant, moved: Moved, steps: Sequence[int]) -> Star
     least = PULSE * len(start.beside)
     short = swing[: max(least, round(SHORT_REST / plant.period)) + len(rest)]
     again = replace(start, periods=_best(short, rest, least))
-    return _improved(trials, windows, start, again)
+    return _improved(trials, windows, start, again, progress)
 
 
 def _swing(plant: AbstractPlant, moved: Moved, most: int) -> Floats:
@@ -76,7 +80,11 @@ def _best(swing: Floats, rest: Floats, least: int) -> int:
 
 
 def _improved(
-    trials: StartTrials, windows: Sequence[int], first: StartEstimate, again: StartEstimate
+    trials: StartTrials,
+    windows: Sequence[int],
+    first: StartEstimate,
+    again: StartEstimate,
+    progress: Progress | None,
 ) -> StartEstimate:
     """Start from which the leg stays beside the recorded one for longest.
 
@@ -85,14 +93,19 @@ def _improved(
         windows: numbers of rows that count, one after the other.
         first: start that is returned if no other is better.
         again: start that is moved.
+        progress: told after each step how many rows it has been through.
     """
     best, longest, at = first, trials.follow(first).beside, again
+    through, total = 0, STEPS * sum(windows)
     for rows in windows:
-        for _ in range(STEPS):
+        for step in range(STEPS):
             found = None if longest == trials.rows else trials.better(at, rows, SHARES)
             if found is None:
                 break
             at, beside = found, trials.follow(found).beside
             if beside > longest:
                 best, longest = at, beside
+            if progress is not None:
+                progress(through + (step + 1) * rows, total)
+        through += STEPS * rows
     return best
