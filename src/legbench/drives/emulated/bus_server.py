@@ -10,9 +10,8 @@ import can
 
 from legbench.closing import Closing
 from legbench.drives.emulated.network import Network
-from legbench.drives.emulated.network_time import NetworkTime
 from legbench.drives.emulated.pacer import Pacer
-from legbench.drives.emulated.shared_body import LockstepChannels
+from legbench.drives.emulated.shared_body import time_of
 from legbench.drives.errors import BusError
 from legbench.drives.transport.messages import frame_of, message_of
 from legbench.drives.transport.split_bus import SplitBus, wait_for_any
@@ -77,9 +76,7 @@ class BusServer(Closing):
         self._ports = [
             BusPort(network, bus) for network, bus in zip(networks, self._parts, strict=True)
         ]
-        alone = len(networks) == 1
-        passing = NetworkTime(networks[0]) if alone else LockstepChannels(networks)
-        self._pacer = Pacer(passing, now_ns)
+        self._pacer = Pacer(time_of(networks), now_ns)
 
     def poll(self) -> None:
         """Wait a moment for frames, pass them on and advance virtual time.

@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from typing import final
 
 from legbench.drives.emulated.network import Body, Network
+from legbench.drives.emulated.network_time import NetworkTime
+from legbench.drives.emulated.pacer import VirtualTime
 from legbench.drives.emulated.station import Station
 
 
@@ -82,3 +84,8 @@ class LockstepChannels:
             upcoming[place] = network.upcoming()
         for network in networks:
             network.now_ns = now_ns
+
+
+def time_of(networks: Sequence[Network]) -> VirtualTime:
+    """Virtual time of one network, or of several that pass it together."""
+    return NetworkTime(networks[0]) if len(networks) == 1 else LockstepChannels(networks)

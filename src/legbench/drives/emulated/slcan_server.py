@@ -9,9 +9,8 @@ from typing import final
 
 from legbench.closing import Closing
 from legbench.drives.emulated.network import Network
-from legbench.drives.emulated.network_time import NetworkTime
 from legbench.drives.emulated.pacer import Pacer
-from legbench.drives.emulated.shared_body import LockstepChannels
+from legbench.drives.emulated.shared_body import time_of
 from legbench.drives.emulated.slcan_line import SlcanLine
 
 
@@ -52,9 +51,7 @@ class SlcanServer(Closing):
             ]
             made.pop_all()
         self.path = ",".join(line.path for line in self._lines)
-        alone = len(networks) == 1
-        passing = NetworkTime(networks[0]) if alone else LockstepChannels(networks)
-        self._pacer = Pacer(passing, now_ns)
+        self._pacer = Pacer(time_of(networks), now_ns)
 
     def poll(self) -> None:
         """Wait a moment for lines, move frames and time on."""
