@@ -112,11 +112,11 @@ class Switched(can.BusABC):
         super().__init__(channel="switched")
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
-        """As the bus behind."""
+        """Send on the bus behind."""
         self.inner.send(msg, timeout)
 
     def recv(self, timeout: float | None = None) -> can.Message | None:
-        """As the bus behind; a peer that the machine holds up is waited for."""
+        """Receive from the bus behind; a peer that the machine holds up is waited for."""
         return self.inner.recv(PATIENCE if timeout and self.inner is not self._first else timeout)
 
 
@@ -129,11 +129,11 @@ class Free:
         self._now_ns = 0
 
     def now_ns(self) -> int:
-        """Now [ns]."""
+        """Return the present time [ns]."""
         return self._now_ns if self.first is None else self.first.timebase.now_ns()
 
     def wait_until(self, at_ns: int) -> None:
-        """Be there."""
+        """Pass the time to `at_ns` without waiting."""
         if self.first is not None:
             self.first.timebase.wait_until(at_ns)
         self._now_ns = max(self._now_ns, at_ns)
@@ -160,7 +160,7 @@ def raw_cycle(bus: can.BusABC, targets: tuple[int, int]) -> Callable[[], None]:
 
 
 def canopen_cycle(bus: can.BusABC, targets: tuple[int, int]) -> tuple[Callable[[], None], Any]:
-    """The same by the PDO objects of the `canopen` package, and the network to end."""
+    """Return a raw cycle made of PDO objects of `canopen`, and the network that is to end."""
     network = canopen.Network()
     network.bus = bus
     nodes = []

@@ -44,7 +44,8 @@ OFF = replace(DESIGN, stiffness=(3.0, 1.7), damping=(0.0065, 0.0095))
 ENOUGH = 50.0
 """Processor time, as a multiple of ours, at which pycma is ended [-]."""
 PEER_ENOUGH = 500.0
-"""The same for `mujoco.sysid`, which is let run to the end: accuracy is compared, too."""
+"""Processor time, as a multiple of ours, at which `mujoco.sysid` is ended [-]; it is let run to the
+end where it can, since accuracy is compared, too."""
 CLOSE = 0.01
 """Part of a standard error within which pycma counts as having arrived [-]."""
 FREED = {

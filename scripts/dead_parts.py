@@ -24,9 +24,9 @@ ROOT = Path(__file__).parents[1]
 EARLIEST, LATEST = 0.3, 4.0
 """When a part dies, after the beginning of a run [s]."""
 BANDWIDTHS = (None, 30.0, 15.0)
-"""Of the position loops; none is ideal [Hz]."""
+"""Bandwidths of the position loops; none is ideal [Hz]."""
 COUNTS = (4096, 1 << 20)
-"""Of the encoders, in a turn."""
+"""Counts of the encoders per turn."""
 LEAN = 0.08
 """Angle by which a leg leans as it starts; it then sways as others do after minutes [rad]."""
 SWAYING_EARLIEST, SWAYING_LATEST = 1.1, 2.5

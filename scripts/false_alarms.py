@@ -34,7 +34,7 @@ RESULTS = ROOT / ".cache" / "false_alarms.csv"
 BANDWIDTHS = {"ideal": None, "30": 30.0, "15": 15.0}
 """Name of a servo -> bandwidth of its position loops [Hz]."""
 COUNTS = (4096, 1 << 20)
-"""Of the encoders, in a turn."""
+"""Counts of the encoders per turn."""
 EMULATIONS = (Emulation.SIM, Emulation.CAN)
 """Emulations that are tried; the equations hop as MuJoCo does, at the price of the bus."""
 
