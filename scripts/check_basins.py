@@ -20,7 +20,7 @@ import numpy as np
 
 sys.path.append(str(Path(__file__).parents[1] / "tests" / "modes"))
 
-from brute_basins import question_around
+from brute_basins import task_around
 from random_hops import random_case, tools_of
 from reference.basins import Cells, edges, fates
 from reference.dop853 import Accuracy
@@ -59,52 +59,52 @@ def random_map(number: int, points: int) -> BasinTask:
             continue
         if abs(found.multipliers[0]) < STABLE:
             pair, design = PAIRS[number % len(PAIRS)], case.design
-            return question_around(design, case.config, found.apex, pair, points, random, SPANS)
+            return task_around(design, case.config, found.apex, pair, points, random, SPANS)
     raise SystemExit(f"map {number}: no leg with a stable hop in 1000")
 
 
-def cells_of(questions: list[BasinTask]) -> Cells:
+def cells_of(tasks: list[BasinTask]) -> Cells:
     """Cells of maps, one map after the other, row by row."""
     starts, centres, designs, configs = [], [], [], []
-    for question in questions:
-        across, up = question.across.values(), question.up.values()
-        centre = np.repeat(question.centre.vector()[:, np.newaxis], len(across) * len(up), axis=1)
+    for task in tasks:
+        across, up = task.across.values(), task.up.values()
+        centre = np.repeat(task.centre.vector()[:, np.newaxis], len(across) * len(up), axis=1)
         start = centre.copy()
-        start[NAMES.index(question.across.name)] = np.tile(across, len(up))
-        start[NAMES.index(question.up.name)] = np.repeat(up, len(across))
+        start[NAMES.index(task.across.name)] = np.tile(across, len(up))
+        start[NAMES.index(task.up.name)] = np.repeat(up, len(across))
         starts.append(start)
         centres.append(centre)
-        designs += [question.design] * start.shape[1]
-        configs += [question.jump] * start.shape[1]
+        designs += [task.design] * start.shape[1]
+        configs += [task.jump] * start.shape[1]
     return Cells(
         designs=designs,
         configs=configs,
         centres=np.concatenate(centres, axis=1),
         starts=np.concatenate(starts, axis=1),
-        hops=questions[0].hops,
-        near=questions[0].near,
+        hops=tasks[0].hops,
+        near=tasks[0].near,
     )
 
 
-def mapped(question: BasinTask) -> list[str]:
+def mapped(task: BasinTask) -> list[str]:
     """Fates of a map's cells, row by row, as the package finds them."""
     with tempfile.TemporaryDirectory() as folder:
-        found = map_basin(question, Path(folder) / "map.jsonl", workers=1)
+        found = map_basin(task, Path(folder) / "map.jsonl", workers=1)
     return [Fate(fate).name.lower() for fate in found.ravel().tolist()]
 
 
 def compare(numbers: range, points: int) -> tuple[int, int]:
     """Print how some maps differ; return the numbers of wrong cells and of those on an edge."""
-    questions = [random_map(number, points) for number in numbers]
-    told = [fate for question in questions for fate in mapped(question)]
-    cells = cells_of(questions)
+    tasks = [random_map(number, points) for number in numbers]
+    told = [fate for task in tasks for fate in mapped(task)]
+    cells = cells_of(tasks)
     wanted = fates(cells, ROUGH)
     differ = [
         cell for cell, pair in enumerate(zip(told, wanted, strict=True)) if pair[0] != pair[1]
     ]
     beside = dict(zip(differ, edges(cells, differ), strict=True))
     bad = on_edge = 0
-    for place, (number, question) in enumerate(zip(numbers, questions, strict=True)):
+    for place, (number, task) in enumerate(zip(numbers, tasks, strict=True)):
         mine = range(place * points**2, (place + 1) * points**2)
         counts = {fate: 0 for fate in sorted({wanted[cell] for cell in mine})}
         lines, wrong = [], 0
@@ -121,8 +121,8 @@ def compare(numbers: range, points: int) -> tuple[int, int]:
             )
         bad, on_edge = bad + wrong, on_edge + len(lines) - wrong
         print(
-            f"map {number}, {question.design.name}, {question.across.name} and "
-            f"{question.up.name}: {wrong} of {points**2} cells differ, {len(lines) - wrong} more "
+            f"map {number}, {task.design.name}, {task.across.name} and "
+            f"{task.up.name}: {wrong} of {points**2} cells differ, {len(lines) - wrong} more "
             f"on an edge; {counts}",
             *lines,
             sep="\n  ",

@@ -22,7 +22,7 @@ NEIGHBOUR = 1e-7
 ENDINGS = {"stands": Fate.STANDS, "fell": Fate.FELL, "fault": Fate.FAULT}
 
 
-def random_question(design: LegDesign, seed: int, points: int) -> BasinTask:
+def random_task(design: LegDesign, seed: int, points: int) -> BasinTask:
     """A window of random size over two random coordinates, around the leg's periodic hop."""
     config, random = JumpConfig(), np.random.default_rng(seed)
     law = JumpLaw(config, design)
@@ -30,10 +30,10 @@ def random_question(design: LegDesign, seed: int, points: int) -> BasinTask:
     start = Apex(height=0.27, speed=0.0, z1=0.0, z2=0.6, dz1=0.0, dz2=0.0)
     centre = fixed_point(leg, law, settle(leg, law, start, 60)[-1]).apex
     first, second = random.choice(6, 2, replace=False).tolist()
-    return question_around(design, config, centre, (first, second), points, random)
+    return task_around(design, config, centre, (first, second), points, random)
 
 
-def question_around(
+def task_around(
     design: LegDesign,
     config: JumpConfig,
     centre: Apex,
@@ -61,62 +61,62 @@ def question_around(
     )
 
 
-def start_at(question: BasinTask, column: int, row: int) -> Apex:
+def start_at(task: BasinTask, column: int, row: int) -> Apex:
     """The start of a cell."""
-    vector = question.centre.vector()
-    vector[NAMES.index(question.across.name)] = question.across.values()[column]
-    vector[NAMES.index(question.up.name)] = question.up.values()[row]
+    vector = task.centre.vector()
+    vector[NAMES.index(task.across.name)] = task.across.values()[column]
+    vector[NAMES.index(task.up.name)] = task.up.values()[row]
     return Apex.of(vector)
 
 
-def fate_by_dense(question: BasinTask, start: Apex) -> Fate:
+def fate_by_dense(task: BasinTask, start: Apex) -> Fate:
     """What becomes of a start, by DOP853."""
-    model, at = LegModel.of(question.design), start
-    config = question.jump or JumpConfig()
-    for _ in range(question.hops):
+    model, at = LegModel.of(task.design), start
+    config = task.jump or JumpConfig()
+    for _ in range(task.hops):
         try:
             flying(model, *at.angles(), at.state(model).trunk_pos, (0.0, 0.0))
         except ConfigError:
             return Fate.BURIED
-        hop = DenseHop(model, Rules(config, question.design))
+        hop = DenseHop(model, Rules(config, task.design))
         story = hop.run(at.height, at.speed, *at.angles())
         if story.ending != "apex":
             return ENDINGS[story.ending]
         at = Apex.of(np.array(story.apex))
-        if np.max(np.abs(at.vector() - question.centre.vector()) / UNITS) < question.near:
+        if np.max(np.abs(at.vector() - task.centre.vector()) / UNITS) < task.near:
             return Fate.RETURNS
     return Fate.WANDERS
 
 
-def on_an_edge(question: BasinTask, start: Apex) -> bool:
+def on_an_edge(task: BasinTask, start: Apex) -> bool:
     """Whether starts beside this one end otherwise, at the finest tolerance."""
-    leg, drive = replace(question, tolerance=FINEST).tools()
+    leg, drive = replace(task, tolerance=FINEST).tools()
     fates = {
-        fate_of(leg, drive, question, Apex.of(start.vector() + NEIGHBOUR * row * UNITS))
+        fate_of(leg, drive, task, Apex.of(start.vector() + NEIGHBOUR * row * UNITS))
         for row in np.vstack([np.eye(6), -np.eye(6), np.zeros((1, 6))])
     }
     return len(fates) > 1
 
 
-def differing(question: BasinTask, dense: int, seed: int) -> tuple[list[str], int]:
+def differing(task: BasinTask, dense: int, seed: int) -> tuple[list[str], int]:
     """Cells whose fate differs from brute force, one line each, and how many lie on an edge.
 
     All cells are compared with the finest tolerance, `dense` random ones with DOP853, too.
     """
-    (leg, drive), attraction = question.tools(), attraction_in(question)
-    fine, _ = replace(question, tolerance=FINEST).tools()
+    (leg, drive), attraction = task.tools(), attraction_in(task)
+    fine, _ = replace(task, tolerance=FINEST).tools()
     random, wrong, edges = np.random.default_rng(seed), [], 0
-    count = question.across.count * question.up.count
+    count = task.across.count * task.up.count
     chosen = set(random.choice(count, min(dense, count), replace=False).tolist())
     for cell in range(count):
-        row, column = divmod(cell, question.across.count)
-        start = start_at(question, column, row)
-        told = fate_of(leg, drive, question, start, attraction)
-        others = [fate_of(fine, drive, question, start)]
+        row, column = divmod(cell, task.across.count)
+        start = start_at(task, column, row)
+        told = fate_of(leg, drive, task, start, attraction)
+        others = [fate_of(fine, drive, task, start)]
         if cell in chosen:
-            others.append(fate_by_dense(question, start))
+            others.append(fate_by_dense(task, start))
         if any(other is not told for other in others):
-            if on_an_edge(question, start):
+            if on_an_edge(task, start):
                 edges += 1
             else:
                 wrong.append(f"({column}, {row}) {told.name}, brute force {others}: {start}")

@@ -14,7 +14,7 @@ from legbench.signals import Floats
 
 pytest.importorskip("heyoka")
 
-from brute_basins import random_question
+from brute_basins import random_task
 
 from legbench.modes.attraction import Attraction, attraction_of
 from legbench.modes.basin import BasinTask, Fate, attraction_in, fate_of
@@ -65,7 +65,7 @@ def test_a_hop_that_repels_or_attracts_too_slowly_has_none() -> None:
 
 @pytest.fixture(scope="module")
 def asked() -> BasinTask:
-    return random_question(PROTOTYPE, 3, 6)
+    return random_task(PROTOTYPE, 3, 6)
 
 
 def test_a_leg_that_is_attracted_returns(asked: BasinTask, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,7 +12,7 @@ from legbench.design import LegDesign, load_design
 
 pytest.importorskip("heyoka")
 
-from brute_basins import differing, random_question
+from brute_basins import differing, random_task
 from random_hops import random_case, thrown, told, tools_of
 from reference.verdicts import judge
 
@@ -224,6 +224,6 @@ def test_every_reading_has_its_place() -> None:
 @pytest.mark.long
 @pytest.mark.parametrize(("name", "seed"), [("prototype", 3), ("optimal", 4)])
 def test_cells_of_a_basin_are_those_of_brute_force(name: str, seed: int) -> None:
-    question = random_question(design_of(name), seed, 6)
-    wrong, _ = differing(question, 3, seed)
+    task = random_task(design_of(name), seed, 6)
+    wrong, _ = differing(task, 3, seed)
     assert wrong == []

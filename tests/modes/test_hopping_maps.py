@@ -235,7 +235,7 @@ def test_template_has_the_stiffness_of_the_leg() -> None:
     assert math.isclose(slip.length, 0.253, rel_tol=1e-9)
 
 
-def question(point: FixedPoint, count: int = 5) -> BasinTask:
+def task(point: FixedPoint, count: int = 5) -> BasinTask:
     height = point.apex.height
     return BasinTask(
         design=PROTOTYPE,
@@ -249,7 +249,7 @@ def question(point: FixedPoint, count: int = 5) -> BasinTask:
 
 
 def test_a_basin_map_is_resumed_where_it_stopped(point: FixedPoint, tmp_path: Path) -> None:
-    asked, path = question(point), tmp_path / "basin.jsonl"
+    asked, path = task(point), tmp_path / "basin.jsonl"
     steps: list[int] = []
     whole = map_basin(asked, path, workers=1, progress=lambda done, _: steps.append(done))
     assert steps == [1, 2, 3, 4, 5]
@@ -261,11 +261,11 @@ def test_a_basin_map_is_resumed_where_it_stopped(point: FixedPoint, tmp_path: Pa
     assert steps == [3, 4, 5]
     assert np.array_equal(whole, again)
     with pytest.raises(ConfigError, match="belongs to another map"):
-        map_basin(question(point, 6), path, workers=1)
+        map_basin(task(point, 6), path, workers=1)
 
 
 def test_two_processes_map_what_one_does(point: FixedPoint, tmp_path: Path) -> None:
-    asked = question(point, 3)
+    asked = task(point, 3)
     one = map_basin(asked, tmp_path / "one.jsonl", workers=1)
     two = map_basin(asked, tmp_path / "two.jsonl", workers=2)
     assert np.array_equal(one, two)
