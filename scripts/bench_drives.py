@@ -66,9 +66,7 @@ PATIENCE = 0.5
 QUIET = 0.005
 """Time without a frame after which the peer has answered all that it was sent [s]."""
 PARTS = ("controller", "record", "link")
-OVER_RAW = {Kind.REST: 1.6, Kind.JUMP: 1.6, Kind.SWAY: 2.0}
-"""Bounds of the link over raw frames; a leg that sways has its momentum watched, too."""
-BOUNDS = {"link over canopen": 0.8, "cycle cpu p50 [us]": 350.0}
+BOUNDS = {"link over raw": 1.6, "link over canopen": 0.8, "cycle cpu p50 [us]": 350.0}
 
 
 def peer(listener: socket.socket, motion: Motion) -> None:
@@ -341,11 +339,10 @@ def main() -> int:
         print(f"  link over raw, neighbours: median {middle:.2f}, quartiles {low:.2f}, {high:.2f}")
         cpu = ", ".join(f"{name} {statistics.median(us):.1f}" for name, us in parts.items())
         print(f"  cpu p50 [us]: {cpu}")
-        bounds = BOUNDS | {"link over raw": OVER_RAW[kind]}
         for name, value in found.items():
-            words = "ok" if value <= bounds[name] else "MISSED"
-            print(f"  {name:<20} {value:7.2f}  bound {bounds[name]:g}  {words}")
-            missed = missed or value > bounds[name]
+            words = "ok" if value <= BOUNDS[name] else "MISSED"
+            print(f"  {name:<20} {value:7.2f}  bound {BOUNDS[name]:g}  {words}")
+            missed = missed or value > BOUNDS[name]
     return int(missed)
 
 
