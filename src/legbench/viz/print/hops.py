@@ -34,6 +34,8 @@ LABELS = {
     Setting.DAMPING: "dampers over those of the design [-]",
     Setting.MISMATCH: "$(k_1 - k_2) / k$ [-]",
 }
+MOST_TICKS = 4
+"""Most intervals between ticks of a return map: heights such as 0.26255 m fit between."""
 
 
 def plot_return(heights: Floats, fixed: Floats, title: str, path: Path) -> None:
@@ -52,6 +54,7 @@ def plot_return(heights: Floats, fixed: Floats, title: str, path: Path) -> None:
             title=title,
         )
         axes.set_aspect("equal")
+        axes.locator_params(nbins=MOST_TICKS)
         save_figure(figure, path, DPI)
 
 
