@@ -10,8 +10,8 @@ from pathlib import Path
 
 from tracing import ROOT, Passed, Timed
 
-BUDGET = 6.0
-"""Tests that run a changed line are tried for so long, timed under the trace [s]."""
+BUDGET = 2.5
+"""Tests that run a changed line are tried for so long, timed with probes [s]."""
 IMPORTING_FILES = 10
 """A fault that an import runs is tried with the tests of so many files."""
 

@@ -15,6 +15,20 @@ ASLEEP = 20.0
 """A child that neither ran nor waited for a processor for so long waits for ever [s]."""
 
 
+def in_background(work: Callable[[], int]) -> int:
+    """Begin some work in a fork of this process that writes nothing out; return its id."""
+    pid = os.fork()
+    if pid == 0:
+        silent = os.open(os.devnull, os.O_RDWR)
+        os.dup2(silent, 1)
+        status = FAILED
+        try:
+            status = int(work())
+        finally:
+            os._exit(status)
+    return pid
+
+
 def in_fork(work: Callable[[], int], seconds: float) -> int | None:
     """Exit status of some work in a silent fork of this process; none when it had to be ended.
 

@@ -32,8 +32,11 @@ from tracing import CACHE, PACKAGE, ROOT, Passed, digest
 from trial import Fault, Trials, prepare
 
 EQUIVALENT = Path(__file__).with_name("equivalent.toml")
-DRIVES = ("tests/drives/test_[!c]*.py", "tests/drives/test_c[!a]*.py")
-"""Tests of drives without `test_can_*`, which try the whole plant."""
+DRIVES = (
+    *("tests/drives/test_[!c]*.py", "tests/drives/test_c[!a]*.py"),
+    "tests/drives/test_can_unix_bus.py",
+)
+"""Tests of drives without most of `test_can_*`, which try the whole plant."""
 TESTS = {
     "drives": DRIVES,
     "limits": DRIVES,
@@ -48,6 +51,8 @@ OTHER_PROCESS = ("test_can_processes.py", "test_can_hardware.py", "test_channel_
 STRICT = (
     *("limits/guard.py", "limits/safety.py", "limits/plausibility.py", "limits/knee.py"),
     *("limits/encoder_watch.py", "limits/shortfall.py", "limits/upper_ends.py"),
+    *("limits/momentum.py", "limits/momentum_watch.py", "limits/support_watch.py"),
+    *("limits/ground_contact.py", "limits/spring_mismatch.py"),
     *("drives/protocol/cia402.py", "drives/master/stop.py", "drives/master/stop_report.py"),
     *("drives/master/sdo_stop.py", "drives/master/cycle.py", "drives/master/start_up.py"),
     *("drives/master/supervisor.py", "drives/master/outgoing.py"),
@@ -186,7 +191,7 @@ def _tests_of(path: Path) -> tuple[Path, ...]:
     if room not in TESTS:
         sys.exit(f"{path}: no tests are named for {room}; there are {', '.join(TESTS)}")
     files = [file for pattern in TESTS[room] for file in sorted(ROOT.glob(pattern))]
-    return tuple(file for file in files if file.name not in OTHER_PROCESS)
+    return tuple(dict.fromkeys(file for file in files if file.name not in OTHER_PROCESS))
 
 
 def _near(suite: Sequence[Path], paths: Sequence[Path]) -> list[Path]:

@@ -3,27 +3,23 @@
 import hashlib
 import json
 import os
-import sys
-import threading
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import CodeType, FrameType
 from typing import Any
 
 import pytest
+from probes import Probes
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "src" / "legbench"
 CACHE = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "legbench-mutants"
-TIMES = 100
-"""A function is followed line by line until so many of its calls in one test showed nothing new."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Timed:
-    """A test and the time of the processor that it took under the trace."""
+    """A test and the time of the processor that it took with probes."""
 
     name: str
     seconds: float
@@ -46,55 +42,27 @@ class Passed:
 class LineTrace:
     """A plugin that notes which lines of the package each passing test runs."""
 
-    def __init__(self) -> None:
-        self._lines: dict[str, set[int]] = {}
-        self._calls: dict[CodeType, int] = {}
-        self._prepared: dict[str, set[int]] = {}
+    def __init__(self, probes: Probes) -> None:
+        self._probes = probes
+        self._prepared: dict[str, int] = {}
         """Run by fixtures; what they made may serve later tests, too."""
         self._began = 0.0
         self.passed: list[dict[str, Any]] = []
 
-    def _on_call(self, frame: FrameType, _event: str, _: object) -> Callable[..., Any] | None:
-        code = frame.f_code
-        if not code.co_filename.startswith(str(PACKAGE)):
-            return None
-        calls = self._calls.get(code, 0)
-        if calls > TIMES:
-            return None
-        self._calls[code] = calls + 1
-        lines = self._lines.setdefault(code.co_filename, set())
-        calls_of = self._calls
-
-        def on_line(frame: FrameType, event: str, _: object) -> Callable[..., Any]:
-            if event == "line" and frame.f_lineno not in lines:
-                lines.add(frame.f_lineno)
-                calls_of[code] = 0
-            return on_line
-
-        return on_line
-
-    @pytest.hookimpl(wrapper=True)
-    def pytest_runtest_protocol(self) -> Any:
-        """Trace one test with its fixtures."""
-        self._lines, self._calls, self._began = {}, {}, _processor_time()
-        threading.settrace(self._on_call)
-        sys.settrace(self._on_call)
-        try:
-            return (yield)
-        finally:
-            sys.settrace(None)
-            threading.settrace(None)
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtest_logstart(self) -> None:
+        """Begin to note one test with its fixtures."""
+        self._probes.reset()
+        self._began = _processor_time()
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Keep what a test ran once it has passed."""
         if report.when == "setup":
-            _add(self._prepared, self._lines)
+            self._prepared = _union(self._prepared, self._probes.lines())
         elif report.when == "call" and report.passed:
-            ran: dict[str, set[int]] = {}
-            _add(ran, self._lines)
-            _add(ran, self._prepared)
-            lines = {_module(name): _bits(ran[name]) for name in sorted(ran)}
             seconds = _processor_time() - self._began
+            ran = _union(self._prepared, self._probes.lines())
+            lines = {name: f"{ran[name]:x}" for name in sorted(ran)}
             test = {"name": report.nodeid, "seconds": seconds, "lines": lines}
             self.passed.append(test)
 
@@ -105,17 +73,9 @@ def _processor_time() -> float:
     return time.process_time() + children.children_user + children.children_system
 
 
-def _add(total: dict[str, set[int]], lines: dict[str, set[int]]) -> None:
-    for name, numbers in lines.items():
-        total.setdefault(name, set()).update(numbers)
-
-
-def _bits(lines: set[int]) -> str:
-    return f"{sum(1 << line for line in lines):x}"
-
-
-def _module(name: str) -> str:
-    return Path(name).relative_to(PACKAGE).as_posix()
+def _union(first: dict[str, int], second: dict[str, int]) -> dict[str, int]:
+    names = first.keys() | second.keys()
+    return {name: first.get(name, 0) | second.get(name, 0) for name in names}
 
 
 def digest(paths: Iterable[Path]) -> str:

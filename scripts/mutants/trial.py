@@ -13,7 +13,7 @@ import os
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
@@ -21,16 +21,16 @@ from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 
 import pytest
-from forks import FAILED, in_fork
-from tracing import PACKAGE, ROOT, LineTrace, Passed, Timed, load, save
+from forks import FAILED, in_background, in_fork
+from sessions import Session, run_items, run_pytest, traced
+from tracing import PACKAGE, ROOT, Timed
 
 HEAVY = (
     *("can", "canopen", "durand", "serial", "numpy", "scipy.integrate", "pyarrow.parquet"),
     *("mujoco", "tyro", "hypothesis", "_hypothesis_pytestplugin", "unittest.mock", "pdb"),
 )
-TIMES, GRACE = 1.0, 2.0
-"""A child may take this many times the time of its tests without faults, and this long more [s].
-That time was taken under the trace, which makes it two to four times as long."""
+TIMES, GRACE = 2.0, 2.0
+"""A child may take this many times the time of its tests without faults, and this long more [s]."""
 COLLECTING = 8.0
 """The time that it may take to import and to collect the files of a few tests [s]."""
 UNNOTICED = (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED)
@@ -94,6 +94,8 @@ def _key(code: CodeType) -> Key:
 def _functions() -> dict[Key, list[FunctionType]]:
     """All functions of the package that exist now."""
     found: dict[Key, list[FunctionType]] = {}
+    # The tests freeze what they have imported, and what is frozen is not among these.
+    gc.unfreeze()
     for thing in gc.get_objects():
         if type(thing) is FunctionType and thing.__code__.co_filename.startswith(str(PACKAGE)):
             found.setdefault(_key(thing.__code__), []).append(thing)
@@ -126,20 +128,13 @@ class _Select(_Outcome):
         items[:] = kept
 
 
-class _Serve:
-    """A plugin that does not run the tests that were collected, but waits for wishes."""
+class _Serve(Session):
+    """Waits for faults, and tries each with its tests in a fork."""
 
     def __init__(self, wishes: Connection, failed: Path) -> None:
         self._wishes = wishes
         self._failed = failed
         self._trials = 0
-
-    def pytest_sessionstart(self) -> None:
-        """A failing example is enough, it need not be the smallest."""
-        hypothesis = importlib.import_module("hypothesis")
-        kept = (hypothesis.Phase.explicit, hypothesis.Phase.generate)
-        hypothesis.settings.register_profile("mutants", phases=kept, database=None)
-        hypothesis.settings.load_profile("mutants")
 
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
         items = {item.nodeid: item for item in session.items}
@@ -151,25 +146,12 @@ class _Serve:
             files = self._failed.with_name(f"s{self._trials}")
             # What an earlier child left running may still write where its tests had their files.
             vars(session.config)["_tmp_path_factory"]._given_basetemp = files
-            if isinstance(wish, Fault):
-                chosen = [items[test.name] for test in wish.tests]
-                seconds = GRACE + TIMES * sum(test.seconds for test in wish.tests)
-                work = _plant_and_run(functions, wish, chosen, _Outcome(self._failed))
-                self._wishes.send(in_fork(work, seconds))
-            else:
-                chosen = [item for item in session.items if item.path == wish]
-                self._wishes.send(in_fork(_trace_and_save(wish, chosen), 600.0))
+            chosen = [items[test.name] for test in wish.tests]
+            seconds = GRACE + TIMES * sum(test.seconds for test in wish.tests)
+            work = _plant_and_run(functions, wish, chosen, _Outcome(self._failed))
+            self._wishes.send(in_fork(work, seconds))
             shutil.rmtree(files, ignore_errors=True)
         return True
-
-
-def _run(items: Sequence[pytest.Item], plugin: object) -> Iterator[pytest.Item]:
-    for place, item in enumerate(items):
-        if place == 0:
-            item.config.pluginmanager.register(plugin)
-        following = items[place + 1] if place + 1 < len(items) else None
-        item.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
-        yield item
 
 
 def _plant_and_run(
@@ -184,7 +166,7 @@ def _plant_and_run(
                 return NOT_SO
         else:
             sys.meta_path.insert(0, _Planted(fault.path, fault.changed))
-        for item in _run(items, outcome):
+        for item in run_items(items, outcome):
             if outcome.failed:
                 item.session._setupstate.teardown_exact(None)
                 break
@@ -211,26 +193,6 @@ def _exchange(functions: dict[Key, list[FunctionType]], fault: Fault) -> bool:
     return bool(exchanged)
 
 
-def _trace_and_save(file: Path, items: Sequence[pytest.Item]) -> Callable[[], int]:
-    def work() -> int:
-        trace = LineTrace()
-        for _ in _run(items, trace):
-            pass
-        save(file, trace.passed)
-        return 0
-
-    return work
-
-
-def _pytest(folder: Path, files: Iterable[str], plugin: object, *more: str) -> int:
-    os.chdir(ROOT)
-    # A failure is not explained, only noticed: that takes ten times as long as to find it.
-    usual = ["-q", "--assert=plain", "--tb=native", "-p", "no:cacheprovider", *more]
-    return pytest.main(
-        [*usual, f"--basetemp={folder / f't{os.getpid()}'}", *files], plugins=[plugin]
-    )
-
-
 class Trials:
     """Plants faults: forks of this process and of one whose tests are collected already."""
 
@@ -239,35 +201,24 @@ class Trials:
         self._folder = Path(tempfile.mkdtemp(prefix="mutants-"))
         self._failed = self._folder / "failed"
         self._wishes, theirs = Pipe()
-        self._pid = os.fork()
-        if self._pid == 0:
+        names = [str(file.relative_to(ROOT)) for file in files]
+        serve = _Serve(theirs, self._failed)
+
+        def work() -> int:
+            # So that the session ends with this process, however that ends.
             self._wishes.close()
-            silent = os.open(os.devnull, os.O_RDWR)
-            os.dup2(silent, 1)
-            try:
-                names = [str(file.relative_to(ROOT)) for file in files]
-                os._exit(_pytest(self._folder, names, _Serve(theirs, self._failed)))
-            finally:
-                os._exit(FAILED)
+            return run_pytest(self._folder, names, serve)
+
+        self._pid = in_background(work)
         theirs.close()
         self._wishes.recv()
-        self.tests = [test for file in files for test in self._traced(file)]
+        self.tests = traced(files, self._folder)
 
     def close(self) -> None:
         """End the session."""
         self._wishes.send(None)
         os.waitpid(self._pid, 0)
         shutil.rmtree(self._folder, ignore_errors=True)
-
-    def _traced(self, file: Path) -> list[Passed]:
-        known = load(file)
-        if known is None:
-            self._wishes.send(file)
-            status = self._wishes.recv()
-            known = load(file)
-            if known is None:
-                sys.exit(f"{file}: its tests cannot be traced ({status}); run them with pytest")
-        return known
 
     def noticed(self, fault: Fault) -> str | None:
         """The test that fails under a fault, or what else shows it; none if nothing does."""
@@ -293,7 +244,7 @@ class Trials:
     def _import_and_run(self, fault: Fault) -> int:
         sys.meta_path.insert(0, _Planted(fault.path, fault.changed))
         files = dict.fromkeys(test.name.split("::")[0] for test in fault.tests)
-        status = _pytest(self._folder, files, _Select(self._failed, fault.tests), "-x")
+        status = run_pytest(self._folder, files, _Select(self._failed, fault.tests), "-x")
         # A module that cannot be imported is noticed, and pytest calls that a wrong usage.
         return pytest.ExitCode.TESTS_FAILED if status == pytest.ExitCode.USAGE_ERROR else status
 
