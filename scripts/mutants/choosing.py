@@ -1,7 +1,6 @@
 """Choice of the tests that a fault is tried with: those that run its line, the fastest first."""
 
 import ast
-import itertools
 import re
 from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
@@ -43,17 +42,17 @@ def runs_at_import(tree: ast.Module, tests: Sequence[Passed], module: str, line:
 
 
 def _affordable(tests: Iterable[Timed], budget: float, near: Collection[str] = ()) -> list[Timed]:
-    """Tests for a budget's time: the fastest of each file, then each file's second fastest.
+    """Tests for a budget's time: the cheaper, and the fewer of its file come before, the sooner.
 
     Files differ in what they look at, so that many of them find more than all tests of a few.
     Those of some near files get half of the time for themselves.
     """
     taken: Counter[str] = Counter()
-    ranked: list[tuple[int, float, Timed]] = []
+    ranked: list[tuple[float, str, Timed]] = []
     for test in sorted(tests, key=lambda test: test.seconds):
         file = file_of(test)
-        ranked.append((taken[file], test.seconds, test))
         taken[file] += 1
+        ranked.append((taken[file] * test.seconds, test.name, test))
     reached = [test for *_, test in sorted(ranked, key=lambda entry: entry[:2])]
     kept = _within(budget / 2, (test for test in reached if file_of(test) in near))
     known = {test.name for test in kept}
@@ -66,10 +65,13 @@ def _affordable(tests: Iterable[Timed], budget: float, near: Collection[str] = (
 
 
 def _within(budget: float, tests: Iterable[Timed]) -> list[Timed]:
-    """The first of some tests that fit into a time."""
-    kept = list(tests)
-    spent = itertools.accumulate(test.seconds for test in kept)
-    return [test for test, so_far in zip(kept, spent, strict=True) if so_far <= budget]
+    """The first of some tests that fit into a time, those left out that do not."""
+    kept: list[Timed] = []
+    for test in tests:
+        if test.seconds <= budget:
+            budget -= test.seconds
+            kept.append(test)
+    return kept
 
 
 def in_function(

@@ -140,8 +140,10 @@ def _key(fault: Fault) -> tuple[str, str]:
 
 
 def _state(fault: Fault) -> str:
+    """A text that changes with the choice of tests, and with what they say."""
     files = {ROOT / file_of(test) for test in fault.tests}
-    return digest(files)[:12] if files else "-"
+    names = "\n".join(sorted(test.name for test in fault.tests))
+    return digest(files, names)[:12] if files else "-"
 
 
 def _try_file(

@@ -78,9 +78,9 @@ def _union(first: dict[str, int], second: dict[str, int]) -> dict[str, int]:
     return {name: first.get(name, 0) | second.get(name, 0) for name in names}
 
 
-def digest(paths: Iterable[Path]) -> str:
-    """A short text that changes with any of some files."""
-    total = hashlib.sha256()
+def digest(paths: Iterable[Path], text: str = "") -> str:
+    """A short text that changes with any of some files, and with another text."""
+    total = hashlib.sha256(text.encode())
     for path in sorted(paths):
         total.update(path.read_bytes() if path.exists() else b"")
     return total.hexdigest()[:32]

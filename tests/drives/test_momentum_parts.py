@@ -156,7 +156,10 @@ def test_no_spring_differs_by_more_than_6_percent_and_more_torque_is_none_of_the
         assert learned([(sign * 0.1799, by)]).share == sign * by * 0.06
         assert learned([(sign * 0.1801, by)]).share == 0.0
     # What cannot be theirs counts as time alone: the mean of one in two.
-    assert learned([(math.inf, 0.0), (0.03, 1.0)]).share == pytest.approx(0.015 / 0.5144)
+    mean = pytest.approx(0.015 / 0.5144)
+    assert learned([(math.inf, 0.0), (0.03, 1.0)]).share == mean
+    assert learned([(0.03, 1.0), (TORQUE, 0.0)]).share == mean
+    assert learned([(0.03, 1.0), (1.001 * TORQUE, 0.0)]).share == pytest.approx(0.03 / 1.0144)
 
 
 def test_springs_are_forgotten_within_a_second() -> None:
@@ -170,11 +173,15 @@ def test_springs_are_forgotten_within_a_second() -> None:
 
 
 def contact(loads: Sequence[float]) -> list[str]:
-    """What is certain after each load on the knee; up to 1 N m may be flight, 5 cycles a stance."""
-    judge = GroundContact(1.0, 5, PERIOD)
+    """What is certain after each load on the knee, 5 cycles a stance.
+
+    Args:
+        loads: relative to the one up to which a leg may be in flight [-].
+    """
+    judge = GroundContact(2.0, 5, PERIOD)
     found = []
     for load in loads:
-        judge.after(load)
+        judge.after(2.0 * load)
         found.append(f"{'f' * judge.in_flight}{'s' * judge.in_stance}")
     return found
 
