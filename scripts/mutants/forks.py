@@ -11,7 +11,7 @@ FAILED = 70
 """Status of a child whose work raised."""
 LOOK = 0.01
 """Time between two looks at a child [s]."""
-ASLEEP = 20.0
+ASLEEP = 4.0
 """A child that neither ran nor waited for a processor for so long waits for ever [s]."""
 
 

@@ -11,6 +11,7 @@ import importlib.abc
 import importlib.machinery
 import os
 import shutil
+import signal
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
@@ -29,8 +30,8 @@ HEAVY = (
     *("can", "canopen", "durand", "serial", "numpy", "scipy.integrate", "pyarrow.parquet"),
     *("mujoco", "tyro", "hypothesis", "_hypothesis_pytestplugin", "unittest.mock", "pdb"),
 )
-TIMES, GRACE = 2.0, 2.0
-"""A child may take this many times the time of its tests without faults, and this long more [s]."""
+TIMES, GRACE = 3.0, 1.0
+"""A test may take this many times its time without faults, and this long more [s]."""
 COLLECTING = 8.0
 """The time that it may take to import and to collect the files of a few tests [s]."""
 UNNOTICED = (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED)
@@ -103,11 +104,15 @@ def _functions() -> dict[Key, list[FunctionType]]:
 
 
 class _Outcome:
-    """Writes down which test failed first."""
+    """Writes down which test failed first, and ends the process with a test that takes too long."""
 
-    def __init__(self, failed: Path) -> None:
+    def __init__(self, failed: Path, chosen: Sequence[Timed]) -> None:
         self.failed = False
         self._file = failed
+        self._seconds = {test.name: test.seconds for test in chosen}
+
+    def pytest_runtest_logstart(self, nodeid: str) -> None:
+        signal.setitimer(signal.ITIMER_PROF, GRACE + TIMES * self._seconds[nodeid])
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         if report.failed and not self.failed:
@@ -119,7 +124,7 @@ class _Select(_Outcome):
     """Keeps chosen tests only, those that were fast first."""
 
     def __init__(self, failed: Path, chosen: Sequence[Timed]) -> None:
-        super().__init__(failed)
+        super().__init__(failed, chosen)
         self._places = {test.name: place for place, test in enumerate(chosen)}
 
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
@@ -147,8 +152,9 @@ class _Serve(Session):
             # What an earlier child left running may still write where its tests had their files.
             vars(session.config)["_tmp_path_factory"]._given_basetemp = files
             chosen = [items[test.name] for test in wish.tests]
-            seconds = GRACE + TIMES * sum(test.seconds for test in wish.tests)
-            work = _plant_and_run(functions, wish, chosen, _Outcome(self._failed))
+            seconds = TIMES * sum(GRACE + test.seconds for test in wish.tests)
+            outcome = _Outcome(self._failed, wish.tests)
+            work = _plant_and_run(functions, wish, chosen, outcome)
             self._wishes.send(in_fork(work, seconds))
             shutil.rmtree(files, ignore_errors=True)
         return True
@@ -230,7 +236,7 @@ class Trials:
             self._wishes.send(fault)
             status = self._wishes.recv()
         if status == NOT_SO:
-            seconds = COLLECTING + TIMES * sum(test.seconds for test in fault.tests)
+            seconds = COLLECTING + TIMES * sum(GRACE + test.seconds for test in fault.tests)
             status = in_fork(lambda: self._import_and_run(fault), seconds)
         if status in UNNOTICED:
             return None
