@@ -29,7 +29,7 @@ os.environ.update(OPENBLAS_NUM_THREADS="1", OMP_NUM_THREADS="1")
 from choosing import BUDGET, at_import, file_of, imports, in_function, runs_at_import, span
 from edits import Mutation, mutations
 from tracing import CACHE, PACKAGE, ROOT, Passed, digest
-from trial import Fault, Trials, prepare
+from trial import OPEN, Fault, Trials, prepare
 
 EQUIVALENT = Path(__file__).with_name("equivalent.toml")
 DRIVES = (
@@ -186,6 +186,10 @@ def _check(path: Path, fresh: Sequence[tuple[Fault, str]], trials: Trials) -> No
             sound = replace(some[0][0], changed=path.read_text(), tests=tests)
             if by := trials.noticed(sound):
                 print(f"{path.name}: {by} fails without a fault, too; what it noticed is void")
+    # What was left open is told of no single test.
+    for fault in [fault for fault, by in fresh if by == OPEN]:
+        if trials.noticed(replace(fault, changed=path.read_text())):
+            print(f"{path.name}: {OPEN} without a fault, too; void is {fault.text}")
 
 
 def _tests_of(path: Path) -> tuple[Path, ...]:

@@ -14,6 +14,7 @@ import shutil
 import signal
 import sys
 import tempfile
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from multiprocessing import Pipe
@@ -37,7 +38,9 @@ COLLECTING = 8.0
 UNNOTICED = (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED)
 NOT_SO = 71
 """Status of a child in which a fault cannot be planted by exchanging code."""
-TIME, IMPORT = "its time was up", "a module could not be imported"
+LEFT_OPEN = 72
+"""Status of a child in which something that must be closed was not, at the end of its tests."""
+TIME, IMPORT, OPEN = "its time was up", "a module could not be imported", "a file was left open"
 """What shows a fault besides a test that fails."""
 UNUSABLE = (pytest.ExitCode.USAGE_ERROR, FAILED)
 
@@ -176,9 +179,18 @@ def _plant_and_run(
             if outcome.failed:
                 item.session._setupstate.teardown_exact(None)
                 break
-        return int(outcome.failed)
+        return int(outcome.failed) or _left_open()
 
     return work
+
+
+def _left_open() -> int:
+    """Look for what must be closed and was not, as pytest does at the end of a session."""
+    found: list[object] = []
+    sys.unraisablehook = found.append
+    warnings.simplefilter("error", ResourceWarning)
+    gc.collect()
+    return LEFT_OPEN if found else 0
 
 
 def _exchange(functions: dict[Key, list[FunctionType]], fault: Fault) -> bool:
@@ -245,12 +257,15 @@ class Trials:
             return self._failed.read_text()
         if status in UNUSABLE:
             sys.exit(f"{fault.path}: pytest ended with {status} under {fault.text}")
-        return TIME if status is None else IMPORT
+        return {None: TIME, LEFT_OPEN: OPEN}.get(status, IMPORT)
 
     def _import_and_run(self, fault: Fault) -> int:
         sys.meta_path.insert(0, _Planted(fault.path, fault.changed))
         files = dict.fromkeys(test.name.split("::")[0] for test in fault.tests)
-        status = run_pytest(self._folder, files, _Select(self._failed, fault.tests), "-x")
+        try:
+            status = run_pytest(self._folder, files, _Select(self._failed, fault.tests), "-x")
+        except (pytest.PytestUnraisableExceptionWarning, ExceptionGroup):
+            return LEFT_OPEN
         # A module that cannot be imported is noticed, and pytest calls that a wrong usage.
         return pytest.ExitCode.TESTS_FAILED if status == pytest.ExitCode.USAGE_ERROR else status
 

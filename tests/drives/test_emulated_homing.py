@@ -147,3 +147,42 @@ def test_switches_are_active_at_their_very_edges() -> None:
         assert switches.inputs(edge + 1e-6 * outwards) == bit
         assert switches.inputs(edge - 1e-6 * outwards) == 0
     assert switches.inputs(1.0 * per_rad) == 4
+
+
+@pytest.mark.parametrize(
+    ("state", "word"),
+    [
+        # CiA 402-2, homing mode: bits 13 (error), 12 (attained) and 10 (target reached).
+        (HomingState.IDLE, 0x0400),
+        (HomingState.SEARCHING, 0x0000),
+        (HomingState.ATTAINED, 0x1400),
+        (HomingState.FAILED, 0x2400),
+    ],
+)
+def test_the_statusword_tells_each_state_of_homing(state: HomingState, word: int) -> None:
+    homing = Homing({}, Switches(UNITS, Behaviour()))
+    homing.state = state
+    assert homing.status(halted=False, standing=True) == word
+
+
+@pytest.mark.parametrize(("method", "direction"), [(34, 1), (33, -1)])
+def test_an_index_pulse_is_passed_at_the_speed_of_the_search_and_not_before(
+    method: int, direction: int
+) -> None:
+    """A count a cycle: from one and a half before the pulse it is half a count before it."""
+    values = {(0x6098, 0): method, (0x607C, 0): 0, (0x607E, 0): 0, (0x6099, 2): 1000}
+    for away, place in ((1.5, -0.5), (0.6, 0.0), (0.002, 0.0)):
+        motion = Motion(UNITS, Behaviour(), values)
+        motion.demand = motion.actual = 1000.0 - direction * away
+        homing = Homing(values, Switches(UNITS, Behaviour()))
+        homing.command(0x1F)
+        homing.step(motion, 1_000_000)
+        assert homing.state is HomingState.SEARCHING
+        assert motion.demand == pytest.approx(1000.0 + direction * place, abs=1e-6)
+    # A thousandth of a count is where the pulse is.
+    motion = Motion(UNITS, Behaviour(), values)
+    motion.demand = motion.actual = 1000.0 - direction * 0.0009
+    homing = Homing(values, Switches(UNITS, Behaviour()))
+    homing.command(0x1F)
+    homing.step(motion, 1_000_000)
+    assert homing.state is HomingState.ATTAINED
