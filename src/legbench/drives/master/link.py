@@ -7,10 +7,8 @@
             sample = link.exchange()
 
 A cycle: tick of the grid, SYNC, process data of all drives until a deadline, watchdogs and limits
-(`exchange`), then the command, slewed and clamped, in RPDOs that act at the next SYNC (`command`).
-Whether motors and encoders still work takes longer to judge than all the rest, and is judged while
-the drives answer the next SYNC. Whatever goes wrong, all drives are told to stop in the same cycle
-and the first cause is kept.
+(`exchange`), then the command, slewed and clamped, in RPDOs that act at the next SYNC (`command`);
+encoders are judged while drives answer that one. Whatever goes wrong, all drives are told to stop.
 """
 
 import math
