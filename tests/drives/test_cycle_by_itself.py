@@ -63,6 +63,20 @@ def test_answers_count_until_the_deadline_and_no_longer() -> None:
         assert wire.time_ns == MS + 720 * US
 
 
+@pytest.mark.parametrize("place", [0, 1])
+def test_a_drive_that_missed_a_cycle_is_well_again_after_two_in_a_row(place: int) -> None:
+    wire = Wire()
+    wire.answers = stale(place, {1})
+    it = cycle(wire)
+    counts = []
+    for _ in range(6):
+        it.tick()
+        counts.append(it.watches[place].missed)
+    # The tick without an answer and the silent one after it.
+    assert counts == [0, 1, 2, 0, 0, 0]
+    assert it.watches[1 - place].missed == 0
+
+
 # --- what is owed ----------------------------------------------------------------------------
 
 

@@ -1,6 +1,7 @@
 import hashlib
 import itertools
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -296,17 +297,24 @@ def test_too_many_missed_ticks_stop_the_leg(tmp_path: Path) -> None:
         assert it.states == [SO, SO]
 
 
-def test_the_first_cause_is_kept(tmp_path: Path) -> None:
+@pytest.mark.parametrize("call", [Link.command, Link.move_to])
+def test_the_first_cause_is_kept(
+    tmp_path: Path, call: Callable[[Link, tuple[float, float]], object]
+) -> None:
     with rig(tmp_path) as it:
+        with pytest.raises(DriveError, match="the link is new; start it first"):
+            it.link.command(START)
         it.link.start()
         with pytest.raises(PlantFault, match="command of motor 1 is nan"):
-            it.link.command((math.nan, 1.9))
+            call(it.link, (math.nan, 1.9))
         first = it.link.fault
         assert first is not None
         assert first.cause == "command not finite"
         assert it.states == [SO, SO]
-        with pytest.raises(PlantFault, match="nan"):
-            it.link.exchange()
+        for again in (it.link.exchange, it.link.look, lambda: it.link.command(START)):
+            with pytest.raises(PlantFault) as caught:
+                again()
+            assert caught.value is first
         assert it.link.fault is first
 
 

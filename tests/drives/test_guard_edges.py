@@ -117,6 +117,15 @@ def test_a_wish_may_jump_by_its_limit_and_no_further(axis: int, side: float) -> 
         assert told.startswith(f"command not finite: the command of motor {axis + 1} is {nothing}")
 
 
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_jump_to_the_other_side_is_as_long_as_it_is(axis: int, side: float) -> None:
+    guard = started(SafetyLimits(command_step=0.5), pair(axis, -0.5 * side, 0.0))
+    told = fault(guard.command, pair(axis, 0.5 * side, 0.0))
+    assert told is not None
+    assert told.startswith(f"command step: the command of motor {axis + 1} jumps by 1.000 rad")
+
+
 def test_a_jump_is_measured_from_the_last_wish_until_that_is_forgotten() -> None:
     limits = SafetyLimits(command_speed=STEP / PERIOD, command_step=0.5)
     for forgets in (False, True):

@@ -187,3 +187,21 @@ def test_a_motor_that_is_suspected_is_named_before_the_link_that_it_makes_doubtf
     told = judged(guard, motor_pos=(0.0, 0.5), joint_pos=(0.0, 0.5))
     assert told is not None
     assert told.startswith("following error: motor 1 shows")
+
+
+@pytest.mark.parametrize("low", [True, False])
+def test_who_is_at_a_limit_is_not_named_for_who_is_beyond_it(*, low: bool) -> None:
+    limits = SafetyLimits(
+        joint_range=((-1.0, 1.0), (-0.5, 1.5)), spring_torque=8.0, temperature=80.0
+    )
+    guard = started(limits)
+    end, over = (-1.0, -0.75) if low else (1.0, 1.75)
+    sign = -1.0 if low else 1.0
+    well = {"joint_pos": (0.0, 0.0), "spring_torque": (0.0, 0.0), "temperature": (80.0, 80.0)}
+    assert fault(guard.check, **well) is None
+    for odd, told in (
+        ({"joint_pos": (end, over)}, "joint range: joint 2 is at"),
+        ({"spring_torque": (8.0 * sign, 8.125 * sign)}, "spring torque: spring 2 carries"),
+        ({"temperature": (80.0, 80.5)}, "temperature: drive 2 is at 80.5 deg C"),
+    ):
+        assert str(fault(guard.check, **well | odd)).startswith(told)
