@@ -141,6 +141,18 @@ def test_every_packet_tells_its_reader_the_state_of_its_controller(
         assert bus._socket.recv(PACKET_BYTES)[5] == state << 1
 
 
+def test_a_master_that_is_bus_off_is_let_go_when_it_hangs_up_and_not_before(wire: UnixWire) -> None:
+    bus = opened(wire)
+    bus.send(message(0x101))
+    wire.network.errors[station_of(wire)] = 256
+    wire.give()
+    # What it sent is not taken any more, and waits in the kernel.
+    assert len(wire._stations) == 1
+    bus.shutdown()
+    wire.give()
+    assert wire._stations == {}
+
+
 def test_channels_and_places_are_as_many(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="zip"):
         ChannelsServer([Network(()), Network(())], [tmp_path / "a.sock"])
