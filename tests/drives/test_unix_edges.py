@@ -197,7 +197,8 @@ def test_own_frames_and_a_passive_controller_are_no_reason_not_to_send(
 def test_each_look_at_the_state_is_at_what_has_come_since(tmp_path: Path) -> None:
     ports = UnixPorts(tmp_path)
     with ports.open() as here, ports.open() as there:
-        there.send(message(0x101))
+        # Read one byte off, this would be a controller that is bus-off.
+        there.send(message(0x101, b"\xff" * 8))
         there.send(message(0x102))
         ports.pass_time()
         # Nothing that was looked at is lost to who reads later.
