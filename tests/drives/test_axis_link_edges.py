@@ -75,3 +75,14 @@ def test_a_torque_has_the_scale_of_its_drive_and_the_direction_of_its_encoder(si
     assert math.isnan(axis.torque)
     assert axis.feed(0x181, shown(0x37, 9, (-8).to_bytes(2, "little", signed=True)))
     assert axis.torque == -2.0 * sign
+
+
+def test_a_link_that_repeats_after_an_odd_number_of_counts_goes_the_shorter_way() -> None:
+    usual = node(0)
+    units = AxisUnits(counts_per_rev=4095, modulus_counts=4095, bits=16)
+    axis = AxisLink(replace(usual, link=units))
+    (pdo,) = usual.tpdos
+    for counts, shown_counts in ((10, 10), (-5, 4090), (2042, 2042), (4089, 4089), (4095, 0)):
+        values = {entry: 0 for entry in pdo.objects} | {usual.link_object: shown_counts}
+        axis.feed(0x181, b"".join(values[e].to_bytes(e.bits // 8, "little") for e in pdo.objects))
+        assert axis.link_counts == counts

@@ -14,6 +14,7 @@ from legbench.drives.emulated.network import Network
 from legbench.drives.emulated.station import Heard, Station
 from legbench.drives.emulated.unix_server import ChannelsServer
 from legbench.drives.emulated.unix_wire import UnixWire
+from legbench.drives.errors import BusError
 from legbench.drives.protocol.frame import Frame
 from legbench.drives.transport.unix_bus import STAMP, UnixBus, _stamp_of
 from legbench.drives.transport.unix_packet import Controller, pack_frame
@@ -199,6 +200,8 @@ def test_each_look_at_the_state_is_at_what_has_come_since(tmp_path: Path) -> Non
     with ports.open() as here, ports.open() as there:
         # Read one byte off, this would be a controller that is bus-off.
         there.send(message(0x101, b"\xff" * 8))
+        ports.pass_time()
+        assert here.state is can.BusState.ACTIVE
         there.send(message(0x102))
         ports.pass_time()
         # Nothing that was looked at is lost to who reads later.
@@ -212,3 +215,9 @@ def test_each_look_at_the_state_is_at_what_has_come_since(tmp_path: Path) -> Non
         ]
         assert heard == [0x101, 0x102]
     ports.close()
+
+
+def test_a_bus_between_processes_asks_for_linux(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr(select, "poll")
+    with pytest.raises(BusError, match="a bus between processes needs"):
+        UnixBus("nowhere")
