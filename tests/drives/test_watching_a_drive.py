@@ -33,6 +33,25 @@ def watch(now_ns: int = 0, heartbeat_ms: int = 10) -> NodeWatch:
     return NodeWatch(replace(config(), heartbeat_ms=heartbeat_ms), node(1), now_ns)
 
 
+def test_a_drive_has_gaps_until_two_cycles_in_a_row_were_complete() -> None:
+    made, seen = watch(), []
+    assert made.gaps is False
+    for complete in (True, False, True, True, False, False, True, True):
+        made.cycle(complete=complete)
+        seen.append((made.gaps, made.missed))
+    # An answer alone takes nothing back of what was missed.
+    assert seen == [
+        (False, 0),
+        (True, 1),
+        (True, 1),
+        (False, 0),
+        (True, 1),
+        (True, 2),
+        (True, 2),
+        (False, 0),
+    ]
+
+
 @pytest.mark.parametrize("heartbeat_ms", [10, 25])
 def test_a_drive_is_lost_after_three_heartbeats_have_not_come(heartbeat_ms: int) -> None:
     made = watch(5 * MS, heartbeat_ms)
