@@ -138,7 +138,7 @@ def test_channels_that_were_opened_are_shut_when_a_later_one_cannot_be(
         return SimpleNamespace(shutdown=lambda: shut.append(str(adapter.channel)))
 
     monkeypatch.setattr(channels_module, "open_bus", opened)
-    adapters = [Adapter(interface="virtual", channel=name) for name in "abc"]
+    adapters = tuple(Adapter(interface="virtual", channel=name) for name in "abc")
     with pytest.raises(BusError, match="cannot open c"):
         open_channels(config(), adapters, leads=False)
     assert shut == ["a", "b"]
