@@ -1,0 +1,89 @@
+"""An emulated drive of which nothing is said, and what it shows of its motor in each period."""
+
+from typing import Any, cast
+
+import pytest
+from drives_rig import config
+
+from legbench.drives.emulated.behaviour import Behaviour, MissingSetpoint
+from legbench.drives.emulated.build import emulate
+from legbench.drives.protocol.sdo import Abort
+
+ASKED = {
+    "reply_delay_us": (50, 250),
+    "seed": 0,
+    "interpolate": True,
+    "missing_setpoint": MissingSetpoint.HOLD,
+    "missing_limit": 3,
+    "sync_loss_periods": 5,
+    "slow_loop": False,
+    "ignores": frozenset(),
+    "status_lag_us": 0,
+    "bandwidth": None,
+    "slew_rate": None,
+    "setpoint_delay": 0,
+    "motor_noise": None,
+    "mode_lag_us": 2000,
+    "mode_needs_power": False,
+    "follows_bit": True,
+    "lacks": frozenset(),
+    "lacking": Abort.NO_OBJECT,
+    "defaults": (),
+    "rpdos": 4,
+    "tpdos": 4,
+    "fixed_mapping": False,
+    "warnings": (),
+    "halt_blocks_mode": True,
+    "boot_us": 5000,
+    "hard_stop": None,
+    "home_switch": None,
+    "start_pos": 0.0,
+    "rated_torque": 10.0,
+}
+IDEAL = {"reply_delay_us": (0, 0), "interpolate": False}
+
+
+def test_a_drive_of_which_nothing_is_said_is_the_usual_one() -> None:
+    usual, ideal = Behaviour(), Behaviour.ideal()
+    for name, value in ASKED.items():
+        assert getattr(usual, name) == value
+        assert getattr(ideal, name) == IDEAL.get(name, value)
+    assert Behaviour.ideal(0.25) == Behaviour(start_pos=0.25, **cast(Any, IDEAL))
+
+
+@pytest.mark.parametrize(("polarity", "sign"), [(0x00, 1), (0x80, -1)])
+def test_a_drive_shows_its_demand_its_error_and_its_limit_switches(
+    polarity: int, sign: int
+) -> None:
+    """The hip, whose counts grow forward, 100 counts behind its demand."""
+    behaviours = [Behaviour(hard_stop=(-1.0, 1.0)), Behaviour()]
+    axis = emulate(config(), behaviours).drives[0].axis
+    values, motion = axis._values, axis.motion
+    values[0x607E, 0] = polarity
+    for angle, switches in ((0.0, 0b00), (-1.0, 0b01), (1.0, 0b10)):
+        motion.actual = float(round(777 + angle * (1 << 20) / 6.283185307179586))
+        motion.demand = motion.actual + 100.0
+        axis.publish()
+        # CiA 402: demand 6062h, error 60F4h, digital inputs 60FDh, all in the drive's own sign.
+        assert values[0x6062, 0] == sign * motion.demand
+        assert values[0x60F4, 0] == sign * 100
+        if sign < 0:
+            switches = {0b01: 0b10, 0b10: 0b01}.get(switches, 0)
+        assert values[0x60FD, 0] == switches
+    # A drive without stops has no switches, and shows none.
+    other = emulate(config()).drives[0].axis
+    other.publish()
+    assert other._values[0x60FD, 0] == 0
+
+
+def test_a_mode_that_is_set_already_is_taken_while_the_drive_is_halted() -> None:
+    for blocks in (True, False):
+        behaviours = [Behaviour(halt_blocks_mode=blocks)] * 2
+        axis = emulate(config(), behaviours).drives[0].axis
+        # 6061h still shows another mode than 6060h holds; bit 8 of 6040h is the halt.
+        axis._values[0x6060, 0], axis._values[0x6061, 0] = 8, 6
+        for halt, other in ((0x000, None), (0x100, Abort.DEVICE_STATE if blocks else None)):
+            axis._values[0x6040, 0] = halt
+            assert axis.check((0x6060, 0), 8) is None
+            assert axis.check((0x6060, 0), 6) is other
+            assert axis.check((0x6060, 0), 99) is Abort.INVALID_VALUE
