@@ -56,7 +56,7 @@ def test_encoders_that_are_wired_wrongly_or_stand_still_are_named_before_any_fit
 def test_a_delay_and_a_stretched_time_are_told_apart(
     steps: tuple[FitTrial, ...], harm: Harm, name: str, value: float
 ) -> None:
-    outcome = identify(task([harm(each) for each in steps]))
+    outcome = identify(task([harm(each) for each in steps[1:]]))
     assert not outcome.trusted
     best = outcome.alternatives[0]
     assert best.name == name
