@@ -11,7 +11,7 @@ from hypothesis import settings
 
 from legbench.design import LegDesign, load_design
 
-settings.register_profile("repeatable", deadline=None, derandomize=True)
+settings.register_profile("repeatable", deadline=None, derandomize=True, max_examples=50)
 settings.load_profile("repeatable")
 
 # Tests that are started in the background inherit that ^C and SIGHUP are ignored, and would hand it
