@@ -22,13 +22,13 @@ JUMP = """
 [[cells]]
 name = "jump"
 set."controller.kind" = "jump"
-set.duration = 2.5
+set.duration = 2.0
 """
 STEPS = """
 [[cells]]
 name = "step"
 set."controller.kind" = "position-jump"
-set.duration = 2.0
+set.duration = 1.4
 grid."setup.kind" = ["hfts", "vfts", "ffs"]
 list = [
   { "controller.settings.z2" = 1.0, "controller.settings.dz2" = -0.3 },
@@ -41,7 +41,7 @@ set."controller.kind" = "bang-bang"
 set."controller.settings.threshold" = 0.04
 grid."setup.kind" = ["hfts", "vfts"]
 grid."controller.settings.z2" = [1.0, 1.8]
-set.duration = 3.5
+set.duration = 2.0
 
 [[cells]]
 name = "bang-bang, fixed foot"
