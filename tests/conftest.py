@@ -5,11 +5,16 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import settings
 
 from legbench.design import LegDesign, load_design
+
+if TYPE_CHECKING:
+    from folder_scheduling import FolderScheduling
+    from xdist.remote import Producer
 
 settings.register_profile("repeatable", deadline=None, derandomize=True, max_examples=50)
 settings.load_profile("repeatable")
@@ -44,6 +49,14 @@ def pytest_collection_finish() -> None:
     gc.freeze()
     gc.set_threshold(50_000, 20, 20)
     gc.enable()
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: "Producer") -> "FolderScheduling":
+    """Hand out a folder at a time to the processes of a run that has several."""
+    from folder_scheduling import FolderScheduling  # noqa: PLC0415 xdist may be switched off
+
+    return FolderScheduling(config, log)
 
 
 @pytest.fixture(scope="session")
