@@ -88,7 +88,12 @@ FLYING = 536
 
 @pytest.mark.parametrize(
     ("phase", "cycles"),
-    [("pushing", 150), ("released", 500), ("flying", FLYING), ("folding", 620)],
+    [
+        ("pushing", 150),
+        ("released", 500),
+        ("flying", FLYING),
+        pytest.param("folding", 620, marks=pytest.mark.long),
+    ],
 )
 def test_a_jump_ends_on_the_ground_whenever_its_time_is_over(phase: str, cycles: int) -> None:
     """In each phase, motors move slowly, and power goes when the foot stands and joints rest."""
