@@ -77,10 +77,10 @@ def main(arguments: list[str]) -> int:
     from legbench.synthesis.trace import Trace
 
     chosen = parse(DesignArguments, "design", arguments)
-    if chosen.plot is not None:
+    for picture in filter(None, (chosen.plot, chosen.drawing)):
         from legbench.viz.print.save import check_suffix
 
-        check_suffix(chosen.plot)
+        check_suffix(picture)
     if chosen.tolerances is not None:
         from legbench.synthesis.yields import check_sample
 
