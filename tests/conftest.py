@@ -35,7 +35,7 @@ sys.dont_write_bytecode = False
 MODELS = Path(__file__).parents[1] / "models"
 
 
-# What is imported and collected stays: searching it for garbage finds none.
+# What is imported and collected stays, with a little garbage that takes half a second to find.
 gc.disable()
 
 
@@ -45,7 +45,6 @@ def pytest_collection_finish() -> None:
     At Python's own threshold of 700 objects the search takes 7 % of the processor time of a run on
     emulated drives; memory is not scarce here.
     """
-    gc.collect()
     gc.freeze()
     gc.set_threshold(50_000, 20, 20)
     gc.enable()
