@@ -47,8 +47,6 @@ class CheckArguments:
 
 def main(arguments: list[str]) -> int:
     """Run `legbench check`: print the verdict on each condition."""
-    from legbench.synthesis.report import condition_lines, reach_lines
-
     chosen = parse(CheckArguments, "check", arguments)
     if not chosen.tolerance >= 0.0:
         raise ConfigError(f"tolerance is {chosen.tolerance:g}; it must be zero or more")
@@ -56,6 +54,8 @@ def main(arguments: list[str]) -> int:
         from legbench.synthesis.yields import check_sample
 
         check_sample(chosen.legs, chosen.seed)
+    from legbench.synthesis.report import condition_lines, reach_lines
+
     design = load_design(chosen.design)
     angle = standing_angle(design, chosen.relaxed_length)
     conditions = check_conditions(Parameters.of(design), angle)

@@ -72,10 +72,6 @@ class DesignArguments:
 
 def main(arguments: list[str]) -> int:
     """Run `legbench design`: search a leg, judge it, write it."""
-    from legbench.synthesis.manufacture import manufacture_table, table_to_json
-    from legbench.synthesis.search import SearchSettings, identity_of
-    from legbench.synthesis.trace import Trace
-
     chosen = parse(DesignArguments, "design", arguments)
     for picture in filter(None, (chosen.plot, chosen.drawing)):
         from legbench.viz.print.save import check_suffix
@@ -85,6 +81,10 @@ def main(arguments: list[str]) -> int:
         from legbench.synthesis.yields import check_sample
 
         check_sample(chosen.legs, chosen.seed)
+    from legbench.synthesis.manufacture import manufacture_table, table_to_json
+    from legbench.synthesis.search import SearchSettings, identity_of
+    from legbench.synthesis.trace import Trace
+
     measured = None if chosen.measured is None else load_design(chosen.measured)
     requirements = requirements_of(chosen)
     usual = 20_000 if chosen.tolerances is None else ROBUST_EVALUATIONS
