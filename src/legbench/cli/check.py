@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from tyro.conf import Positional
 
 from legbench.cli.output import note, print_json, timed_progress
-from legbench.cli.parse import parse
+from legbench.cli.parse import OrNone, parse
 from legbench.design import LegDesign, load_design
 from legbench.design.matching import TOLERANCE, Parameters, check_conditions, standing_angle
 from legbench.design.mending import mends
@@ -25,7 +25,7 @@ class CheckArguments:
 
     design: Annotated[Path, Positional] = Path("models/optimal.toml")
     """Design file of the leg."""
-    relaxed_length: float | None = None
+    relaxed_length: OrNone[float] = None
     """Leg length at which stability is asked for [m]; by default the longest that the stops
     allow, where it is hardest."""
     tolerance: float = TOLERANCE
@@ -33,9 +33,9 @@ class CheckArguments:
     model: bool = True
     """Whether to measure the conditions on the generated MuJoCo model, too; without it they are
     computed from the design's numbers alone."""
-    target: Path | None = None
+    target: OrNone[Path] = None
     """Design file of the planned leg: prints the weights that bring the built one there."""
-    tolerances: str | None = None
+    tolerances: OrNone[str] = None
     """`default` or a tolerance file: makes legs with that scatter and counts those that work."""
     legs: int = 1000
     """Number of scattered legs."""
