@@ -4,6 +4,7 @@ from collections import deque
 from collections.abc import Sequence
 from typing import final
 
+from legbench.drives.emulated.actual_values import ActualValues
 from legbench.drives.emulated.alarms import Alarms
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.dictionary import USUAL_LINKS
@@ -14,21 +15,18 @@ from legbench.drives.emulated.power import HALT, POWERED, PowerStage
 from legbench.drives.emulated.sensors import Sensors
 from legbench.drives.emulated.switches import Switches
 from legbench.drives.protocol.cia402 import DriveState, Mode, StatusBit
-from legbench.drives.protocol.datatypes import DataType, range_of
 from legbench.drives.protocol.emcy import Emergency, emcy_frame
 from legbench.drives.protocol.frame import Frame
-from legbench.drives.protocol.objects import LINK_SHORT, Key
+from legbench.drives.protocol.objects import Key
 from legbench.drives.protocol.sdo import Abort
 from legbench.drives.setup.config import NodeConfig
 from legbench.drives.setup.encoders import Side
-from legbench.drives.setup.units import wrap
 
 MODES = (Mode.NONE, Mode.HOMING, Mode.CYCLIC_SYNCHRONOUS_POSITION)
 POLARITY = (0x607E, 0)
 FOLLOWING_ERROR, SETPOINTS_MISSING, SYNC_MISSING = 0x8611, 0xFF10, 0xFF11
 HOMED = 1 << 15
 """Bit 15 of the statusword, the maker's own: the position refers to a home since power-on."""
-SHORT = (LINK_SHORT, 0)
 _ENABLED = DriveState.OPERATION_ENABLED
 _STATUS = int(StatusBit.REMOTE)
 
@@ -54,7 +52,6 @@ class Axis:
         links: Sequence[Key] = USUAL_LINKS,
     ) -> None:
         """Turn the numbers of an object dictionary; `links` show the position of the link."""
-        self._links = tuple(links)
         self._node, self._behaviour, self._values = node, behaviour, values
         self.node_id = node.node_id
         self.power = PowerStage(values)
@@ -66,7 +63,8 @@ class Axis:
         self._homing = Homing(values, self._switches)
         self._link_counts = 0 if node.link is None else node.link.to_counts(behaviour.start_pos)
         self._torque = 0.0
-        self._target, self._shown = node.target_object.key, node.motor_object.key
+        self._shown = ActualValues(node, behaviour.rated_torque, values, links)
+        self._target = node.target_object.key
         self._mode_due_ns: int | None = None
         self._waiting_word: int | None = None
         self._now_ns = 0
@@ -96,6 +94,8 @@ class Axis:
 
     def take(self) -> list[Frame]:
         """Return the emergency messages since the last call."""
+        if not self._out:
+            return []
         out, self._out = self._out, []
         return out
 
@@ -229,25 +229,10 @@ class Axis:
 
     def publish(self) -> None:
         """Update the actual values in the object dictionary."""
-        values, motion = self._values, self.motion
-        node, sign = self._node, motion.sign
-        actual = self.sensors.motor.show(round(motion.actual + motion.beside))
-        values[self._shown] = node.motor.show(sign * actual)
-        values[0x6062, 0] = wrap(sign * round(motion.demand))
-        values[0x60F4, 0] = wrap(sign * (round(motion.demand) - actual))
-        if node.link is not None:
-            link = self.sensors.link.show(self._link_counts)
-            for key in self._links:
-                own = key == node.link_object.key
-                short = 16 if key == SHORT else 32
-                values[key] = node.link.show(link) if own else wrap(link, short)
+        self._shown.update(self.motion, self.sensors, self._link_counts, self._torque)
         if self._switches.present:
-            values[0x60FD, 0] = self._switches.inputs(motion.travel, sign)
-        rated = self._behaviour.rated_torque
-        values[0x6077, 0] = _saturated(1000.0 * self._torque / rated, DataType.INTEGER16)
-        if node.torque_object is not None:
-            shown = _saturated(self._torque / node.torque_scale, node.torque_object.kind)
-            values[node.torque_object.key] = shown
+            motion = self.motion
+            self._values[0x60FD, 0] = self._switches.inputs(motion.travel, motion.sign)
         self._status()
 
     def _status(self) -> None:
@@ -285,9 +270,3 @@ class Axis:
     def _say(self, frame: Frame | None) -> None:
         if frame is not None:
             self._out.append(frame)
-
-
-def _saturated(value: float, kind: DataType) -> int:
-    """The nearest number that an object of a kind holds."""
-    low, high = range_of(kind)
-    return min(max(round(value), low), high)
