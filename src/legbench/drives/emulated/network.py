@@ -144,7 +144,8 @@ class Network:
             at_ns, event = self._next()
             if at_ns > until_ns:
                 break
-            self.now_ns = max(self.now_ns, at_ns)
+            if at_ns > self.now_ns:
+                self.now_ns = at_ns
             event()
         else:
             return
@@ -196,7 +197,9 @@ class Network:
         now_ns = self.now_ns
         self._flying = winner = self._queue.pop(now_ns)
         frame = winner.frame
-        self._broken = self._injector.breaks(frame, now_ns) or self._garbled(winner.sender)
+        self._broken = self._injector.breaks(frame, now_ns)
+        if self._strangers and not self._broken:
+            self._broken = self._garbled(winner.sender)
         bits = ERROR_BITS + worst_bits(0) if self._broken else bits_of(frame, self._stuffing)
         self._end_ns = now_ns + bits * self._bit_ns
 
@@ -223,8 +226,8 @@ class Network:
         if self._broken:
             self._fail(flying)
             return
-        if sender in self.errors:
-            self.errors[sender] = max(0, self.errors[sender] - 1)
+        if self.errors.get(sender):
+            self.errors[sender] -= 1
         if isinstance(sender, Station):
             sender.waiting -= 1
             if sender.echo:
@@ -244,21 +247,19 @@ class Network:
         now_ns = self.now_ns
         if self.log is not None:
             self.log.append((now_ns, frame))
-        if isinstance(sender, EmulatedDrive) and self._injector.silent(sender.node_id, now_ns):
+        unplugged = self._injector.unplugged
+        if isinstance(sender, EmulatedDrive) and sender.node_id in unplugged:
             return
+        errors = self.errors
         for node in self._nodes:
-            if node is sender:
+            if node is sender or errors[node] >= BUS_OFF:
                 continue
             if isinstance(node, Station):
-                if not self.off_bus(node):
-                    heard = ERROR_FRAME if node in self._strangers else frame
-                    node.received.append(Heard(now_ns, heard))
-            elif not (self.off_bus(node) or self._deaf(node)):
+                heard = ERROR_FRAME if node in self._strangers else frame
+                node.received.append(Heard(now_ns, heard))
+            elif not (isinstance(node, EmulatedDrive) and node.node_id in unplugged):
                 node.receive(frame, now_ns)
                 self._collect(node)
-
-    def _deaf(self, node: Participant) -> bool:
-        return isinstance(node, EmulatedDrive) and self._injector.silent(node.node_id, self.now_ns)
 
     def _fail(self, flying: Waiting) -> None:
         """Send an error frame to all nodes; the sender repeats its frame until it is bus-off."""

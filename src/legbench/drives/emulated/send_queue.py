@@ -58,6 +58,8 @@ class SendQueue:
 
         Of the frames that are ready the one with the lowest identifier wins (ISO 11898-1).
         """
+        if len(self._waiting) == 1:
+            return self._waiting.pop()
         winner = min(self._competing(now_ns), key=lambda entry: entry[1:3])
         self._waiting.remove(winner)
         return winner
