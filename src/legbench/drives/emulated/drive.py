@@ -66,9 +66,8 @@ class EmulatedDrive:
     ) -> None:
         """Switch it on; `kept` is what its memory holds instead of the defaults (1010h)."""
         self._node, self._behaviour = node, behaviour or Behaviour()
-        self.node_id = node.node_id
-        self._random = random.Random(self._behaviour.seed * LAST_NODE + node.node_id)
-        how = self._behaviour
+        self.node_id, how = node.node_id, self._behaviour
+        self._random = random.Random(how.seed * LAST_NODE + node.node_id)
         self._dictionary = shown = changed(dictionary or dictionary_of(node), node, how)
         self._store = ObjectStore(
             shown.entries, self._check, self._written, shown.hidden, lacking=how.lacking
@@ -82,11 +81,9 @@ class EmulatedDrive:
         self._target = node.target_object.key
         self._sdo = SdoServer(self._read, self._store.write, how.sdo_answers)
         self.state = NmtState.BOOT_UP
-        self._now_ns = 0
-        self._tick_ns = 0
+        self._now_ns = self._tick_ns = 0
         self._boot_ns = 1000 * how.boot_us
-        self._beats = HeartbeatProducer()
-        self._heartbeats = HeartbeatConsumer(self._values)
+        self._beats, self._heartbeats = HeartbeatProducer(), HeartbeatConsumer(self._values)
         self._connection = Connection(self.axis, self._values)
         self._reception = Reception(
             self._values, self.axis, self._pdos, self._connection, self._behaviour.sync_loss_periods
@@ -99,16 +96,18 @@ class EmulatedDrive:
 
     def take(self) -> list[tuple[int, Frame]]:
         """Frames to send since the last call, each with the time at which it is ready [ns]."""
-        out, self._out = self._out + self._connection.outlet.take(), []
-        return out
+        frames = self._connection.outlet.take()
+        if self._out:
+            frames, self._out = self._out + frames, []
+        return frames
 
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Receive a frame of another node; whatever it says, nothing is raised."""
         self._now_ns = now_ns
         booting = self.state is NmtState.BOOT_UP and self.node_id != lss.UNCONFIGURED
-        if frame.error or frame.extended or frame.remote or booting:
+        cob_id, data, remote, extended, error, _ = frame
+        if error or extended or remote or booting:
             return
-        cob_id, data = frame.cob_id, frame.data
         if cob_id == lss.REQUEST_ID:
             self._reply(lss.ANSWER_ID, self._lss.feed(data))
             if self._lss.released:
@@ -217,10 +216,11 @@ class EmulatedDrive:
     def _check(self, key: Key, value: int) -> Abort | None:
         if (refusal := self._dictionary.refusal(key, value)) is not None:
             return refusal
-        if Memory.owns(key):
-            return Memory.check(key, value, powered=self.axis.power.state in POWERED)
-        if ProcessData.owns(key):
-            return self._pdos.check(key, value)
+        if key[0] in COMMUNICATION_PROFILE:
+            if Memory.owns(key):
+                return Memory.check(key, value, powered=self.axis.power.state in POWERED)
+            if ProcessData.owns(key):
+                return self._pdos.check(key, value)
         return objection(key, value, self._values) or self.axis.check(key, value)
 
     def _read(self, index: int, sub: int) -> bytes:
@@ -229,7 +229,11 @@ class EmulatedDrive:
         return self._store.read(index, sub)
 
     def _written(self, key: Key) -> None:
-        if ProcessData.owns(key):
+        if key[0] >= 0x6000 or key == self._target:
+            if key == self._target:
+                self._reception.fresh = True
+            self.axis.written(key, self._now_ns)
+        elif ProcessData.owns(key):
             if key[0] & 0x200 or key[1] in (1, 2, 5):
                 self._pdos.rebuild()
         elif Memory.owns(key):
@@ -238,10 +242,6 @@ class EmulatedDrive:
             self._heartbeats.clear()
         elif key == ERROR_COUNT:
             self._values[LATEST_ERROR] = 0
-        elif key[0] >= 0x6000 or key == self._target:
-            if key == self._target:
-                self._reception.fresh = True
-            self.axis.written(key, self._now_ns)
 
     def _boot(self) -> None:
         self.state = NmtState.PRE_OPERATIONAL

@@ -45,6 +45,8 @@ class EmergencyOutlet:
 
     def take(self) -> list[tuple[int, Frame]]:
         """Messages since the last call, each with the time at which it is ready [ns]."""
+        if not self._out:
+            return []
         out, self._out = self._out, []
         return out
 

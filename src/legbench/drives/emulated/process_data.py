@@ -179,12 +179,10 @@ class ProcessData:
     def apply(self, pdo: Pdo, values: tuple[int, ...]) -> None:
         """Write the values of an RPDO to its objects; one that is refused keeps its value."""
         for key, value in zip(pdo.keys, values, strict=True):
-            entry = self._store.entry(key)
-            if entry is not None:
-                try:
-                    self._store.put(entry, value)
-                except SdoAbortError:
-                    continue
+            try:
+                self._store.put(key, value)
+            except SdoAbortError:
+                continue
 
     def events(self, now_ns: int) -> list[Frame]:
         """Sample the event-driven TPDOs that have changed or whose timer has run out."""
