@@ -27,8 +27,10 @@ POLARITY = (0x607E, 0)
 FOLLOWING_ERROR, SETPOINTS_MISSING, SYNC_MISSING = 0x8611, 0xFF10, 0xFF11
 HOMED = 1 << 15
 """Bit 15 of the statusword, the maker's own: the position refers to a home since power-on."""
-_ENABLED = DriveState.OPERATION_ENABLED
-_STATUS = int(StatusBit.REMOTE)
+# Numbers and members by names of their own: looking one up in its class takes longer than its use.
+_ENABLED, _QUICK_STOP = DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE
+_CYCLIC, _HOMING = int(Mode.CYCLIC_SYNCHRONOUS_POSITION), int(Mode.HOMING)
+_STATUS, _FOLLOWS = int(StatusBit.REMOTE), int(StatusBit.FOLLOWS_COMMAND)
 
 
 @final
@@ -42,6 +44,7 @@ class Axis:
         alarms: errors of the drive.
         sensors: encoders of motor and link.
         warning: whether bit 7 of the statusword is set.
+        emergencies: messages that `take` returns.
     """
 
     def __init__(
@@ -69,7 +72,7 @@ class Axis:
         self._waiting_word: int | None = None
         self._now_ns = 0
         self._late_words: deque[tuple[int, int]] = deque()
-        self._out: list[Frame] = []
+        self.emergencies: list[Frame] = []
         self.publish()
 
     def address(self, node_id: int) -> None:
@@ -94,9 +97,7 @@ class Axis:
 
     def take(self) -> list[Frame]:
         """Return the emergency messages since the last call."""
-        if not self._out:
-            return []
-        out, self._out = self._out, []
+        out, self.emergencies = self.emergencies, []
         return out
 
     def check(self, key: Key, value: int) -> Abort | None:
@@ -133,7 +134,7 @@ class Axis:
         if self.power.state is _ENABLED and not was_enabled:
             self.motion.hold(now_ns)
             self._warn()
-        if obeyed and self.power.state is _ENABLED and self._values[0x6061, 0] == Mode.HOMING:
+        if obeyed and self.power.state is _ENABLED and self._values[0x6061, 0] == _HOMING:
             self._homing.command(controlword)
         self._status()
 
@@ -150,7 +151,7 @@ class Axis:
     def sync(self, fresh: bool, now_ns: int) -> None:
         """Latch the target as the new set point at SYNC, if one has come."""
         values = self._values
-        if self.power.state is not _ENABLED or values[0x6061, 0] != 8:
+        if self.power.state is not _ENABLED or values[0x6061, 0] != _CYCLIC:
             return
         if self.power.stopping is not None or values[0x6040, 0] & HALT:
             return
@@ -195,16 +196,16 @@ class Axis:
         if power.stopping is not None:
             if motion.ramp(self._deceleration(power.stopping), step_ns):
                 power.stopped()
-        elif power.state is DriveState.QUICK_STOP_ACTIVE:
+        elif power.state is _QUICK_STOP:
             motion.ramp(0.0, step_ns)
         elif power.state is not _ENABLED:
             motion.hold(now_ns)
             return
         elif values[0x6040, 0] & HALT:
             motion.ramp(self._deceleration(values[0x605D, 0]), step_ns)
-        elif values[0x6061, 0] == Mode.CYCLIC_SYNCHRONOUS_POSITION:
+        elif values[0x6061, 0] == _CYCLIC:
             motion.follow(now_ns, step_ns)
-        elif values[0x6061, 0] == Mode.HOMING:
+        elif values[0x6061, 0] == _HOMING:
             self._homing.step(motion, step_ns)
         motion.drive(step_ns)
         if motion.overdue(step_ns):
@@ -242,31 +243,30 @@ class Axis:
         if self._homing.done:
             word |= HOMED
         mode = self._values[0x6061, 0]
-        if mode == Mode.CYCLIC_SYNCHRONOUS_POSITION:
+        if mode == _CYCLIC:
             if self.power.state is _ENABLED and self.power.stopping is None:
                 follows = not (self._values[0x6040, 0] & HALT or self.motion.limited)
                 if follows and self._behaviour.follows_bit:
-                    word |= StatusBit.FOLLOWS_COMMAND
+                    word |= _FOLLOWS
                 if self.motion.limited:
                     word |= StatusBit.INTERNAL_LIMIT
             if self._values[0x603F, 0] == FOLLOWING_ERROR:
                 word |= StatusBit.FOLLOWING_ERROR
-        elif mode == Mode.HOMING:
+        elif mode == _HOMING:
             halted = bool(self._values[0x6040, 0] & HALT)
             word |= self._homing.status(halted=halted, standing=self.motion.speed == 0.0)
-        self._show(int(word))
-
-    def _show(self, word: int) -> None:
-        """Publish the statusword in the object dictionary, late by the status lag."""
-        lag_ns = 1000 * self._behaviour.status_lag_us
-        if lag_ns:
-            late = self._late_words
-            late.append((self._now_ns + lag_ns, word))
-            while late and late[0][0] <= self._now_ns:
-                self._values[0x6041, 0] = late.popleft()[1]
+        if self._behaviour.status_lag_us:
+            self._show_late(int(word))
         else:
-            self._values[0x6041, 0] = word
+            self._values[0x6041, 0] = int(word)
+
+    def _show_late(self, word: int) -> None:
+        """Publish the statusword in the object dictionary, late by the status lag."""
+        late, lag_ns = self._late_words, 1000 * self._behaviour.status_lag_us
+        late.append((self._now_ns + lag_ns, word))
+        while late and late[0][0] <= self._now_ns:
+            self._values[0x6041, 0] = late.popleft()[1]
 
     def _say(self, frame: Frame | None) -> None:
         if frame is not None:
-            self._out.append(frame)
+            self.emergencies.append(frame)

@@ -18,7 +18,7 @@ from legbench.drives.emulated.reception import RPDO_LATE, Reception
 from legbench.drives.emulated.rules import COMMUNICATION_PROFILE, ERRORS, objection
 from legbench.drives.emulated.store import ObjectStore
 from legbench.drives.emulated.warmth import HOT, WARM, show_temperature
-from legbench.drives.protocol import lss
+from legbench.drives.protocol import lss, nmt
 from legbench.drives.protocol.cia402 import DriveState
 from legbench.drives.protocol.frame import (
     COB_MASK,
@@ -40,11 +40,7 @@ HEARTBEAT_LOST = 0x8130
 SYNC = (0x1005, 0)
 ERROR_COUNT, LATEST_ERROR = (0x1003, 0), (0x1003, 1)
 SET_BACK = tuple(index for index in COMMUNICATION_PROFILE if index not in ERRORS)
-_ORDERS = {
-    NmtCommand.START: NmtState.OPERATIONAL,
-    NmtCommand.STOP: NmtState.STOPPED,
-    NmtCommand.ENTER_PRE_OPERATIONAL: NmtState.PRE_OPERATIONAL,
-}
+_BOOT_UP, _OPERATIONAL = NmtState.BOOT_UP, NmtState.OPERATIONAL
 
 
 @final
@@ -96,15 +92,16 @@ class EmulatedDrive:
 
     def take(self) -> list[tuple[int, Frame]]:
         """Frames to send since the last call, each with the time at which it is ready [ns]."""
-        frames = self._connection.outlet.take()
-        if self._out:
-            frames, self._out = self._out + frames, []
-        return frames
+        outlet = self._connection.outlet
+        if not (self._out or outlet.ready):
+            return []
+        out, self._out = self._out + outlet.take(), []
+        return out
 
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Receive a frame of another node; whatever it says, nothing is raised."""
         self._now_ns = now_ns
-        booting = self.state is NmtState.BOOT_UP and self.node_id != lss.UNCONFIGURED
+        booting = self.state is _BOOT_UP and self.node_id != lss.UNCONFIGURED
         cob_id, data, remote, extended, error, _ = frame
         if error or extended or remote or booting:
             return
@@ -115,11 +112,11 @@ class EmulatedDrive:
         elif self.node_id == lss.UNCONFIGURED:
             return
         elif cob_id == self._values[SYNC] & COB_MASK:
-            if self._reception.is_sync(data, now_ns) and self.state is NmtState.OPERATIONAL:
+            if self._reception.is_sync(data, now_ns) and self.state is _OPERATIONAL:
                 for sample in self._reception.sync(now_ns):
                     self._send(sample)
         elif cob_id in self._pdos.rpdos:
-            if self.state is NmtState.OPERATIONAL:
+            if self.state is _OPERATIONAL:
                 self._reception.rpdo(cob_id, data, now_ns)
         elif cob_id == SDO_REQUEST_BASE + self.node_id:
             if self.state is not NmtState.STOPPED:
@@ -130,28 +127,30 @@ class EmulatedDrive:
                 self._obey(order[0])
         elif self._heartbeats.take(cob_id - HEARTBEAT_BASE, data, now_ns):
             self._connection.over(HEARTBEAT_LOST, now_ns)
-        self._connection.forward(self._now_ns)
+        if self.axis.emergencies:
+            self._connection.forward(self._now_ns)
 
     def tick(self, now_ns: int) -> float:
         """Move until now and check the timers; returns the true motor position [rad]."""
         step_ns, self._now_ns, self._tick_ns = now_ns - self._tick_ns, now_ns, now_ns
         if step_ns <= 0:
             return self.axis.motion.angle
-        booting = self.state is NmtState.BOOT_UP
+        booting = self.state is _BOOT_UP
         running = self.axis.power.state is not DriveState.NOT_READY_TO_SWITCH_ON
         if booting and now_ns >= self._boot_ns and self.node_id != lss.UNCONFIGURED:
             self._boot()
         angle = self.axis.tick(now_ns, step_ns) if running else self.axis.motion.angle
         if not booting:
             self._timers()
-        self._connection.forward(self._now_ns)
+        if self.axis.emergencies:
+            self._connection.forward(self._now_ns)
         return angle
 
     def sense(self, link_pos: float, spring_torque: float) -> None:
         """Take over the state of the body in this tick: link angle [rad], spring torque [N m]."""
         self.axis.sense(link_pos, spring_torque)
         self.axis.publish()
-        if self.state is NmtState.OPERATIONAL:
+        if self.state is _OPERATIONAL:
             for frame in self._pdos.events(self._now_ns):
                 self._send(frame)
 
@@ -259,7 +258,7 @@ class EmulatedDrive:
             self._restart(SET_BACK)
             self._connection.end(self._now_ns)
         else:
-            self._enter(_ORDERS[command])
+            self._enter(nmt.ORDERED[command])
 
     def _enter(self, state: NmtState) -> None:
         before, self.state = self.state, state

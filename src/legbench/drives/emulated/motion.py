@@ -112,9 +112,9 @@ class Motion:
 
     def follow(self, now_ns: int, step_ns: int) -> None:
         """Move the demand along the interpolated way to its place at `now_ns`."""
-        share = min(1.0, (now_ns - self._since_ns) / self.span_ns)
-        if not self._behaviour.interpolate:
-            share = 1.0
+        share = 1.0
+        if self._behaviour.interpolate:
+            share = min(share, (now_ns - self._since_ns) / self.span_ns)
         self._demand(self._from + share * (self._to - self._from), step_ns)
 
     def seek(self, speed: float, step_ns: int) -> None:
