@@ -159,11 +159,8 @@ class Network:
         """Time and handler of the next event; at equal times the grid of the body goes first."""
         if self._flying is not None:
             at_ns, event = self._end_ns, self._land
-        elif self._queue:
-            at_ns = max(self._end_ns, self._queue.earliest_ns)
-            event = self._arbitrate
         else:
-            return self._tick_ns, self._tick
+            at_ns, event = max(self._end_ns, self._queue.earliest_ns), self._arbitrate
         if self._tick_ns <= at_ns:
             return self._tick_ns, self._tick
         return at_ns, event

@@ -5,6 +5,9 @@ from typing import NamedTuple, final
 from legbench.drives.emulated.station import Node, Station
 from legbench.drives.protocol.frame import Frame
 
+NEVER_NS = 1 << 62
+"""Later than any event [ns]."""
+
 
 class Waiting(NamedTuple):
     """A frame that waits for the wire."""
@@ -30,14 +33,10 @@ class SendQueue:
         self._waiting: list[Waiting] = []
         self._count = 0
 
-    def __bool__(self) -> bool:
-        """Whether any frame waits."""
-        return bool(self._waiting)
-
     @property
     def earliest_ns(self) -> int:
-        """Time from which the first of the frames that wait may be sent [ns]."""
-        return min(self._waiting)[0]
+        """Time from which the first of the frames that wait may be sent, `NEVER_NS` without any."""
+        return min(self._waiting)[0] if self._waiting else NEVER_NS
 
     def put(self, sender: Node, ready_ns: int, frame: Frame) -> int:
         """Add a frame that may be sent from a time on [ns]; returns its number."""
