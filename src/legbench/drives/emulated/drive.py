@@ -15,7 +15,7 @@ from legbench.drives.emulated.oddities import changed
 from legbench.drives.emulated.power import POWERED
 from legbench.drives.emulated.process_data import ProcessData
 from legbench.drives.emulated.reception import RPDO_LATE, Reception
-from legbench.drives.emulated.rules import COMMUNICATION_PROFILE, ERRORS, objection
+from legbench.drives.emulated.rules import COMMUNICATION_PROFILE, SET_BACK, objection
 from legbench.drives.emulated.store import ObjectStore
 from legbench.drives.emulated.warmth import HOT, WARM, show_temperature
 from legbench.drives.protocol import lss, nmt
@@ -39,7 +39,6 @@ UNDER_VOLTAGE, OVER_TEMPERATURE = 0x3220, 0x4310
 HEARTBEAT_LOST = 0x8130
 SYNC = (0x1005, 0)
 ERROR_COUNT, LATEST_ERROR = (0x1003, 0), (0x1003, 1)
-SET_BACK = tuple(index for index in COMMUNICATION_PROFILE if index not in ERRORS)
 _BOOT_UP, _OPERATIONAL = NmtState.BOOT_UP, NmtState.OPERATIONAL
 
 
@@ -125,7 +124,9 @@ class EmulatedDrive:
             order = decode_nmt(data)
             if order is not None and order[1] in (0, self.node_id):
                 self._obey(order[0])
-        elif self._heartbeats.take(cob_id - HEARTBEAT_BASE, data, now_ns):
+        elif cob_id > HEARTBEAT_BASE and self._heartbeats.take(
+            cob_id - HEARTBEAT_BASE, data, now_ns
+        ):
             self._connection.over(HEARTBEAT_LOST, now_ns)
         if self.axis.emergencies:
             self._connection.forward(self._now_ns)

@@ -52,10 +52,11 @@ class Injector:
 
     Attributes:
         unplugged: ids of the nodes whose connector is unplugged.
+        frames: faults of frames.
     """
 
     def __init__(self, faults: Sequence[Fault]) -> None:
-        self._frames: list[FrameFault] = []
+        self.frames: list[FrameFault] = []
         self._nodes: list[NodeFault] = []
         self._babbles: list[Babble] = []
         self._begun: list[NodeFault] = []
@@ -66,7 +67,7 @@ class Injector:
     def add(self, fault: Fault) -> None:
         """Add a fault, which acts in its window of time."""
         if isinstance(fault, FrameFault):
-            self._frames.append(fault)
+            self.frames.append(fault)
         elif isinstance(fault, NodeFault):
             self._nodes.append(fault)
         else:
@@ -85,7 +86,7 @@ class Injector:
 
     def breaks(self, frame: Frame, now_ns: int) -> bool:
         """Whether a frame is destroyed on the wire."""
-        for fault in self._frames:
+        for fault in self.frames:
             if fault.kind is FrameFaultKind.BAD_BITS and fault.hits(frame, now_ns):
                 return True
         return False
@@ -93,7 +94,7 @@ class Injector:
     def fate(self, frame: Frame, now_ns: int) -> Fate:
         """Delay [ns] and content of each copy that arrives of a frame that was not destroyed."""
         arrivals: Fate = ((0, frame),)
-        for fault in self._frames:
+        for fault in self.frames:
             if not fault.hits(frame, now_ns):
                 continue
             if fault.kind is FrameFaultKind.DROP:

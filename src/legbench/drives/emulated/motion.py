@@ -70,7 +70,9 @@ class Motion:
     def span_ns(self) -> int:
         """Interpolation time 60C2h [ns]."""
         value, exponent = self._values[0x60C2, 1], self._values[0x60C2, 2]
-        return max(1, round(value * 10.0 ** max(-9, min(exponent, 3)) * SECOND_NS))
+        if not -9 <= exponent <= 3:
+            exponent = max(-9, min(exponent, 3))
+        return max(1, round(value * 10.0**exponent * SECOND_NS))
 
     def hold(self, now_ns: int) -> None:
         """Hold the motor where it is and drop the interpolated way to a target."""

@@ -131,7 +131,7 @@ class Network:
         Raises:
             BusError: the controller is bus-off, or its queue is full.
         """
-        if self.off_bus(station):
+        if self.errors[station] >= BUS_OFF:
             raise BusError("the controller is bus-off; find the cause, then restart the interface")
         if station.waiting >= station.tx_queue:
             raise BusError(f"the transmit queue is full ({station.tx_queue} frames)")
@@ -165,11 +165,9 @@ class Network:
             return self._tick_ns, self._tick
         return at_ns, event
 
-    def _collect(self, node: Node) -> None:
-        if isinstance(node, Station):
-            return
-        for ready_ns, frame in node.take():
-            if not self.off_bus(node):
+    def _enqueue(self, node: Participant, frames: Sequence[tuple[int, Frame]]) -> None:
+        if not self.off_bus(node):
+            for ready_ns, frame in frames:
                 self._queue.put(node, ready_ns, frame)
 
     def _tick(self) -> None:
@@ -187,14 +185,16 @@ class Network:
         for other in self._others:
             other.tick(now_ns)
         for node in self._nodes:
-            self._collect(node)
+            if not isinstance(node, Station) and (frames := node.take()):
+                self._enqueue(node, frames)
 
     def _arbitrate(self) -> None:
         """Start the ready frame with the lowest identifier, as arbitration does (ISO 11898-1)."""
         now_ns = self.now_ns
         self._flying = winner = self._queue.pop(now_ns)
         frame = winner.frame
-        self._broken = self._injector.breaks(frame, now_ns)
+        injector = self._injector
+        self._broken = bool(injector.frames) and injector.breaks(frame, now_ns)
         if self._strangers and not self._broken:
             self._broken = self._garbled(winner.sender)
         bits = ERROR_BITS + worst_bits(0) if self._broken else bits_of(frame, self._stuffing)
@@ -233,6 +233,9 @@ class Network:
             # No node receives a copy of its own frames.
             self._deliver(self._copied.pop(sequence, sender), frame)
             return
+        if not self._injector.frames:
+            self._deliver(sender, frame)
+            return
         for delay_ns, changed in self._injector.fate(frame, self.now_ns):
             if delay_ns:
                 copy = self._queue.put(self._injector, self.now_ns + delay_ns, changed)
@@ -256,7 +259,8 @@ class Network:
                 node.received.append(Heard(now_ns, heard))
             elif not (isinstance(node, EmulatedDrive) and node.node_id in unplugged):
                 node.receive(frame, now_ns)
-                self._collect(node)
+                if answers := node.take():
+                    self._enqueue(node, answers)
 
     def _fail(self, flying: Waiting) -> None:
         """Send an error frame to all nodes; the sender repeats its frame until it is bus-off."""
