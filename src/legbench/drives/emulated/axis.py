@@ -237,28 +237,27 @@ class Axis:
         self._status()
 
     def _status(self) -> None:
-        word = self.power.low_byte | _STATUS
+        power, motion, values = self.power, self.motion, self._values
+        word = power.low_byte | _STATUS
         if self.warning:
             word |= StatusBit.WARNING
         if self._homing.done:
             word |= HOMED
-        mode = self._values[0x6061, 0]
+        mode, halted = values[0x6061, 0], bool(values[0x6040, 0] & HALT)
         if mode == _CYCLIC:
-            if self.power.state is _ENABLED and self.power.stopping is None:
-                follows = not (self._values[0x6040, 0] & HALT or self.motion.limited)
-                if follows and self._behaviour.follows_bit:
-                    word |= _FOLLOWS
-                if self.motion.limited:
+            if power.state is _ENABLED and power.stopping is None:
+                if motion.limited:
                     word |= StatusBit.INTERNAL_LIMIT
-            if self._values[0x603F, 0] == FOLLOWING_ERROR:
+                elif self._behaviour.follows_bit and not halted:
+                    word |= _FOLLOWS
+            if values[0x603F, 0] == FOLLOWING_ERROR:
                 word |= StatusBit.FOLLOWING_ERROR
         elif mode == _HOMING:
-            halted = bool(self._values[0x6040, 0] & HALT)
-            word |= self._homing.status(halted=halted, standing=self.motion.speed == 0.0)
+            word |= self._homing.status(halted=halted, standing=motion.speed == 0.0)
         if self._behaviour.status_lag_us:
-            self._show_late(int(word))
+            self._show_late(word)
         else:
-            self._values[0x6041, 0] = int(word)
+            values[0x6041, 0] = word
 
     def _show_late(self, word: int) -> None:
         """Publish the statusword in the object dictionary, late by the status lag."""

@@ -55,7 +55,8 @@ class Encoder:
     def show(self, counts: int) -> int:
         """Return the reading for a true position [counts]."""
         if self._ailment is not _FROZEN:
-            self._shown = counts + round((self._offset + self._noise) * self._counts_per_rad)
+            error = self._offset + self._noise
+            self._shown = counts + round(error * self._counts_per_rad) if error else counts
         return self._shown
 
 
