@@ -119,9 +119,11 @@ class ProcessData:
     def _build(self, comm: int, old: dict[int, Pdo]) -> Pdo | None:
         values = self._store.values
         cob = values[comm, 1]
+        if cob & COB_INVALID:
+            return None
         mapping = comm + 0x200
         count = min(values.get((mapping, 0), 0), MAX_MAPPED)
-        if cob & COB_INVALID or not count:
+        if not count:
             return None
         words = [values.get((mapping, sub), 0) for sub in range(1, count + 1)]
         entries = [self._mapped(word, mapping) for word in words]
