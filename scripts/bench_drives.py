@@ -4,18 +4,19 @@ The peer is a process of its own behind an AF_UNIX bus. It answers every SYNC wi
 process data, those of a motion that was recorded on emulated drives (`bench_motion`): of a leg at
 rest, of one that hops, and of one that hops and sways, so that every watch of the limits works.
 Raw frames, the link and the other stack take turns, and the ratios are those of neighbours.
+
+Drives do not compute on the master's processor, so the peer has another one. How the same frames
+compare where both share one, and nothing is done while the peer answers, is printed without a
+bound.
 """
 
-import multiprocessing
 import os
-import socket
 import statistics
 import struct
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, final
 
@@ -28,21 +29,18 @@ from bench_motion import (
     ROOT,
     SYNC,
     Kind,
-    Motion,
     bench_config,
     emulated_bus,
     leader,
     open_link,
     record_motion,
 )
+from bench_peer import APART, SHARED, play, served
 
 from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.master.link import Link
 from legbench.drives.master.session import Session
-from legbench.drives.protocol.frame import Frame
 from legbench.drives.setup.config import BusConfig
-from legbench.drives.transport.unix_bus import UnixBus
-from legbench.drives.transport.unix_packet import PACKET, pack_frame, unpack_frame
 from legbench.plant.can import CanPlant
 from legbench.recording.writer import RunWriter
 from legbench.signals import Observation
@@ -53,49 +51,13 @@ ROUNDS, BLOCK = 40, 30
 """Blocks of cycles take turns, so that whatever slows the machine down slows all of them."""
 OTHER_EVERY = 4
 """Rounds between two of the other stack, whose threads take long to begin and to end."""
-BEAT_EVERY = 10
 COMMANDS = (0x201, 0x202)
 COMMAND = struct.Struct("<Hi")
 """Controlword and target."""
-PLAY = 0x7E0
-"""Order to the peer, an identifier that no drive has: whether its motion goes on at each SYNC."""
-SDO_REQUESTS, TEMPERATURE = (0x601, 0x602), bytes.fromhex("4B702000FA000000")
-"""The only object that is asked for in the cycle: 2070h, 25.0 deg C."""
-PATIENCE = 0.5
+PATIENCE = 5.0
 """Longest wait for an answer, so that a machine that is busy elsewhere loses none [s]."""
-QUIET = 0.005
-"""Time without a frame after which the peer has answered all that it was sent [s]."""
 PARTS = ("controller", "record", "link")
-BOUNDS = {"link over raw": 1.6, "link over canopen": 0.8, "cycle cpu p50 [us]": 350.0}
-
-
-def peer(listener: socket.socket, motion: Motion) -> None:
-    """Answer every SYNC until the other end is closed."""
-    port, _ = listener.accept()
-    rows = [
-        [pack_frame(Frame(cob_id, data)) for cob_id, data in zip(ANSWERS, row, strict=True)]
-        for row in motion.answers
-    ]
-    beats = [pack_frame(Frame(0x700 + node_id, b"\x05")) for node_id in (1, 2)]
-    count, row, step = 0, -1, 0
-    while True:
-        try:
-            frame = unpack_frame(port.recv(PACKET.size + 1))
-        except ConnectionResetError:
-            return
-        if frame is None:
-            return
-        if frame.cob_id == SYNC:
-            count, row = count + 1, row + step
-            for packet in rows[max(row, 0)]:
-                port.send(packet)
-            if count % BEAT_EVERY == 0:
-                for packet in beats:
-                    port.send(packet)
-        elif frame.cob_id in SDO_REQUESTS:
-            port.send(pack_frame(Frame(frame.cob_id - 0x80, TEMPERATURE)))
-        elif frame.cob_id == PLAY:
-            step = frame.data[0]
+BOUNDS = {"link over raw": 1.3, "link over canopen": 0.8, "cycle cpu p50 [us]": 350.0}
 
 
 @final
@@ -192,13 +154,6 @@ def canopen_cycle(bus: can.BusABC, targets: tuple[int, int]) -> tuple[Callable[[
     return cycle, network
 
 
-def play(bus: can.BusABC, goes_on: bool) -> None:
-    """Tell the peer whether its motion goes on at each SYNC; late answers are none to the next."""
-    bus.send(can.Message(arbitration_id=PLAY, data=[goes_on], is_extended_id=False))
-    while bus.recv(QUIET) is not None:
-        pass
-
-
 def timed(cycle: Callable[[], object]) -> list[float]:
     """Wall time of each cycle of a block [us]."""
     took = []
@@ -207,27 +162,6 @@ def timed(cycle: Callable[[], object]) -> list[float]:
         cycle()
         took.append(1e6 * (time.perf_counter() - began))
     return took
-
-
-@contextmanager
-def served(motion: Motion) -> Iterator[UnixBus]:
-    """A bus behind which a peer of its own process replays a motion."""
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listener,
-    ):
-        listener.bind(f"{folder}/bus")
-        listener.listen()
-        process = multiprocessing.get_context("fork").Process(
-            target=peer, args=(listener, motion), daemon=True
-        )
-        process.start()
-        bus = UnixBus(f"{folder}/bus")
-        try:
-            yield bus
-        finally:
-            bus.shutdown()
-            process.join(2.0)
 
 
 def cpu_parts(plant: CanPlant, kind: Kind, seen: Observation) -> dict[str, list[float]]:
@@ -254,10 +188,15 @@ def cpu_parts(plant: CanPlant, kind: Kind, seen: Observation) -> dict[str, list[
 
 Blocks = list[list[float]]
 """Times of the cycles of each block [us]."""
+WHO = ("raw", "ours")
 
 
 def rounds(
-    bus: can.BusABC, switched: Switched, link: Link, commands: Iterator[tuple[float, ...]]
+    bus: can.BusABC,
+    switched: Switched,
+    link: Link,
+    commands: Iterator[tuple[float, ...]],
+    move: Callable[[str], None],
 ) -> dict[str, Blocks]:
     """Wall time of blocks that take turns: raw frames, the link, now and then `canopen`."""
 
@@ -275,15 +214,15 @@ def rounds(
     targets = [axis.target_counts for axis in link.cycle.axes]
     raw = raw_cycle(switched, (targets[0], targets[1]))
     other, network = canopen_cycle(bus, (targets[0], targets[1]))
-    took: dict[str, Blocks] = {"raw": [], "ours": [], "canopen": []}
+    took: dict[str, Blocks] = {f"{who} {where}": [] for who in WHO for where in (APART, SHARED)}
+    took["canopen"] = []
+    blocks = {"raw": lambda: timed(raw), "ours": ours}
     for number in range(ROUNDS):
-        # Who goes first takes turns, too.
-        if number % 2:
-            took["raw"].append(timed(raw))
-            took["ours"].append(ours())
-        else:
-            took["ours"].append(ours())
-            took["raw"].append(timed(raw))
+        for where in (SHARED, APART):
+            move(where)
+            # Who goes first takes turns, too.
+            for who in WHO if number % 2 else reversed(WHO):
+                took[f"{who} {where}"].append(blocks[who]())
         if number % OTHER_EVERY == 0:
             network.notifier = can.Notifier(bus, network.listeners, 0.001)
             took["canopen"].append(timed(other))
@@ -298,8 +237,8 @@ def undisturbed(blocks: Blocks) -> float:
 
 def measure(config: BusConfig, kind: Kind) -> tuple[dict[str, list[float]], dict[str, Blocks]]:
     """CPU time of the parts of a cycle and wall time of blocks, for one motion [us]."""
-    motion = record_motion(config, WARM_UP + CYCLES + ROUNDS * BLOCK, kind)
-    with served(motion) as bus:
+    motion = record_motion(config, WARM_UP + CYCLES + 2 * ROUNDS * BLOCK, kind)
+    with served(motion) as (bus, move):
         first = emulated_bus(config, kind)
         switched, free = Switched(first), Free(first)
         plant, link = open_link(Session(switched, config, free))
@@ -307,15 +246,22 @@ def measure(config: BusConfig, kind: Kind) -> tuple[dict[str, list[float]], dict
             seen = plant.reset()
             free.wait_until(free.now_ns())
             switched.inner, free.first = bus, None
+            move(APART)
             play(bus, True)
             parts = cpu_parts(plant, kind, seen)
             play(bus, False)
-            took = rounds(bus, switched, link, iter(motion.commands[WARM_UP + CYCLES :]))
+            commands = iter(motion.commands[WARM_UP + CYCLES :])
+            took = rounds(bus, switched, link, commands, move)
         finally:
             switched.inner, free.first = first, first
             plant.close()
             first.shutdown()
     return parts, took
+
+
+def over(blocks: tuple[list[float], list[float]]) -> float:
+    """Ratio of the medians of two blocks [-]."""
+    return statistics.median(blocks[0]) / statistics.median(blocks[1])
 
 
 def main() -> int:
@@ -325,18 +271,20 @@ def main() -> int:
     for kind in Kind:
         parts, took = measure(config, kind)
         best = {name: undisturbed(blocks) for name, blocks in took.items()}
-        neighbours = [
-            statistics.median(ours) / statistics.median(raw)
-            for ours, raw in zip(took["ours"], took["raw"], strict=True)
-        ]
-        low, middle, high = statistics.quantiles(neighbours)
         found = {
-            "link over raw": best["ours"] / best["raw"],
-            "link over canopen": best["ours"] / best["canopen"],
+            "link over raw": best["ours apart"] / best["raw apart"],
+            "link over canopen": best["ours apart"] / best["canopen"],
             "cycle cpu p50 [us]": statistics.median(parts["whole"]),
         }
-        print(f"{kind}: raw {best['raw']:.1f}, link {best['ours']:.1f} us undisturbed")
-        print(f"  link over raw, neighbours: median {middle:.2f}, quartiles {low:.2f}, {high:.2f}")
+        print(kind)
+        for where, words in ((APART, "a processor of its own"), (SHARED, "the link's processor")):
+            raw, ours = took[f"raw {where}"], took[f"ours {where}"]
+            pairs = zip(ours, raw, strict=True)
+            middle = statistics.median(map(over, pairs))
+            print(
+                f"  peer on {words}: raw {undisturbed(raw):.1f}, link {undisturbed(ours):.1f} us, "
+                f"{undisturbed(ours) / undisturbed(raw):.2f}; neighbouring blocks {middle:.2f}"
+            )
         cpu = ", ".join(f"{name} {statistics.median(us):.1f}" for name, us in parts.items())
         print(f"  cpu p50 [us]: {cpu}")
         for name, value in found.items():

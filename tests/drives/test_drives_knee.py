@@ -112,10 +112,10 @@ def test_from_beyond_the_knee_the_way_leads_back_and_no_farther() -> None:
 @pytest.mark.parametrize("links", [(0.0, 0.09), (-1.1, 1.1)])
 def test_a_knee_beyond_its_range_ends_the_run(links: tuple[float, float]) -> None:
     guard = Guard(KNEED, PERIOD)
-    motors, torques = (-0.3, 0.3), (0.0, 0.0)
-    guard.check(joint_pos=(0.0, 0.11), motor_pos=motors, spring_torque=torques)
+    torques = (0.0, 0.0)
+    guard.check(joint_pos=(0.0, 0.11), spring_torque=torques)
     with pytest.raises(PlantFault, match=r"q2 - q1 is at .* the limits are \[0\.1, 2\.1\] rad"):
-        guard.check(joint_pos=links, motor_pos=motors, spring_torque=torques)
+        guard.check(joint_pos=links, spring_torque=torques)
 
 
 @pytest.mark.parametrize(

@@ -100,11 +100,7 @@ def test_limits_that_real_drives_need_are_named_when_they_are_missing() -> None:
         SafetyLimits(command_speed=1.0, following_error=0.1).require_complete()
 
 
-GOOD: dict[str, Any] = {
-    "motor_pos": (0.0, 1.0),
-    "joint_pos": (0.0, 1.0),
-    "spring_torque": (0.0, 0.0),
-}
+GOOD: dict[str, Any] = {"joint_pos": (0.0, 1.0), "spring_torque": (0.0, 0.0)}
 
 
 @pytest.mark.parametrize(
@@ -128,15 +124,15 @@ def test_every_limit_has_its_cause(change: dict[str, Any], cause: str, words: st
 def test_a_following_error_may_last_its_cycles() -> None:
     guard = Guard(LIMITS, PERIOD)
     guard.start_at((0.0, 1.0))
-    away: dict[str, Any] = {**GOOD, "motor_pos": (0.2, 1.0)}
+    led: dict[str, Any] = {"joint_pos": (0.0, 1.0), "expected_pos": (0.0, 1.0)}
     for _ in range(3):
-        guard.check(**away, expected_pos=(0.0, 1.0))
-    guard.check(**GOOD, expected_pos=(0.0, 1.0))
+        guard.check_encoders(motor_pos=(0.2, 1.0), **led)
+    guard.check_encoders(motor_pos=(0.0, 1.0), **led)
     for _ in range(3):
-        guard.check(**away, expected_pos=(0.0, 1.0))
+        guard.check_encoders(motor_pos=(0.2, 1.0), **led)
     words = r"motor 1 shows 0\.200 rad and is 0\.200 rad away .* for 4 cycles"
     with pytest.raises(PlantFault, match=words) as caught:
-        guard.check(**away, expected_pos=(0.0, 1.0))
+        guard.check_encoders(motor_pos=(0.2, 1.0), **led)
     assert caught.value.cause == "following error"
 
 

@@ -1,6 +1,7 @@
 import hashlib
 import itertools
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import can
@@ -109,6 +110,25 @@ def test_spring_torque_is_the_encoders_difference(tmp_path: Path) -> None:
         sample = it.link.start()
         assert sample.spring_torque == pytest.approx((0.8, -0.5), abs=1e-3)
         assert sample.link_pos == pytest.approx((START[0] - 0.2, START[1] + 0.1), abs=1e-4)
+
+
+def test_an_encoder_that_jumps_is_found_while_the_drives_answer_the_next_sync(
+    tmp_path: Path,
+) -> None:
+    with rig(tmp_path, limits=replace(LIMITS, joint_speed=60.0)) as it:
+        it.link.start()
+        it.run(3)
+        jumps_ns = it.network.now_ns
+        it.network.inject(
+            NodeFault(kind=NodeFaultKind.LINK_STEP, node_id=1, start_ns=jumps_ns, size=0.1)
+        )
+        with pytest.raises(PlantFault, match="joint 1 moved by 0") as caught:
+            it.run(5)
+        assert caught.value.cause == "joint speed"
+        words = [word for at_ns, _, word in it.words() if at_ns >= jumps_ns]
+        stopped = next(place for place, word in enumerate(words) if word != 0x0F)
+        # The command before the jump and the one after it, to two drives; then quick stop.
+        assert stopped == 4
 
 
 def test_a_fast_command_is_slewed_and_a_far_one_clamped(tmp_path: Path) -> None:

@@ -28,11 +28,15 @@ class Told:
     """A guard that lets everything through, half a milliradian lower, and keeps what it is told."""
 
     checks: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
+    encoders: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
     began: list[Sequence[float]] = field(default_factory=list[Sequence[float]])
     applied: tuple[float, ...] = ()
 
     def check(self, **told: Any) -> None:
         self.checks.append(told)
+
+    def check_encoders(self, **told: Any) -> None:
+        self.encoders.append(told)
 
     def start_at(self, motor_pos: Sequence[float]) -> None:
         self.began.append(motor_pos)
@@ -85,11 +89,36 @@ class Leg:
         self.motion.check(self.motion.sample(tick))
         return self.guard.checks[-1]
 
+    def judge(self, at_ms: int, skipped: int = 0) -> dict[str, Any]:
+        """What the guard is told of the encoders of a cycle, later."""
+        self.check(at_ms, skipped)
+        before = len(self.guard.encoders)
+        self.motion.check_encoders()
+        (told,) = self.guard.encoders[before:]
+        return told
+
+
+def test_encoders_are_judged_once_a_cycle_and_only_while_the_leg_is_commanded() -> None:
+    leg = Leg()
+    leg.show((0.1, -0.2), (0.1, -0.2))
+    leg.motion.check_encoders()
+    # As long as nothing is commanded a motor may be moved by hand.
+    leg.check(1)
+    leg.motion.check_encoders()
+    assert leg.guard.encoders == []
+    leg.motion.begin()
+    leg.motion.check_encoders()
+    assert leg.guard.encoders == []
+    leg.check(2)
+    assert leg.guard.encoders == []
+    for _ in range(2):
+        leg.motion.check_encoders()
+        assert len(leg.guard.encoders) == 1
+
 
 def test_a_command_is_expected_to_have_acted_two_looks_later() -> None:
     leg = Leg()
     leg.show((0.1, -0.2), (0.1, -0.2))
-    assert leg.check(1)["expected_pos"] is None
     for axis, target in zip(leg.axes, (0.3, -0.4), strict=True):
         axis.aim(target)
     leg.motion.begin()
@@ -97,7 +126,7 @@ def test_a_command_is_expected_to_have_acted_two_looks_later() -> None:
     held = tuple(axis.target_pos for axis in leg.axes)
     assert held == pytest.approx((0.3, -0.4), abs=1e-5)
     assert leg.guard.began == [held]
-    assert leg.check(2)["expected_pos"] == held
+    assert leg.judge(2)["expected_pos"] == held
     sent = []
     for step in range(3):
         applied, words = leg.motion.aim((0.31 + step, -0.41 - step))
@@ -105,34 +134,39 @@ def test_a_command_is_expected_to_have_acted_two_looks_later() -> None:
         assert [axis.target_pos for axis in leg.axes] == pytest.approx(applied, abs=1e-5)
         assert words == [axis.machine.controlword for axis in leg.axes]
         sent.append(applied)
-        assert leg.check(3 + step)["expected_pos"] == (held if step == 0 else sent[step - 1])
+        assert leg.judge(3 + step)["expected_pos"] == (held if step == 0 else sent[step - 1])
 
 
 def test_the_limits_are_told_what_was_measured_and_how_long_ago_the_last_was() -> None:
     leg = Leg()
     leg.show((0.1, -0.2), (0.15, -0.1))
-    leg.check(5)
-    told = leg.check(8, skipped=2)
+    leg.motion.begin()
+    leg.judge(5)
+    told = leg.judge(8, skipped=2)
     assert (told["elapsed"], told["interval"]) == (3, pytest.approx(0.003, rel=1e-12))
-    told = leg.check(9)
+    told = leg.judge(9)
     assert (told["elapsed"], told["interval"]) == (1, pytest.approx(0.001, rel=1e-12))
+    # With two encoders the one of the position loop is the motor's.
     assert told["motor_pos"] == leg.motion.led_pos == pytest.approx((0.1, -0.2), abs=1e-5)
     assert told["joint_pos"] == pytest.approx((0.15, -0.1), abs=1e-4)
+    assert told["fresh"] == (True, True)
+    told = leg.check(10)
+    assert told["joint_pos"] == pytest.approx((0.15, -0.1), abs=1e-4)
     assert told["spring_torque"] == pytest.approx((4.0 * -0.05, 5.0 * -0.1), abs=1e-3)
-    assert (told["temperature"], told["fresh"]) == ((41.0, None), (True, True))
-    # With two encoders the one of the position loop is the motor's.
-    assert told["led_pos"] is None
+    assert told["temperature"] == (41.0, None)
 
 
 def test_with_one_encoder_the_limits_are_told_which_one_the_loop_is_closed_over() -> None:
     leg = Leg(one_encoder=True)
     leg.show((0.1, -0.2), (80, -50))
-    told = leg.check(1)
-    assert told["led_pos"] == leg.motion.led_pos == pytest.approx((0.1, -0.2), abs=1e-5)
-    # The knee's encoder counts the other way, and its torque does, too: 0.8 N m and 0.5 N m.
-    assert told["spring_torque"] == pytest.approx((0.8, 0.5))
-    assert told["motor_pos"] == pytest.approx((0.1, -0.2 + 0.5 / 5.0), abs=1e-5)
+    leg.motion.begin()
+    told = leg.judge(1)
+    assert told["motor_pos"] == leg.motion.led_pos == pytest.approx((0.1, -0.2), abs=1e-5)
     assert told["joint_pos"] == pytest.approx((0.1 - 0.8 / 4.0, -0.2), abs=1e-5)
+    seen = leg.motion.sample(Tick(MS, 0, 0, 0, True))
+    # The knee's encoder counts the other way, and its torque does, too: 0.8 N m and 0.5 N m.
+    assert leg.check(2)["spring_torque"] == seen.spring_torque == pytest.approx((0.8, 0.5))
+    assert seen.motor_pos == pytest.approx((0.1, -0.2 + 0.5 / 5.0), abs=1e-5)
     # A spring without stiffness tells nothing of its other side.
     shown, hidden, torque = joint_of(leg.axes[0], 0.0)
     assert (shown, torque) == (pytest.approx(0.1, abs=1e-5), pytest.approx(0.8))

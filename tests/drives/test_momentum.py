@@ -293,8 +293,8 @@ def guarded(sway: float, leg: LegMomentum | None) -> str | None:
     guard = Guard(limits, PERIOD, momentum=leg)
     motors = (POSTURE[0] + 0.2, POSTURE[1] + 0.2)
     guard.start_at(motors)
-    seen = {"motor_pos": motors, "joint_pos": POSTURE, "spring_torque": (0.0, 0.0)}
-    doubts = (fault(guard.check, **seen, expected_pos=motors) for _ in range(1300))
+    seen = {"motor_pos": motors, "joint_pos": POSTURE, "expected_pos": motors}
+    doubts = (fault(guard.check_encoders, **seen) for _ in range(1300))
     return next(filter(None, doubts), None)
 
 
@@ -311,13 +311,13 @@ def calls_in_a_cycle(leg: LegMomentum | None) -> int:
     """Calls that a guard makes to look at a leg that does not sway."""
     guard = Guard(SafetyLimits(sway=0.05, standing=0.02, link_error=0.025), PERIOD, momentum=leg)
     guard.start_at(POSTURE)
-    seen = {"motor_pos": POSTURE, "joint_pos": POSTURE, "spring_torque": (0.0, 0.0)}
-    guard.check(**seen, expected_pos=POSTURE)
+    seen = {"motor_pos": POSTURE, "joint_pos": POSTURE, "expected_pos": POSTURE}
+    guard.check_encoders(**seen)
     found: list[str] = []
     before = sys.getprofile()
     sys.setprofile(lambda frame, event, _: found.append(event) if event == "call" else None)
     try:
-        guard.check(**seen, expected_pos=POSTURE)
+        guard.check_encoders(**seen)
     finally:
         sys.setprofile(before)
     return len(found)

@@ -19,6 +19,7 @@ from legbench.drives.master.stop_report import StopReport
 from legbench.drives.master.tick import Tick
 from legbench.drives.master.ticks import Ticks
 from legbench.drives.protocol.cia402 import Goal
+from legbench.errors import PlantFault
 
 WARNING, LIMIT = 1 << 7, 1 << 11
 """Bits 7 and 11 of 6041h (CiA 402-2, table 29)."""
@@ -128,25 +129,47 @@ class Ticking:
             bus=lambda tick: note(f"bus {tick.skipped}"),
             drives=lambda: note("drives"),
         )
-        cycle = SimpleNamespace(follow=answering("follow", 3), tick=answering("tick", 2))
+        cycle = SimpleNamespace(
+            follow=answering("follow", 3),
+            tick=answering("tick", 2),
+            sync=lambda: note("sync"),
+            answers=answering("answers", 2),
+        )
         status = SimpleNamespace(listening=self.listening)
         return cast(Any, SimpleNamespace(cycle=cycle, supervisor=supervisor, status=status))
 
 
-@pytest.mark.parametrize(("listening", "way", "skipped"), [(False, "tick", 2), (True, "follow", 3)])
+@pytest.mark.parametrize(
+    ("listening", "ways", "skipped"),
+    [(False, ("tick", "sync work answers"), 2), (True, ("follow", "follow"), 3)],
+)
 def test_a_tick_is_its_own_or_the_masters_and_is_watched(
-    listening: bool, way: str, skipped: int
+    listening: bool, ways: tuple[str, str], skipped: int
 ) -> None:
     it = Ticking(listening)
-    ticks = Ticks(it.parts())
+    ticks = Ticks(it.parts(), lambda: it.asked.append("work"))
     assert (ticks.last, ticks.skipped_total) == (Tick(0, 0, 0, 0, False), 0)
     assert ticks.settling() == ticks.last == Tick(MS, 0, skipped, 0, True)
-    assert it.asked == [way, "other master"]
+    assert it.asked == [ways[0], "other master"]
     assert ticks.skipped_total == skipped
     it.asked.clear()
     assert ticks.watched() == ticks.last
-    assert it.asked == [way, f"bus {skipped}", "drives"]
+    assert it.asked == [*ways[1].split(), f"bus {skipped}", "drives"]
     assert ticks.skipped_total == 2 * skipped
+
+
+def test_what_the_drives_answer_is_taken_though_the_work_meanwhile_raises() -> None:
+    it, found = Ticking(False), PlantFault("joint encoder", "it contradicts its springs")
+
+    def work() -> None:
+        raise found
+
+    ticks = Ticks(it.parts(), work)
+    with pytest.raises(PlantFault) as caught:
+        ticks.watched()
+    assert caught.value is found
+    assert it.asked == ["sync", "answers"]
+    assert (ticks.last, ticks.skipped_total) == (Tick(MS, 0, 2, 0, True), 2)
 
 
 # --- enabling --------------------------------------------------------------------------------

@@ -118,11 +118,11 @@ def test_limits_of_what_is_not_known_do_not_act_and_all_others_do() -> None:
     nan = (math.nan, math.nan)
     guard = Guard(limits, 0.001, known=[frozenset(["motor_pos"])] * 2, two_encoders=False)
     guard.start_at((0.0, 0.0))
-    guard.check(motor_pos=(0.0, 0.0), joint_pos=nan, spring_torque=nan, expected_pos=(0.0, 0.0))
+    guard.check(joint_pos=nan, spring_torque=nan)
+    guard.check_encoders(motor_pos=(0.0, 0.0), joint_pos=nan, expected_pos=(0.0, 0.0))
 
     def far() -> None:
-        rest = (0.0, 0.0)
-        guard.check(motor_pos=(0.0, 0.5), joint_pos=nan, spring_torque=nan, expected_pos=rest)
+        guard.check_encoders(motor_pos=(0.0, 0.5), joint_pos=nan, expected_pos=(0.0, 0.0))
 
     for _ in range(limits.following_cycles):
         far()
@@ -131,9 +131,9 @@ def test_limits_of_what_is_not_known_do_not_act_and_all_others_do() -> None:
     # What is to be known and is no number ends a run.
     known = Guard(limits, 0.001, known=[ALL, ALL])
     with pytest.raises(PlantFault, match="spring 1 carries nan N m"):
-        known.check(motor_pos=(0.0, 0.0), joint_pos=(0.0, 0.0), spring_torque=nan)
+        known.check(joint_pos=(0.0, 0.0), spring_torque=nan)
     with pytest.raises(PlantFault, match="joint 1 is at nan rad"):
-        known.check(motor_pos=(0.0, 0.0), joint_pos=nan, spring_torque=(0.0, 0.0))
+        known.check(joint_pos=nan, spring_torque=(0.0, 0.0))
 
 
 def test_a_spring_whose_torque_nobody_knows_is_waived_by_name(tmp_path: Path) -> None:

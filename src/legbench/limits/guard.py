@@ -187,28 +187,16 @@ class Guard:
     def check(
         self,
         *,
-        motor_pos: Sequence[float],
         joint_pos: Sequence[float],
         spring_torque: Sequence[float],
-        expected_pos: Sequence[float] | None = None,
         temperature: Sequence[float | None] = (),
-        fresh: Sequence[bool] = (True, True),
-        elapsed: int = 1,
-        interval: float | None = None,
-        led_pos: Sequence[float] | None = None,
     ) -> None:
-        """Look at what a cycle showed.
+        """Check what a cycle showed against the ranges of the leg.
 
         Args:
-            motor_pos: motors [rad].
             joint_pos: links [rad].
             spring_torque: of the series springs [N m].
-            expected_pos: command that should act by now; None while nothing is commanded [rad].
             temperature: of each drive, None if it is not known [deg C].
-            fresh: which drives have told something new in this cycle.
-            elapsed: periods since the cycle before.
-            interval: time since the cycle before, by default these periods [s].
-            led_pos: positions that the drives' loops lead; by default those of the motors [rad].
 
         Raises:
             PlantFault: a limit is exceeded.
@@ -228,12 +216,34 @@ class Guard:
         for value in temperature:
             if value is not None and value > hottest:
                 self._refuse_temperatures(temperature)
-        if expected_pos is not None:
-            led = motor_pos if led_pos is None else led_pos
-            after = elapsed * self._period if interval is None else interval
-            doubt = self._encoders.see(led, joint_pos, expected_pos, fresh, elapsed, after)
-            if doubt is not None:
-                raise PlantFault(doubt.cause, doubt.message)
+
+    def check_encoders(
+        self,
+        *,
+        motor_pos: Sequence[float],
+        joint_pos: Sequence[float],
+        expected_pos: Sequence[float],
+        fresh: Sequence[bool] = (True, True),
+        elapsed: int = 1,
+        interval: float | None = None,
+    ) -> None:
+        """Check whether motors and encoders work, by all that a healthy leg can show in a cycle.
+
+        Args:
+            motor_pos: positions that the drives' loops lead [rad].
+            joint_pos: links [rad].
+            expected_pos: command that acted by then [rad].
+            fresh: which drives had told something new in that cycle.
+            elapsed: periods since the cycle before.
+            interval: time since the cycle before, by default these periods [s].
+
+        Raises:
+            PlantFault: a motor does not follow, or an encoder contradicts the others or the leg.
+        """
+        after = elapsed * self._period if interval is None else interval
+        doubt = self._encoders.see(motor_pos, joint_pos, expected_pos, fresh, elapsed, after)
+        if doubt is not None:
+            raise PlantFault(doubt.cause, doubt.message)
 
     def _refuse_torques(self, spring_torque: Sequence[float]) -> None:
         """Raise PlantFault for the first known torque beyond its limit; none if all are unknown."""

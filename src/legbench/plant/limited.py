@@ -61,10 +61,11 @@ class LimitedPlant(AbstractPlant):
         applied = self._guard.command(command.motor_pos.tolist())
         self._expected.append(applied)
         seen = self._plant.step(replace(command, motor_pos=np.array(applied)))
-        self._guard.check(
+        joint_pos = seen.joint_pos.tolist()
+        self._guard.check(joint_pos=joint_pos, spring_torque=seen.spring_torque.tolist())
+        self._guard.check_encoders(
             motor_pos=seen.motor_pos.tolist(),
-            joint_pos=seen.joint_pos.tolist(),
-            spring_torque=seen.spring_torque.tolist(),
+            joint_pos=joint_pos,
             expected_pos=self._expected.popleft(),
         )
         return seen

@@ -12,6 +12,7 @@ import can
 
 from legbench.drives.errors import BusError
 from legbench.drives.master.axis_link import AxisLink
+from legbench.drives.master.foreign_sync import await_sync
 from legbench.drives.master.mode_poll import mode_polls
 from legbench.drives.master.notices import Notices
 from legbench.drives.master.outgoing import Outgoing
@@ -79,7 +80,9 @@ class Cycle:
         # SYNC is still sent up to half a period late; later it would crowd the next one.
         self._latest_ns = config.period_ns - config.period_ns // 2
         self._deadline_ns = 1000 * config.deadline_us
-        self._due_ns = 0
+        self._due_ns = self._sync_ns = 0
+        self._skipped = self._silent = 0
+        self._sent = False
         self._owed: set[int] = set()
         """COB-IDs of process data that has not come, and still may."""
         modes = mode_polls(self.axes, config)
@@ -103,10 +106,13 @@ class Cycle:
 
     def tick(self) -> Tick:
         """Wait for the next tick of the grid, send SYNC, gather process data."""
+        self.sync()
+        return self.answers()
+
+    def sync(self) -> None:
+        """Wait for the next tick of the grid and send SYNC; `answers` belongs to it."""
         timebase = self._port.timebase
-        now_ns = timebase.now_ns()
-        late_ns = now_ns - self._due_ns
-        skipped = 0
+        late_ns, skipped = timebase.now_ns() - self._due_ns, 0
         if late_ns >= self._latest_ns:
             skipped = (late_ns + self._period_ns // 2) // self._period_ns
             self._due_ns += skipped * self._period_ns
@@ -116,18 +122,22 @@ class Cycle:
         silent = int(bool(self._owed) and not self.stopping)
         if silent:
             self._keep_silent()
-        due_ns, sync_ns = self._due_ns, timebase.now_ns()
-        sent = self._outgoing.sync()
+        self._skipped, self._silent, self._sync_ns = skipped, silent, timebase.now_ns()
+        self._sent = self._outgoing.sync()
         for axis in self.axes:
             axis.begin_cycle()
-        complete = sent and self._gather(sync_ns + self._deadline_ns)
+
+    def answers(self) -> Tick:
+        """Gather process data after `sync`, until it is complete or the deadline; the tick."""
+        due_ns, sync_ns, silent = self._due_ns, self._sync_ns, self._silent
+        complete = self._sent and self._gather(sync_ns + self._deadline_ns)
         # The next SYNC leaves on the grid, however late this one was.
         asks = complete and not self.stopping
-        self._requests.turn(timebase.now_ns() - due_ns if asks else None)
+        self._requests.turn(self._port.timebase.now_ns() - due_ns if asks else None)
         if self._gaps or not complete:
             self._count()
         self._due_ns = due_ns + self._period_ns
-        return Tick(sync_ns, sync_ns - due_ns, skipped + silent, silent, complete)
+        return Tick(sync_ns, sync_ns - due_ns, self._skipped + silent, silent, complete)
 
     def hears_sync(self, until_ns: int) -> bool:
         """Whether another master sends SYNC by then; from its first one on this one may `follow`.
@@ -135,7 +145,7 @@ class Cycle:
         Raises:
             BusError: the bus has failed.
         """
-        heard = self._await_sync(until_ns) is not None
+        heard = await_sync(self._port, until_ns, self._between) is not None
         if heard:
             self._ours, self.stranger = frozenset[int](), None
         return heard
@@ -144,10 +154,10 @@ class Cycle:
         """Wait for the SYNC of another master, gather process data; nothing is sent."""
         timebase, last_ns = self._port.timebase, self._due_ns
         self.bus_error = None
-        complete, skipped = False, 0
-        sync_ns = None
+        complete, skipped, sync_ns = False, 0, None
         try:
-            sync_ns = self._await_sync(timebase.now_ns() + 2 * self._period_ns)
+            until_ns = timebase.now_ns() + 2 * self._period_ns
+            sync_ns = await_sync(self._port, until_ns, self._between)
         except BusError as error:
             self._failed(error)
         for axis in self.axes:
@@ -165,20 +175,13 @@ class Cycle:
             watch.cycle(complete=axis.fresh)
         self._gaps = any(watch.gaps for watch in self.watches)
 
-    def _await_sync(self, until_ns: int) -> int | None:
-        """Time at which the SYNC of another master came [ns]; none if it has not by `until_ns`."""
-        now_ns = self._port.timebase.now_ns
-        while now_ns() < until_ns:
-            message = self._port.receive(until_ns)
-            if message is None:
-                break
-            if message.arbitration_id == SYNC_ID and not message.is_error_frame:
-                return now_ns()
-            if message.arbitration_id in self._tpdos and not message.is_error_frame:
-                self.late_frames += 1
-            else:
-                self.other(message)
-        return None
+    def _between(self, message: can.Message) -> bool:
+        """Take a frame between two cycles; whether it is process data, which is late then."""
+        if message.arbitration_id in self._tpdos and not message.is_error_frame:
+            self.late_frames += 1
+            return True
+        self.other(message)
+        return False
 
     def _keep_silent(self) -> None:
         """Let this tick pass, so that a late answer cannot be taken for one to the next SYNC."""
@@ -278,11 +281,8 @@ class Cycle:
                         f"frames come faster than they are read, for {1e-6 * self._period_ns:g} ms "
                         "now: look for a node or a program that babbles"
                     )
-                if message.arbitration_id in self._tpdos and not message.is_error_frame:
-                    self.late_frames += 1
+                if self._between(message):
                     self._late(message)
-                else:
-                    self.other(message)
         except BusError as error:
             self._failed(error)
             # Frames that are still unread may be answers to an earlier SYNC.

@@ -7,8 +7,8 @@
             sample = link.exchange()
 
 A cycle: tick of the grid, SYNC, process data of all drives until a deadline, watchdogs and limits
-(`exchange`), then the command, slewed and clamped, in RPDOs that act at the next SYNC (`command`).
-Whatever goes wrong, all drives are told to stop in the same cycle and the first cause is kept.
+(`exchange`), then the command, slewed and clamped, in RPDOs that act at the next SYNC (`command`);
+encoders are judged while drives answer that one. Whatever goes wrong, all drives are told to stop.
 """
 
 import math
@@ -96,11 +96,11 @@ class Link(DriveLeader):
         self._supervisor, self._start_up = parts.supervisor, parts.start_up
         self._opening, self._ending = LinkOpening(parts), LinkEnd(parts)
         self._stop_on_error = StopOnError(self._ending)
-        self._ticks = Ticks(parts)
         self._guard = guard_of(config, parts.limits, momentum)
         self._motion = LimitedMotion(
             parts.cycle, self._guard, stiffness, two_encoders=config.two_encoders
         )
+        self._ticks = Ticks(parts, self._motion.check_encoders)
 
     # --- what has become of it ---------------------------------------------------------------
 
