@@ -39,7 +39,7 @@ check: $(STAMP) typings/mujoco/__init__.pyi dist ## lint, format, types, layers,
 	$(BIN)/pyrefly check --threads 1
 	$(BIN)/lint-imports
 
-test: check ## check, then the tests, a file a processor at a time
+test: check ## check, then the tests, a folder a processor at a time
 	$(BIN)/pytest -m 'not long' --numprocesses auto --dist loadfile
 
 test-long: $(STAMP) ## the tests that `make test` leaves out, a notebook's kernel installed for them

@@ -39,7 +39,7 @@ class Job:
 ELSEWHERE = ("--out", "more")
 """Options that leave one run in `runs/`, the first, which later commands take as `{run}`."""
 
-EMULATED = ("--plant", "can", "--interface", "legbench")
+EMULATED = ("--plant", "can", "--interface", "legbench", "--end", "stop")
 
 JOBS = (
     Job(words=("run", "jump", "--duration", "1"), prints="P^r"),

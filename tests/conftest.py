@@ -5,13 +5,18 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import settings
 
 from legbench.design import LegDesign, load_design
 
-settings.register_profile("repeatable", deadline=None, derandomize=True)
+if TYPE_CHECKING:
+    from folder_scheduling import FolderScheduling
+    from xdist.remote import Producer
+
+settings.register_profile("repeatable", deadline=None, derandomize=True, max_examples=50)
 settings.load_profile("repeatable")
 
 # Tests that are started in the background inherit that ^C and SIGHUP are ignored, and would hand it
@@ -30,7 +35,7 @@ sys.dont_write_bytecode = False
 MODELS = Path(__file__).parents[1] / "models"
 
 
-# What is imported and collected stays: searching it for garbage finds none.
+# What is imported and collected stays, with a little garbage that takes half a second to find.
 gc.disable()
 
 
@@ -40,10 +45,17 @@ def pytest_collection_finish() -> None:
     At Python's own threshold of 700 objects the search takes 7 % of the processor time of a run on
     emulated drives; memory is not scarce here.
     """
-    gc.collect()
     gc.freeze()
     gc.set_threshold(50_000, 20, 20)
     gc.enable()
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: "Producer") -> "FolderScheduling":
+    """Hand out a folder at a time to the processes of a run that has several."""
+    from folder_scheduling import FolderScheduling  # noqa: PLC0415 xdist may be switched off
+
+    return FolderScheduling(config, log)
 
 
 @pytest.fixture(scope="session")

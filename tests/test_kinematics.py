@@ -20,7 +20,7 @@ from legbench.kinematics import (
 LENGTHS = (0.064, 0.133, 0.069)
 ANGLE = st.floats(-3.0, 3.0)
 CONVENTIONS = pytest.mark.parametrize("convention", ModalConvention)
-BY_LAW = settings(derandomize=True, max_examples=200, deadline=None)
+BY_LAW = settings(derandomize=True, max_examples=80, deadline=None)
 
 
 @BY_LAW

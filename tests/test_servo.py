@@ -12,7 +12,7 @@ from legbench.servo import Servo, ServoConfig
 from legbench.signals import Floats
 
 PERIOD = 0.001
-BY_LAW = settings(derandomize=True, max_examples=100, deadline=None)
+BY_LAW = settings(derandomize=True, max_examples=50, deadline=None)
 POSITIONS = st.lists(st.floats(-2.0, 2.0), min_size=1, max_size=40)
 
 

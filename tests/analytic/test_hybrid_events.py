@@ -138,8 +138,8 @@ def check_run(model: LegModel, start: LegState, motor: tuple[float, float], time
 )
 def test_random_starts_miss_no_event_and_repeat_none(model: LegModel) -> None:
     random = np.random.default_rng(11)
-    events = sum(check_run(model, random_start(model, random), MOTOR, 0.3) for _ in range(25))
-    assert events > 25
+    events = sum(check_run(model, random_start(model, random), MOTOR, 0.3) for _ in range(15))
+    assert events > 15
 
 
 @pytest.mark.long

@@ -321,6 +321,13 @@ def test_jitter_in_virtual_time_is_punctual(drives: Drives, tmp_path: Path) -> N
     assert plot.stat().st_size > 1000
 
 
+def test_a_plot_of_no_kind_is_refused_before_anything_is_measured(
+    drives: Drives, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("legbench.commissioning.jitter.measure", None)
+    drives("jitter", "--plot", "x.bmp").refused("a figure cannot be written as 'x.bmp'")
+
+
 def test_jitter_measures_with_a_recording_and_without(drives: Drives, tmp_path: Path) -> None:
     done = drives(
         "jitter", "--cycles", "120", "--recording", "both", "--out", tmp_path / "kept", "--json"

@@ -4,7 +4,7 @@ import pytest
 from commands import DESIGN, MODELS, DoneTogether, started_together
 
 WATCHED = (
-    *("numpy", "tyro", "pyarrow", "mujoco", "scipy", "can", "typeguard", "pyarrow.dataset"),
+    *("numpy", "tyro", "pyarrow", "mujoco", "scipy", "can", "typeguard", "pyarrow.dataset", "cma"),
     # Of a data sheet, which none of these lines reads.
     "canopen",
 )
@@ -14,6 +14,7 @@ LINES: dict[str, tuple[tuple[str, ...], set[str]]] = {
     "help": (("run", "--help"), {"numpy", "tyro"}),
     "help of a controller": (("run", "jump", "--help"), {"numpy", "tyro"}),
     "help with drives": (("run", "bang-bang", "--plant", "can", "--help"), {"numpy", "tyro"}),
+    "help of a search": (("design", "--help"), {"numpy", "tyro"}),
     "sim": ((*RUN, "sim"), {"numpy", "tyro", "pyarrow", "mujoco"}),
     "can": (
         (*RUN, "can", "--interface", "legbench", "--bus", str(BUS)),

@@ -44,7 +44,7 @@ def ran(
     [
         ("pass", "2>&-"),
         pytest.param("pass", "0<&- 2>&-", marks=pytest.mark.long),
-        ("pass", "2>/dev/full"),
+        pytest.param("pass", "2>/dev/full", marks=pytest.mark.long),
         (TERMINAL.format(error="BrokenPipeError(32, 'Broken pipe')"), ""),
         *(
             pytest.param(TERMINAL.format(error=error), "", marks=pytest.mark.long)

@@ -26,7 +26,7 @@ SUPPORTS = st.sampled_from(list(Support))
 CONVENTIONS = st.sampled_from(list(ModalConvention))
 
 
-@settings(derandomize=True, max_examples=150, deadline=None)
+@settings(derandomize=True, max_examples=50, deadline=None)
 @given(half=st.floats(0.2, 1.4), support=SUPPORTS, convention=CONVENTIONS)
 def test_a_link_set_point_is_where_gravity_and_springs_balance(
     optimal: LegDesign, half: float, support: Support, convention: ModalConvention
@@ -40,7 +40,7 @@ def test_a_link_set_point_is_where_gravity_and_springs_balance(
     assert np.allclose(torque, gravity_load(optimal, support).torque(link), atol=1e-9)
 
 
-@settings(derandomize=True, max_examples=100, deadline=None)
+@settings(derandomize=True, max_examples=50, deadline=None)
 @given(half=st.floats(0.2, 0.7), support=SUPPORTS)
 def test_a_motor_set_point_is_the_motors_and_the_leg_sags_from_it(
     optimal: LegDesign, half: float, support: Support

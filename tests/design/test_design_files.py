@@ -10,7 +10,7 @@ from legbench.design import LegDesign, Limits, Segment, load_design, save_design
 from legbench.design.toml import design_from_mapping, design_to_mapping
 from legbench.errors import DesignError
 
-BY_LAW = settings(derandomize=True, max_examples=100, deadline=None)
+BY_LAW = settings(derandomize=True, max_examples=50, deadline=None)
 POSITIVE = st.floats(1e-6, 1e3)
 WHOLE = """
 name = "a leg"

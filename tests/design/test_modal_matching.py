@@ -73,7 +73,7 @@ def appendix(design: LegDesign) -> dict[str, float]:
     }
 
 
-@settings(derandomize=True, max_examples=60)
+@settings(derandomize=True, max_examples=30)
 @given(legs())
 def test_equation_5_is_equation_20(leg: LegDesign) -> None:
     t = appendix(leg)
@@ -85,7 +85,7 @@ def test_equation_5_is_equation_20(leg: LegDesign) -> None:
     assert abs(printed - coupling) < 1e-13 * scale
 
 
-@settings(derandomize=True, max_examples=60)
+@settings(derandomize=True, max_examples=30)
 @given(legs())
 def test_gravity_condition_is_that_of_appendix_1_in_both_supports(leg: LegDesign) -> None:
     t = appendix(leg)

@@ -36,7 +36,7 @@ def ratios(shares: list[float]) -> np.ndarray:
     return lower + np.array(shares) * (upper - lower)
 
 
-@settings(derandomize=True, max_examples=80)
+@settings(derandomize=True, max_examples=40)
 @given(INSIDE)
 def test_dependent_parameters_meet_every_requirement(shares: list[float]) -> None:
     free = ratios(shares)

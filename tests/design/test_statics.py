@@ -16,7 +16,7 @@ from legbench.design.statics import (
 from legbench.errors import DesignError
 from legbench.kinematics import leg_points
 
-BY_LAW = settings(derandomize=True, max_examples=100, deadline=None)
+BY_LAW = settings(derandomize=True, max_examples=50, deadline=None)
 SUPPORTS = st.sampled_from(list(Support))
 HALF, POLAR = st.floats(0.1, 1.5), st.floats(-0.5, 0.5)
 

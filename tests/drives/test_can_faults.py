@@ -45,6 +45,13 @@ LOST = {"answers dropped for 2 cycles": 2, "drive warns": 0}
 """Cycles without process data in a run that goes on."""
 BETWEEN = ("answers 0.7 ms late", "answers 1 ms late")
 """Trials whose delay lies between those of two others with the same end."""
+LIKE_OTHERS = (
+    "over-temperature",
+    *("frozen motor encoder", "motor encoder steps 0.1 rad", "motor encoder drifts 1 rad/s"),
+    *("frozen link encoder", "link encoder steps 0.1 rad", "link encoder drifts 1 rad/s"),
+)
+"""Trials of an emergency like under-voltage, and of parts that `test_can_dead_parts` lets die in
+the same jump on the same drives."""
 
 
 @pytest.mark.parametrize(
@@ -53,7 +60,7 @@ BETWEEN = ("answers 0.7 ms late", "answers 1 ms late")
         pytest.param(
             trial,
             id=trial.name.replace(" ", "-"),
-            marks=[pytest.mark.long] if trial.name in BETWEEN else [],
+            marks=[pytest.mark.long] if trial.name in BETWEEN + LIKE_OTHERS else [],
         )
         for trial in TRIALS
         if not trial.viewer  # whose view hangs has its own test below

@@ -180,7 +180,7 @@ def test_interrupting_the_master_stops_both_drives_and_keeps_the_run(
     assert len(told["protections"]) == 2 + len(LOOSE)
 
 
-@pytest.mark.parametrize("name", ["SIGKILL", "SIGSTOP"])
+@pytest.mark.parametrize("name", ["SIGKILL", pytest.param("SIGSTOP", marks=pytest.mark.long)])
 def test_drives_stop_by_themselves_when_the_master_is_gone(
     name: str, led: tuple[Served, Popen[str], Path]
 ) -> None:

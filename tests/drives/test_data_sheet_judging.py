@@ -47,7 +47,7 @@ TPDOS = (
 
 
 def read(sheet: Sheet) -> DataSheet:
-    return sheet_of(sheet.text().encode(), "stranger.eds")
+    return sheet_of(sheet.text().encode(), "it.eds")
 
 
 def bus_of(eds: Path) -> BusConfig:

@@ -141,7 +141,7 @@ def test_limits_come_from_a_file(tmp_path: Path) -> None:
             load_limits(path)
 
 
-@settings(derandomize=True, max_examples=200)
+@settings(derandomize=True, max_examples=80)
 @given(st.integers(0, 0xFFFF), st.integers(0, 0xFF), st.sampled_from(list(FORMATS)))
 def test_names_of_objects_come_back(index: int, sub: int, kind: DataType) -> None:
     entry = Mapped(index, sub, kind)

@@ -51,7 +51,7 @@ def shows(node: NodeConfig, motor: float, link: float) -> float:
     return axis.link_pos
 
 
-@settings(derandomize=True, max_examples=150, deadline=None)
+@settings(derandomize=True, max_examples=50, deadline=None)
 @given(
     units=st.builds(
         AxisUnits,

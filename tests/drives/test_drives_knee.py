@@ -26,7 +26,7 @@ KNEED = SafetyLimits(
 ANGLES = st.tuples(st.floats(-1.5, 1.5), st.floats(-1.5, 1.5))
 
 
-@settings(derandomize=True, max_examples=300)
+@settings(derandomize=True, max_examples=100)
 @given(st.lists(ANGLES, max_size=20))
 def test_whatever_is_wished_the_knee_the_ranges_and_the_speed_are_kept(
     wishes: list[tuple[float, float]],
@@ -47,7 +47,7 @@ def test_whatever_is_wished_the_knee_the_ranges_and_the_speed_are_kept(
 EXACT = st.tuples(st.integers(-15_000, 15_000), st.integers(-15_000, 15_000))
 
 
-@settings(derandomize=True, max_examples=300)
+@settings(derandomize=True, max_examples=100)
 @given(last=EXACT, wish=EXACT, step=st.integers(1, 8000))
 def test_a_slewed_command_has_a_knee_between_the_last_and_the_wanted_one(
     last: tuple[int, int], wish: tuple[int, int], step: int
@@ -70,7 +70,7 @@ def test_a_slewed_command_has_a_knee_between_the_last_and_the_wanted_one(
     assert max(moved) <= step * unit
 
 
-@settings(derandomize=True, max_examples=300)
+@settings(derandomize=True, max_examples=100)
 @given(st.tuples(st.floats(*BOXES[0]), st.floats(*BOXES[1])))
 def test_a_projection_is_the_nearest_posture_that_the_knee_allows(
     wanted: tuple[float, float],

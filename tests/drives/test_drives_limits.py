@@ -27,7 +27,7 @@ LIMITS = SafetyLimits(
 ANYTHING = st.floats(allow_nan=True, allow_infinity=True)
 
 
-@settings(derandomize=True, max_examples=150)
+@settings(derandomize=True, max_examples=50)
 @given(
     st.tuples(st.floats(-1, 1), st.floats(0, 2)),
     st.lists(st.tuples(ANYTHING, ANYTHING) | st.tuples(st.floats(-3, 3), st.floats(-3, 3))),

@@ -29,7 +29,7 @@ LAYOUTS = st.lists(st.sampled_from(NUMERIC), min_size=1, max_size=8).filter(
 )
 
 
-@settings(derandomize=True, max_examples=200)
+@settings(derandomize=True, max_examples=80)
 @given(st.data())
 def test_values_come_back_as_they_went(data: st.DataObject) -> None:
     kinds = data.draw(LAYOUTS)
@@ -135,7 +135,7 @@ def test_a_heartbeat_never_heard_is_lost_too() -> None:
     assert not watch.lost(161)
 
 
-@settings(derandomize=True, max_examples=150)
+@settings(derandomize=True, max_examples=50)
 @given(st.integers(-(1 << 40), 1 << 40), st.sampled_from([16, 32]))
 def test_positions_are_followed_across_the_seam(start: int, bits: int) -> None:
     # The encoder on the link has 16 bits, that on the motor 32.
@@ -153,7 +153,7 @@ def test_positions_are_followed_across_the_seam(start: int, bits: int) -> None:
     assert nearest(wrap(start, bits), start) == start
 
 
-@settings(derandomize=True, max_examples=150)
+@settings(derandomize=True, max_examples=50)
 @given(
     st.integers(1, 1 << 24),
     st.floats(0.1, 200.0),

@@ -22,7 +22,7 @@ def servo_gain(bandwidth: float) -> float:
     return 1.0 - math.exp(-2.0 * math.pi * bandwidth * PERIOD)
 
 
-@settings(derandomize=True, max_examples=100)
+@settings(derandomize=True, max_examples=50)
 @given(
     st.floats(15.0, 1e4),
     st.lists(st.tuples(st.floats(-1.0, 1.0), st.integers(1, 60)), max_size=12),

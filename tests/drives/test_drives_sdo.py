@@ -117,7 +117,7 @@ def test_a_size_that_is_not_kept_changes_nothing() -> None:
     assert shelf.content == b"before"
 
 
-@settings(derandomize=True, max_examples=150)
+@settings(derandomize=True, max_examples=50)
 @given(st.lists(st.binary(max_size=9), max_size=20))
 def test_any_bytes_are_survived_by_the_server(frames: list[bytes]) -> None:
     shelf = Shelf(b"0123456789")
@@ -129,7 +129,7 @@ def test_any_bytes_are_survived_by_the_server(frames: list[bytes]) -> None:
     assert upload.result == shelf.content
 
 
-@settings(derandomize=True, max_examples=150)
+@settings(derandomize=True, max_examples=50)
 @given(st.lists(st.binary(max_size=9), max_size=20), st.booleans())
 def test_any_bytes_are_survived_by_the_client(frames: list[bytes], write: bool) -> None:
     transfer = Download(0x2000, 3, bytes(20)) if write else Upload(0x2000, 3)

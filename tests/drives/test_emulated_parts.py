@@ -10,7 +10,7 @@ from legbench.drives.emulated import warmth
 from legbench.drives.emulated.emergencies import EmergencyOutlet
 from legbench.drives.emulated.heartbeats import HeartbeatConsumer, HeartbeatProducer
 from legbench.drives.emulated.homing_methods import Until
-from legbench.drives.emulated.send_queue import SendQueue
+from legbench.drives.emulated.send_queue import NEVER_NS, SendQueue
 from legbench.drives.emulated.sensors import Encoder, SensorFault, Sensors
 from legbench.drives.emulated.station import Station
 from legbench.drives.emulated.switches import Switches
@@ -126,12 +126,11 @@ def test_emergencies_of_a_mute_drive_are_sent_later_or_forgotten() -> None:
 def test_of_frames_that_are_ready_the_lowest_identifier_goes_first() -> None:
     queue = SendQueue()
     first, second, third = (cast(Any, name) for name in ("first", "second", "third"))
-    assert not queue
+    assert queue.earliest_ns == NEVER_NS
     assert queue.put(first, 100, Frame(0x182)) == 1
     assert queue.put(second, 50, Frame(0x183)) == 2
     assert queue.put(third, 100, Frame(0x181)) == 3
     assert queue.put(first, 100, Frame(0x181, b"x")) == 4
-    assert queue
     assert queue.earliest_ns == 50
     assert queue.pop(99).frame == Frame(0x183)
     assert queue.earliest_ns == 100
@@ -144,7 +143,7 @@ def test_of_frames_that_are_ready_the_lowest_identifier_goes_first() -> None:
     queue.put(second, 0, Frame(0x100))
     queue.drop(first)
     assert queue.pop(200).sender is second
-    assert not queue
+    assert queue.earliest_ns == NEVER_NS
 
 
 def test_a_master_sends_in_its_own_order() -> None:

@@ -130,8 +130,15 @@ def test_a_mode_that_follows_after_seconds_is_waited_for_as_the_bus_file_says() 
     assert led(told(slow, mode_patience_ms=6000)) is None
 
 
-@pytest.mark.parametrize("lag_us", [0, pytest.param(300_000, marks=pytest.mark.long), 3_000_000])
-@pytest.mark.parametrize("follows", [True, False])
+@pytest.mark.parametrize(
+    ("follows", "lag_us"),
+    [
+        *((follows, 0) for follows in (True, False)),
+        (False, 3_000_000),
+        pytest.param(True, 3_000_000, marks=pytest.mark.long),
+        *(pytest.param(follows, 300_000, marks=pytest.mark.long) for follows in (True, False)),
+    ],
+)
 def test_a_mode_that_is_shown_with_power_alone_is_asked_for_then(
     lag_us: int, follows: bool
 ) -> None:

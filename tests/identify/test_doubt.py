@@ -56,7 +56,7 @@ def test_encoders_that_are_wired_wrongly_or_stand_still_are_named_before_any_fit
 def test_a_delay_and_a_stretched_time_are_told_apart(
     steps: tuple[FitTrial, ...], harm: Harm, name: str, value: float
 ) -> None:
-    outcome = identify(task([harm(each) for each in steps]))
+    outcome = identify(task([harm(each) for each in steps[1:]]))
     assert not outcome.trusted
     best = outcome.alternatives[0]
     assert best.name == name
@@ -89,7 +89,7 @@ def test_bars_that_were_left_out_are_not_accepted(steps_of_bars: tuple[FitTrial,
 
 
 def test_bars_that_are_not_there_are_named(steps: tuple[FitTrial, ...]) -> None:
-    outcome = identify(task(steps, bars=Bars(density=fitted_bar_density(PROTOTYPE))))
+    outcome = identify(task(steps[1:], bars=Bars(density=fitted_bar_density(PROTOTYPE))))
     assert outcome.alternatives[0].text.startswith("bars without mass explain ")
     assert outcome.alternatives[0].share > 0.9
 

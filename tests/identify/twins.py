@@ -17,6 +17,7 @@ from legbench.identify.staged import IdentificationTask
 from legbench.identify.trial import FIXED, FitTrial, trial_of
 from legbench.imperfections import Imperfections
 from legbench.mjcf.options import Linkage, LinkageKind
+from legbench.plant.landing import End
 from legbench.plants import EMULATED, CanChoice
 from legbench.recording.reader import Recording
 from legbench.servo import ServoConfig
@@ -72,15 +73,20 @@ def trials(chosen: Sequence[Experiment]) -> tuple[FitTrial, ...]:
     )
 
 
-def driven(controller: ControllerSettings, kind: SetupKind, duration: float) -> Recording:
+def driven(
+    controller: ControllerSettings,
+    kind: SetupKind,
+    duration: float,
+    hidden: Imperfections = HIDDEN,
+) -> Recording:
     """Run of the twin behind emulated drives."""
     return run(
         Experiment(
             design=PROTOTYPE,
             controller=controller,
             setup=Setup(kind=kind),
-            plant=CanChoice(bus=ROOT / "hardware" / "leg.toml", interface=EMULATED),
-            imperfections=HIDDEN,
+            plant=CanChoice(bus=ROOT / "hardware" / "leg.toml", interface=EMULATED, end=End.STOP),
+            imperfections=hidden,
             duration=duration,
         )
     )

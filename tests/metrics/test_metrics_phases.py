@@ -19,7 +19,7 @@ HOPS = st.builds(
 )
 
 
-@settings(derandomize=True, max_examples=60)
+@settings(derandomize=True, max_examples=30)
 @given(HOPS)
 def test_events_of_a_ballistic_hop_come_out_in_closed_form(hop: Hop) -> None:
     gait = Analysis(hop.recording()).gait
@@ -56,7 +56,7 @@ def test_rows_of_phases_are_those_of_the_contact() -> None:
             assert run["contact"][stop] != touching
 
 
-@settings(derandomize=True, max_examples=60)
+@settings(derandomize=True, max_examples=30)
 @given(st.integers(0, 2**32 - 1))
 def test_chattering_contact_changes_no_phase(seed: int) -> None:
     hop = Hop()

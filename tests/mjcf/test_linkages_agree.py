@@ -74,7 +74,8 @@ def test_bars_move_as_the_constraint_they_make(name: str, setup: str) -> None:
 @pytest.mark.parametrize("setup", WITHOUT_IMPACT)
 @pytest.mark.parametrize("name", MODELS_BY_NAME)
 def test_loops_stay_closed(name: str, setup: str) -> None:
-    for density in DENSITIES:
+    # How the gap depends on the bars' mass is a matter of the linkage, not of the leg.
+    for density in DENSITIES if name == "prototype" else (DEFAULT_DENSITY,):
         assert 0.0 < released(name, setup, "bars", density).loop_gap < 2e-5
     assert released(name, setup, "reduced", DEFAULT_DENSITY).loop_gap == 0.0
 

@@ -61,7 +61,7 @@ def test_loops_are_closed_at_rest_in_every_posture(prototype: LegDesign, setup: 
 MODELS: dict[str, mujoco.MjModel] = {}
 
 
-@settings(derandomize=True, max_examples=60, deadline=None)
+@settings(derandomize=True, max_examples=30, deadline=None)
 @given(
     knee=st.floats(0.3, 2.9),
     polar=st.floats(-0.6, 0.6),

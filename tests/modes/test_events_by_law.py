@@ -56,10 +56,10 @@ def test_legs_settle_that_cross_a_level_up_and_down_in_one_step(
 
 
 def test_random_hops_are_told_as_the_reference_tells_them() -> None:
-    cases = [random_case(np.random.default_rng(seed)) for seed in range(100)]
+    cases = [random_case(np.random.default_rng(seed)) for seed in range(50)]
     stories = [told(tools_of(case, MAP_TOLERANCE), case) for case in cases]
     begun = [(case, story) for case, story in zip(cases, stories, strict=True) if story]
-    assert len(begun) > 90
+    assert len(begun) > 45
     verdicts = judge(*zip(*begun, strict=True))
     for verdict in verdicts:
         assert verdict.grazes or (not verdict.fault and verdict.error < 1e-5), verdict

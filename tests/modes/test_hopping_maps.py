@@ -118,7 +118,7 @@ def test_the_sampled_controller_hops_as_its_continuous_limit(point: FixedPoint) 
     motor = controller.start_motor_pos
     start = Start(joint_pos=targets.link_at_rest(motor), motor_pos=motor)
     plant = AnalyticPlant(PROTOTYPE, Setup(), start)
-    assert run(plant, controller, 5000).status == "complete"
+    assert run(plant, controller, 3500).status == "complete"
     landed = [event.time for event in plant.transitions if event.touchdown]
     landed = [b for a, b in zip([0.0, *landed], landed, strict=False) if b - a > 0.1]
     periods = np.diff(landed)[-3:]

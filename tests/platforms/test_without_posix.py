@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 PROGRAM = Path(__file__).parent / "without_posix.py"
+EMULATED = ("--plant", "can", "--interface", "legbench")
 
 
 def run(folder: Path, *lines: list[str]) -> tuple[list[int], str]:
@@ -30,7 +31,7 @@ def test_simulation_runs_without_posix_and_drives_say_what_they_need(tmp_path: P
         ["run", "position-jump", "--duration", "0.05", "--out", "runs"],
         ["replay", "RUN"],
         ["recover", "RUN"],
-        ["run", "jump", "--duration", "0.05", "--plant", "can", "--interface", "legbench"],
+        [*("run", "jump", "--duration", "0.05", "--end", "stop"), *EMULATED],
         ["model", "--design", "prototype", "--out", "leg.xml"],
         ["drives", "emulate", "--channel", "x.sock"],
         ["check", "optimal", "--no-model"],

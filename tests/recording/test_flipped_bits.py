@@ -111,7 +111,7 @@ def assert_noticed(path: Path, whole: Values, read: Callable[[], Values]) -> Non
     told, silent = judged(path, whole, read)
     assert silent == 0
     assert len(told) > 0.8 * FLIPS
-    assert all(" is damaged: " in each and "\n" not in each for each in told)
+    assert all(" is damaged: " in each and "; " in each and "\n" not in each for each in told)
 
 
 @pytest.mark.parametrize("long_rows", [reader.LONG_ROWS, 10])

@@ -83,11 +83,13 @@ def test_some_rows_of_a_long_run_stay_in_its_file(
     assert "joint_pos_1" in long
     assert "no_such" not in long
     inner = slice(10, 40)
-    for part, mine, theirs in (
-        (slice(None), long, short),
-        (inner, rows_of(long, inner), rows_of(short, inner)),
+    few = ("joint_pos_1", "trunk_pos_x", "phase", "contact")
+    for part, mine, theirs, names in (
+        (slice(None), long, short, list(short)),
+        (inner, rows_of(long, inner), rows_of(short, inner), few),
     ):
-        for name, values in theirs.items():
+        for name in names:
+            values = theirs[name]
             assert mine[name].base is None  # keeps no column of the whole run
             np.testing.assert_array_equal(mine[name], values)
             windows = [each[name] for each in column_windows(mine, 64)]

@@ -26,7 +26,7 @@ from legbench.recording.stream import (
 from legbench.recording.writer import RunWriter
 
 SLOW = settings(
-    max_examples=60,
+    max_examples=30,
     derandomize=True,
     deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture],

@@ -2,6 +2,7 @@ import math
 from pathlib import Path
 
 import pytest
+from small_campaign import IDEAL, JUMP, campaign
 
 from legbench.campaign import read_table
 from legbench.campaign.again import experiment_of
@@ -12,21 +13,36 @@ from legbench.recording.reader import Recording
 from legbench.report import figures, kpis
 from legbench.viz.print.stills import stills_of
 
+STEP = """
+[[cells]]
+name = "step"
+set."controller.kind" = "position-jump"
+set."setup.kind" = "hfts"
+set.duration = 2.0
+list = [{ "controller.settings.z2" = 1.0, "controller.settings.dz2" = -0.3 }]
+"""
 
-def recorded(small: Path, controller: str) -> Recording:
-    rows = rows_of(read_table(small), "run")
+
+@pytest.fixture(scope="module")
+def two(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of a campaign of one step and one jump that kept no recordings."""
+    return campaign(IDEAL + STEP + JUMP, tmp_path_factory.mktemp("two"))
+
+
+def recorded(folder: Path, controller: str) -> Recording:
+    rows = rows_of(read_table(folder), "run")
     row = next(row for row in rows if row["controller.kind"] == controller)
-    return run(experiment_of(small, row))
+    return run(experiment_of(folder, row))
 
 
 @pytest.fixture(scope="module")
-def hop(small: Path) -> Recording:
-    return recorded(small, "jump")
+def hop(two: Path) -> Recording:
+    return recorded(two, "jump")
 
 
 @pytest.fixture(scope="module")
-def step(small: Path) -> Recording:
-    return recorded(small, "position-jump")
+def step(two: Path) -> Recording:
+    return recorded(two, "position-jump")
 
 
 def test_kpis_are_the_figures_of_the_summary_with_units(hop: Recording) -> None:

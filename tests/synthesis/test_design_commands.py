@@ -67,7 +67,6 @@ def test_design_of_a_quadruped_from_a_file_and_by_name(
         (["--requirements", "none.toml"], "no such requirements file; the presets are 'paper'"),
         (["--requirements", "quadruped", "--mass", "nan"], "body mass is nan kg"),
         (["--seed", "-1"], "seed is -1; it must be 0 or more"),
-        (["--drawing", "leg.bmp"], "a figure cannot be written as 'leg.bmp'"),
         (["--out", "/proc/none/my.toml"], "cannot write"),
     ],
 )
@@ -80,6 +79,15 @@ def test_design_refuses_in_one_line(
     assert printed.out == ""
     (line,) = [line for line in printed.err.splitlines() if line.startswith("legbench: ")]
     assert message in line
+
+
+@pytest.mark.parametrize("flag", ["--drawing", "--plot"])
+def test_a_picture_of_no_kind_is_refused_before_the_search(
+    flag: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("legbench.synthesis.solve.solve", None)
+    assert main(["design", flag, "leg.bmp"]) == 2
+    assert "a figure cannot be written as 'leg.bmp'" in capsys.readouterr().err
 
 
 def test_progress_tells_the_best_leg_and_the_time_left_at_the_most(

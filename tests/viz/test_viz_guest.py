@@ -106,7 +106,9 @@ def test_own_signals_come_below_the_differences_and_those_of_both_runs_are_laid_
     assert len(figure.axes) == 8
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, pytest.param(12, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "count", [1, 3, *(pytest.param(n, marks=pytest.mark.long) for n in (2, 12))]
+)
 def test_every_own_signal_has_a_panel_and_dollars_are_no_mathematics(
     guest: Recording, count: int, tmp_path: Path
 ) -> None:

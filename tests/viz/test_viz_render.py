@@ -30,7 +30,14 @@ def gl_works() -> bool:
     return done.returncode == 0
 
 
-needs_gl = pytest.mark.skipif(not gl_works(), reason="no OpenGL without a display")
+@pytest.fixture(scope="module")
+def gl() -> None:
+    """OpenGL without a display, which is looked for when the first test needs it."""
+    if not gl_works():
+        pytest.skip("no OpenGL without a display")
+
+
+needs_gl = pytest.mark.usefixtures("gl")
 
 
 @pytest.mark.parametrize("kind", list(SetupKind))

@@ -152,7 +152,10 @@ def read_table(folder: Path | str) -> pa.Table:
         with opened(path) as file:
             table = file.read()
     except UNREADABLE as error:
-        raise RecordingError(f"{path} is damaged: {reason(error)}") from error
+        raise RecordingError(
+            f"{path} is damaged: {reason(error)}; move it away and go on with legbench campaign, "
+            "which makes it anew of the campaign's shards"
+        ) from error
     found = (table.schema.metadata or {}).get(FORMAT_KEY, b"none").decode()
     if found != str(TABLE_FORMAT):
         raise FormatError(

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from tyro.conf import Positional
 
 from legbench.cli.output import note, print_json, timed_progress
-from legbench.cli.parse import parse
+from legbench.cli.parse import OrNone, parse
 from legbench.design import LegDesign, load_design
 from legbench.design.matching import TOLERANCE, Parameters, check_conditions, standing_angle
 from legbench.design.mending import mends
@@ -25,7 +25,7 @@ class CheckArguments:
 
     design: Annotated[Path, Positional] = Path("models/optimal.toml")
     """Design file of the leg."""
-    relaxed_length: float | None = None
+    relaxed_length: OrNone[float] = None
     """Leg length at which stability is asked for [m]; by default the longest that the stops
     allow, where it is hardest."""
     tolerance: float = TOLERANCE
@@ -33,9 +33,9 @@ class CheckArguments:
     model: bool = True
     """Whether to measure the conditions on the generated MuJoCo model, too; without it they are
     computed from the design's numbers alone."""
-    target: Path | None = None
+    target: OrNone[Path] = None
     """Design file of the planned leg: prints the weights that bring the built one there."""
-    tolerances: str | None = None
+    tolerances: OrNone[str] = None
     """`default` or a tolerance file: makes legs with that scatter and counts those that work."""
     legs: int = 1000
     """Number of scattered legs."""
@@ -47,8 +47,6 @@ class CheckArguments:
 
 def main(arguments: list[str]) -> int:
     """Run `legbench check`: print the verdict on each condition."""
-    from legbench.synthesis.report import condition_lines, reach_lines
-
     chosen = parse(CheckArguments, "check", arguments)
     if not chosen.tolerance >= 0.0:
         raise ConfigError(f"tolerance is {chosen.tolerance:g}; it must be zero or more")
@@ -56,6 +54,8 @@ def main(arguments: list[str]) -> int:
         from legbench.synthesis.yields import check_sample
 
         check_sample(chosen.legs, chosen.seed)
+    from legbench.synthesis.report import condition_lines, reach_lines
+
     design = load_design(chosen.design)
     angle = standing_angle(design, chosen.relaxed_length)
     conditions = check_conditions(Parameters.of(design), angle)

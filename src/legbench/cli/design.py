@@ -13,7 +13,7 @@ from legbench.cli.output import (
     print_json,
     status_line,
 )
-from legbench.cli.parse import parse
+from legbench.cli.parse import OrNone, parse
 from legbench.design import load_design, save_design
 from legbench.design.dependent import INFEASIBLE
 from legbench.design.requirements import PAPER, Requirements, load_requirements
@@ -38,33 +38,33 @@ class DesignArguments:
 
     requirements: str = "paper"
     """`paper`, `quadruped` (with --mass), or a requirements file."""
-    mass: float | None = None
+    mass: OrNone[float] = None
     """Body mass of the quadruped [kg]."""
     seed: int = 0
     """Seed of the search."""
     restarts: int = 0
     """Further searches with doubled populations; the best counts."""
-    evaluations: int | None = None
+    evaluations: OrNone[int] = None
     """Limit of evaluations; by default 20000, with --tolerances 800."""
-    trace: Path | None = None
+    trace: OrNone[Path] = None
     """File that keeps every evaluation; a search whose file exists is continued."""
-    overhang: float | None = None
+    overhang: OrNone[float] = None
     """Largest reach of mass beyond both joints of its segment [m]; the paper does not ask."""
     cross_check: bool = True
     """Whether to search by differential evolution as well, and compare; without it the search takes
     half the time, and nothing says that another leg is not better."""
-    tolerances: str | None = None
+    tolerances: OrNone[str] = None
     """`default` or a tolerance file: candidates also pay for the P^r that scatter costs them, and
     the yield of the result is measured."""
     legs: int = 1000
     """Number of legs on which the yield is measured."""
-    measured: Path | None = None
+    measured: OrNone[Path] = None
     """Design file of a leg that was built: prints the weights that bring it to the result."""
-    out: Path | None = None
+    out: OrNone[Path] = None
     """Design file to write."""
-    drawing: Path | None = None
+    drawing: OrNone[Path] = None
     """Drawing to scale to write, .svg, .png or .pdf."""
-    plot: Path | None = None
+    plot: OrNone[Path] = None
     """Plot of the search to write, .svg, .png or .pdf."""
     json: bool = False
     """Print one JSON object on stdout."""
@@ -72,19 +72,19 @@ class DesignArguments:
 
 def main(arguments: list[str]) -> int:
     """Run `legbench design`: search a leg, judge it, write it."""
-    from legbench.synthesis.manufacture import manufacture_table, table_to_json
-    from legbench.synthesis.search import SearchSettings, identity_of
-    from legbench.synthesis.trace import Trace
-
     chosen = parse(DesignArguments, "design", arguments)
-    if chosen.plot is not None:
+    for picture in filter(None, (chosen.plot, chosen.drawing)):
         from legbench.viz.print.save import check_suffix
 
-        check_suffix(chosen.plot)
+        check_suffix(picture)
     if chosen.tolerances is not None:
         from legbench.synthesis.yields import check_sample
 
         check_sample(chosen.legs, chosen.seed)
+    from legbench.synthesis.manufacture import manufacture_table, table_to_json
+    from legbench.synthesis.search import SearchSettings, identity_of
+    from legbench.synthesis.trace import Trace
+
     measured = None if chosen.measured is None else load_design(chosen.measured)
     requirements = requirements_of(chosen)
     usual = 20_000 if chosen.tolerances is None else ROBUST_EVALUATIONS

@@ -46,6 +46,10 @@ class Jitter:
         count = os.cpu_count() or 1
         if self.cpu is not None and not 0 <= self.cpu < count:
             raise ConfigError(f"cpu is {self.cpu}; this computer has 0 to {count - 1}")
+        if self.plot is not None:
+            from legbench.viz.print.save import check_suffix
+
+            check_suffix(self.plot)
         stiffness = bench.leg().stiffness
         found: dict[str, Timing] = {}
         with (

@@ -20,6 +20,9 @@ class Backlash:
     What lies between gear and spring has no mass (the dead-zone model of backlash): a spring that
     is loaded leans on a flank, half of the play behind its shaft, and between the flanks there is
     no torque.
+
+    Attributes:
+        none: whether no gear has any play.
     """
 
     def __init__(self, imperfections: Imperfections | Sequence[Imperfections]) -> None:
@@ -28,11 +31,7 @@ class Backlash:
             self._half = 0.5 * np.array(imperfections.backlash or (0.0, 0.0))
         else:
             self._half = 0.5 * np.array([leg.backlash or (0.0, 0.0) for leg in imperfections])
-
-    @property
-    def none(self) -> bool:
-        """Whether no gear has any play."""
-        return not self._half.any()
+        self.none = not self._half.any()
 
     def flank(self, shaft: Floats, joint_pos: Floats, joint_vel: Floats, step: float) -> Floats:
         """Return where the springs begin (..., 2) [rad] during a step of the simulation.

@@ -10,7 +10,7 @@ from pyarrow import parquet
 
 from legbench.errors import RecordingError
 from legbench.recording.layout import ARCHIVE
-from legbench.recording.sealed import UNREADABLE, opened, require_every_row, seal
+from legbench.recording.sealed import UNREADABLE, damaged, opened, require_every_row, seal
 from legbench.recording.stream import WholeBatches, carrying, schema_for
 from legbench.writing import put_in_place, reason
 
@@ -118,7 +118,7 @@ def read_archive(run: Path) -> pa.Table:
         with opened(path) as file:
             return file.read()
     except UNREADABLE as error:
-        raise RecordingError(f"{path} is damaged: {reason(error)}") from error
+        raise damaged(path, error) from error
 
 
 def read_schema(run: Path) -> pa.Schema:

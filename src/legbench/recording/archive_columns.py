@@ -11,12 +11,10 @@ from weakref import finalize
 import numpy as np
 import pyarrow as pa
 
-from legbench.errors import RecordingError
 from legbench.recording.archive import write_archive
 from legbench.recording.layout import ARCHIVE
-from legbench.recording.sealed import UNREADABLE, opened, require_every_row
+from legbench.recording.sealed import UNREADABLE, damaged, opened, require_every_row
 from legbench.recording.stream import WholeBatches
-from legbench.writing import reason
 
 LONG_ROWS: Final = 1 << 18
 """Rows above which columns are not kept: four minutes at 1 kHz, 60 MB."""
@@ -40,7 +38,7 @@ class ArchiveColumns(Mapping[str, np.ndarray]):
                 self.schema: pa.Schema = file.schema_arrow
                 self.rows: int = file.metadata.num_rows
         except UNREADABLE as error:
-            raise RecordingError(f"{path} is damaged: {reason(error)}") from error
+            raise damaged(path, error) from error
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Values of a column (n,), read-only."""
@@ -52,7 +50,7 @@ class ArchiveColumns(Mapping[str, np.ndarray]):
             require_every_row(len(values), self.rows)
             return values
         except UNREADABLE as error:
-            raise RecordingError(f"{self._path} is damaged: {reason(error)}") from error
+            raise damaged(self._path, error) from error
 
     def __contains__(self, name: object) -> bool:
         return name in self.schema.names
@@ -74,7 +72,7 @@ class ArchiveColumns(Mapping[str, np.ndarray]):
                     found += batch.num_rows
             require_every_row(found, self.rows)
         except UNREADABLE as error:
-            raise RecordingError(f"{self._path} is damaged: {reason(error)}") from error
+            raise damaged(self._path, error) from error
 
 
 @final

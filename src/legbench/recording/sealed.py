@@ -16,6 +16,9 @@ from typing import IO, Final
 import pyarrow as pa
 from pyarrow import parquet
 
+from legbench.errors import RecordingError
+from legbench.writing import reason
+
 MARK: Final = b"legbench crc32:"
 """Beginning of a seal; the checksum follows."""
 SEAL_BYTES: Final = len(MARK) + 8
@@ -55,6 +58,14 @@ def opened(source: Path | bytes) -> parquet.ParquetFile:
     with source.open("rb") as file:
         _check_footer(file)
     return parquet.ParquetFile(str(source), page_checksum_verification=True)
+
+
+def damaged(path: Path, error: Exception) -> RecordingError:
+    """Return the error of a damaged archive of samples, which says what helps."""
+    return RecordingError(
+        f"{path} is damaged: {reason(error)}; bring it back from a copy of the run, or run its "
+        "experiment again"
+    )
 
 
 def require_every_row(found: int, told: int) -> None:

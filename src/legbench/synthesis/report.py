@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from legbench.design import LegDesign
 from legbench.design.matching import Condition
@@ -11,8 +12,10 @@ from legbench.design.requirements import VARIABLES
 from legbench.synthesis.manufacture import Adjusted, ManufactureRow, beyond, shown
 from legbench.synthesis.model_check import AGREES, TILT_AGREES, ModelCheck
 from legbench.synthesis.release import KEPT
-from legbench.synthesis.solve import Solution
-from legbench.synthesis.yields import Yield
+
+if TYPE_CHECKING:  # To say what a check found, no search is needed, and none of its libraries.
+    from legbench.synthesis.solve import Solution
+    from legbench.synthesis.yields import Yield
 
 EXACT = 1e-9
 """Ratio below which nothing is left to mend [-]."""
@@ -80,7 +83,7 @@ def reach_lines(design: LegDesign) -> list[str]:
     ]
 
 
-def solution_lines(solution: Solution) -> list[str]:
+def solution_lines(solution: "Solution") -> list[str]:
     """Lines on the end of a search: objective, ratios, bounds and their prices, the cross-check."""
     state = "converged" if solution.complete else "stopped early, best so far"
     lines = [
@@ -144,7 +147,7 @@ def adjustment_lines(adjusted: Adjusted) -> list[str]:
     return lines
 
 
-def yield_lines(result: Yield) -> list[str]:
+def yield_lines(result: "Yield") -> list[str]:
     """How many legs keep their mode, and which tolerance takes it from the others."""
     lines = [
         f"{result.kept} of {result.legs} legs keep P^r above {KEPT:g} "

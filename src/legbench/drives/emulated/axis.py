@@ -4,6 +4,7 @@ from collections import deque
 from collections.abc import Sequence
 from typing import final
 
+from legbench.drives.emulated.actual_values import ActualValues
 from legbench.drives.emulated.alarms import Alarms
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.dictionary import USUAL_LINKS
@@ -14,23 +15,22 @@ from legbench.drives.emulated.power import HALT, POWERED, PowerStage
 from legbench.drives.emulated.sensors import Sensors
 from legbench.drives.emulated.switches import Switches
 from legbench.drives.protocol.cia402 import DriveState, Mode, StatusBit
-from legbench.drives.protocol.datatypes import DataType, range_of
 from legbench.drives.protocol.emcy import Emergency, emcy_frame
 from legbench.drives.protocol.frame import Frame
-from legbench.drives.protocol.objects import LINK_SHORT, Key
+from legbench.drives.protocol.objects import Key
 from legbench.drives.protocol.sdo import Abort
 from legbench.drives.setup.config import NodeConfig
 from legbench.drives.setup.encoders import Side
-from legbench.drives.setup.units import wrap
 
 MODES = (Mode.NONE, Mode.HOMING, Mode.CYCLIC_SYNCHRONOUS_POSITION)
 POLARITY = (0x607E, 0)
 FOLLOWING_ERROR, SETPOINTS_MISSING, SYNC_MISSING = 0x8611, 0xFF10, 0xFF11
 HOMED = 1 << 15
 """Bit 15 of the statusword, the maker's own: the position refers to a home since power-on."""
-SHORT = (LINK_SHORT, 0)
-_ENABLED = DriveState.OPERATION_ENABLED
-_STATUS = int(StatusBit.REMOTE)
+# Numbers and members by names of their own: looking one up in its class takes longer than its use.
+_ENABLED, _QUICK_STOP = DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE
+_CYCLIC, _HOMING = int(Mode.CYCLIC_SYNCHRONOUS_POSITION), int(Mode.HOMING)
+_STATUS, _FOLLOWS = int(StatusBit.REMOTE), int(StatusBit.FOLLOWS_COMMAND)
 
 
 @final
@@ -44,6 +44,7 @@ class Axis:
         alarms: errors of the drive.
         sensors: encoders of motor and link.
         warning: whether bit 7 of the statusword is set.
+        emergencies: messages that `take` returns.
     """
 
     def __init__(
@@ -54,7 +55,6 @@ class Axis:
         links: Sequence[Key] = USUAL_LINKS,
     ) -> None:
         """Turn the numbers of an object dictionary; `links` show the position of the link."""
-        self._links = tuple(links)
         self._node, self._behaviour, self._values = node, behaviour, values
         self.node_id = node.node_id
         self.power = PowerStage(values)
@@ -66,12 +66,13 @@ class Axis:
         self._homing = Homing(values, self._switches)
         self._link_counts = 0 if node.link is None else node.link.to_counts(behaviour.start_pos)
         self._torque = 0.0
-        self._target, self._shown = node.target_object.key, node.motor_object.key
+        self._shown = ActualValues(node, behaviour.rated_torque, values, links)
+        self._target = node.target_object.key
         self._mode_due_ns: int | None = None
         self._waiting_word: int | None = None
         self._now_ns = 0
         self._late_words: deque[tuple[int, int]] = deque()
-        self._out: list[Frame] = []
+        self.emergencies: list[Frame] = []
         self.publish()
 
     def address(self, node_id: int) -> None:
@@ -96,7 +97,7 @@ class Axis:
 
     def take(self) -> list[Frame]:
         """Return the emergency messages since the last call."""
-        out, self._out = self._out, []
+        out, self.emergencies = self.emergencies, []
         return out
 
     def check(self, key: Key, value: int) -> Abort | None:
@@ -133,7 +134,7 @@ class Axis:
         if self.power.state is _ENABLED and not was_enabled:
             self.motion.hold(now_ns)
             self._warn()
-        if obeyed and self.power.state is _ENABLED and self._values[0x6061, 0] == Mode.HOMING:
+        if obeyed and self.power.state is _ENABLED and self._values[0x6061, 0] == _HOMING:
             self._homing.command(controlword)
         self._status()
 
@@ -150,7 +151,7 @@ class Axis:
     def sync(self, fresh: bool, now_ns: int) -> None:
         """Latch the target as the new set point at SYNC, if one has come."""
         values = self._values
-        if self.power.state is not _ENABLED or values[0x6061, 0] != 8:
+        if self.power.state is not _ENABLED or values[0x6061, 0] != _CYCLIC:
             return
         if self.power.stopping is not None or values[0x6040, 0] & HALT:
             return
@@ -195,16 +196,16 @@ class Axis:
         if power.stopping is not None:
             if motion.ramp(self._deceleration(power.stopping), step_ns):
                 power.stopped()
-        elif power.state is DriveState.QUICK_STOP_ACTIVE:
+        elif power.state is _QUICK_STOP:
             motion.ramp(0.0, step_ns)
         elif power.state is not _ENABLED:
             motion.hold(now_ns)
             return
         elif values[0x6040, 0] & HALT:
             motion.ramp(self._deceleration(values[0x605D, 0]), step_ns)
-        elif values[0x6061, 0] == Mode.CYCLIC_SYNCHRONOUS_POSITION:
+        elif values[0x6061, 0] == _CYCLIC:
             motion.follow(now_ns, step_ns)
-        elif values[0x6061, 0] == Mode.HOMING:
+        elif values[0x6061, 0] == _HOMING:
             self._homing.step(motion, step_ns)
         motion.drive(step_ns)
         if motion.overdue(step_ns):
@@ -229,65 +230,42 @@ class Axis:
 
     def publish(self) -> None:
         """Update the actual values in the object dictionary."""
-        values, motion = self._values, self.motion
-        node, sign = self._node, motion.sign
-        actual = self.sensors.motor.show(round(motion.actual + motion.beside))
-        values[self._shown] = node.motor.show(sign * actual)
-        values[0x6062, 0] = wrap(sign * round(motion.demand))
-        values[0x60F4, 0] = wrap(sign * (round(motion.demand) - actual))
-        if node.link is not None:
-            link = self.sensors.link.show(self._link_counts)
-            for key in self._links:
-                own = key == node.link_object.key
-                short = 16 if key == SHORT else 32
-                values[key] = node.link.show(link) if own else wrap(link, short)
+        self._shown.update(self.motion, self.sensors, self._link_counts, self._torque)
         if self._switches.present:
-            values[0x60FD, 0] = self._switches.inputs(motion.travel, sign)
-        rated = self._behaviour.rated_torque
-        values[0x6077, 0] = _saturated(1000.0 * self._torque / rated, DataType.INTEGER16)
-        if node.torque_object is not None:
-            shown = _saturated(self._torque / node.torque_scale, node.torque_object.kind)
-            values[node.torque_object.key] = shown
+            motion = self.motion
+            self._values[0x60FD, 0] = self._switches.inputs(motion.travel, motion.sign)
         self._status()
 
     def _status(self) -> None:
-        word = self.power.low_byte | _STATUS
+        power, motion, values = self.power, self.motion, self._values
+        word = power.low_byte | _STATUS
         if self.warning:
             word |= StatusBit.WARNING
         if self._homing.done:
             word |= HOMED
-        mode = self._values[0x6061, 0]
-        if mode == Mode.CYCLIC_SYNCHRONOUS_POSITION:
-            if self.power.state is _ENABLED and self.power.stopping is None:
-                follows = not (self._values[0x6040, 0] & HALT or self.motion.limited)
-                if follows and self._behaviour.follows_bit:
-                    word |= StatusBit.FOLLOWS_COMMAND
-                if self.motion.limited:
+        mode, halted = values[0x6061, 0], bool(values[0x6040, 0] & HALT)
+        if mode == _CYCLIC:
+            if power.state is _ENABLED and power.stopping is None:
+                if motion.limited:
                     word |= StatusBit.INTERNAL_LIMIT
-            if self._values[0x603F, 0] == FOLLOWING_ERROR:
+                elif self._behaviour.follows_bit and not halted:
+                    word |= _FOLLOWS
+            if values[0x603F, 0] == FOLLOWING_ERROR:
                 word |= StatusBit.FOLLOWING_ERROR
-        elif mode == Mode.HOMING:
-            halted = bool(self._values[0x6040, 0] & HALT)
-            word |= self._homing.status(halted=halted, standing=self.motion.speed == 0.0)
-        self._show(int(word))
-
-    def _show(self, word: int) -> None:
-        """Publish the statusword in the object dictionary, late by the status lag."""
-        lag_ns = 1000 * self._behaviour.status_lag_us
-        if lag_ns:
-            late = self._late_words
-            late.append((self._now_ns + lag_ns, word))
-            while late and late[0][0] <= self._now_ns:
-                self._values[0x6041, 0] = late.popleft()[1]
+        elif mode == _HOMING:
+            word |= self._homing.status(halted=halted, standing=motion.speed == 0.0)
+        if self._behaviour.status_lag_us:
+            self._show_late(word)
         else:
-            self._values[0x6041, 0] = word
+            values[0x6041, 0] = word
+
+    def _show_late(self, word: int) -> None:
+        """Publish the statusword in the object dictionary, late by the status lag."""
+        late, lag_ns = self._late_words, 1000 * self._behaviour.status_lag_us
+        late.append((self._now_ns + lag_ns, word))
+        while late and late[0][0] <= self._now_ns:
+            self._values[0x6041, 0] = late.popleft()[1]
 
     def _say(self, frame: Frame | None) -> None:
         if frame is not None:
-            self._out.append(frame)
-
-
-def _saturated(value: float, kind: DataType) -> int:
-    """The nearest number that an object of a kind holds."""
-    low, high = range_of(kind)
-    return min(max(round(value), low), high)
+            self.emergencies.append(frame)

@@ -140,27 +140,25 @@ class LockstepBus(VirtualBus):
             can.CanOperationError: the bus is shut down.
         """
         if timeout is not None:
-            return self._recv_within(math.ceil(1e9 * max(0.0, timeout)))
+            return self._recv_within(math.ceil(1e9 * timeout) if timeout > 0.0 else 0)
         while (message := self._recv_within(IDLE_NS)) is None:
             time.sleep(YIELD_S)
         return message
 
     def _recv_within(self, span_ns: int) -> can.Message | None:
         self._check_open()
-        with self.network.lock:
-            return self._next_message(self.network.now_ns + span_ns)
-
-    def _next_message(self, until_ns: int) -> can.Message | None:
-        received = self._station.received
-        while True:
-            if not received:
-                self.network.advance(until_ns, self._station)
-            if not received:
-                return None
-            at_ns, frame, own = received.popleft()
-            message = message_of(frame, 1e-9 * at_ns, self.channel, own=own)
-            if self._filters is None or self._matches_filters(message):
-                return message
+        network, received = self.network, self._station.received
+        with network.lock:
+            until_ns = network.now_ns + span_ns
+            while True:
+                if not received:
+                    network.advance(until_ns, self._station)
+                if not received:
+                    return None
+                at_ns, frame, own = received.popleft()
+                message = message_of(frame, 1e-9 * at_ns, self.channel, own=own)
+                if self._filters is None or self._matches_filters(message):
+                    return message
 
     def inject(self, frame: Frame) -> None:
         """Put a frame into the receive queue that was never on the wire, for tests."""

@@ -41,7 +41,10 @@ class Dictionary:
 
     def refusal(self, key: Key, value: int) -> Abort | None:
         """Abort code of a value beyond the limits of its object; none if it lies within."""
-        low, high = self.limits.get(key, (value, value))
+        limits = self.limits.get(key)
+        if limits is None:
+            return None
+        low, high = limits
         if low <= value <= high:
             return None
         return Abort.TOO_LOW if value < low else Abort.TOO_HIGH

@@ -15,10 +15,10 @@ from legbench.drives.emulated.oddities import changed
 from legbench.drives.emulated.power import POWERED
 from legbench.drives.emulated.process_data import ProcessData
 from legbench.drives.emulated.reception import RPDO_LATE, Reception
-from legbench.drives.emulated.rules import COMMUNICATION_PROFILE, ERRORS, objection
+from legbench.drives.emulated.rules import COMMUNICATION_PROFILE, SET_BACK, objection
 from legbench.drives.emulated.store import ObjectStore
 from legbench.drives.emulated.warmth import HOT, WARM, show_temperature
-from legbench.drives.protocol import lss
+from legbench.drives.protocol import lss, nmt
 from legbench.drives.protocol.cia402 import DriveState
 from legbench.drives.protocol.frame import (
     COB_MASK,
@@ -39,12 +39,7 @@ UNDER_VOLTAGE, OVER_TEMPERATURE = 0x3220, 0x4310
 HEARTBEAT_LOST = 0x8130
 SYNC = (0x1005, 0)
 ERROR_COUNT, LATEST_ERROR = (0x1003, 0), (0x1003, 1)
-SET_BACK = tuple(index for index in COMMUNICATION_PROFILE if index not in ERRORS)
-_ORDERS = {
-    NmtCommand.START: NmtState.OPERATIONAL,
-    NmtCommand.STOP: NmtState.STOPPED,
-    NmtCommand.ENTER_PRE_OPERATIONAL: NmtState.PRE_OPERATIONAL,
-}
+_BOOT_UP, _OPERATIONAL = NmtState.BOOT_UP, NmtState.OPERATIONAL
 
 
 @final
@@ -66,9 +61,8 @@ class EmulatedDrive:
     ) -> None:
         """Switch it on; `kept` is what its memory holds instead of the defaults (1010h)."""
         self._node, self._behaviour = node, behaviour or Behaviour()
-        self.node_id = node.node_id
-        self._random = random.Random(self._behaviour.seed * LAST_NODE + node.node_id)
-        how = self._behaviour
+        self.node_id, how = node.node_id, self._behaviour
+        self._random = random.Random(how.seed * LAST_NODE + node.node_id)
         self._dictionary = shown = changed(dictionary or dictionary_of(node), node, how)
         self._store = ObjectStore(
             shown.entries, self._check, self._written, shown.hidden, lacking=how.lacking
@@ -82,11 +76,9 @@ class EmulatedDrive:
         self._target = node.target_object.key
         self._sdo = SdoServer(self._read, self._store.write, how.sdo_answers)
         self.state = NmtState.BOOT_UP
-        self._now_ns = 0
-        self._tick_ns = 0
+        self._now_ns = self._tick_ns = 0
         self._boot_ns = 1000 * how.boot_us
-        self._beats = HeartbeatProducer()
-        self._heartbeats = HeartbeatConsumer(self._values)
+        self._beats, self._heartbeats = HeartbeatProducer(), HeartbeatConsumer(self._values)
         self._connection = Connection(self.axis, self._values)
         self._reception = Reception(
             self._values, self.axis, self._pdos, self._connection, self._behaviour.sync_loss_periods
@@ -99,16 +91,19 @@ class EmulatedDrive:
 
     def take(self) -> list[tuple[int, Frame]]:
         """Frames to send since the last call, each with the time at which it is ready [ns]."""
-        out, self._out = self._out + self._connection.outlet.take(), []
+        outlet = self._connection.outlet
+        if not (self._out or outlet.ready):
+            return []
+        out, self._out = self._out + outlet.take(), []
         return out
 
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Receive a frame of another node; whatever it says, nothing is raised."""
         self._now_ns = now_ns
-        booting = self.state is NmtState.BOOT_UP and self.node_id != lss.UNCONFIGURED
-        if frame.error or frame.extended or frame.remote or booting:
+        booting = self.state is _BOOT_UP and self.node_id != lss.UNCONFIGURED
+        cob_id, data, remote, extended, error, _ = frame
+        if error or extended or remote or booting:
             return
-        cob_id, data = frame.cob_id, frame.data
         if cob_id == lss.REQUEST_ID:
             self._reply(lss.ANSWER_ID, self._lss.feed(data))
             if self._lss.released:
@@ -116,11 +111,11 @@ class EmulatedDrive:
         elif self.node_id == lss.UNCONFIGURED:
             return
         elif cob_id == self._values[SYNC] & COB_MASK:
-            if self._reception.is_sync(data, now_ns) and self.state is NmtState.OPERATIONAL:
+            if self._reception.is_sync(data, now_ns) and self.state is _OPERATIONAL:
                 for sample in self._reception.sync(now_ns):
                     self._send(sample)
         elif cob_id in self._pdos.rpdos:
-            if self.state is NmtState.OPERATIONAL:
+            if self.state is _OPERATIONAL:
                 self._reception.rpdo(cob_id, data, now_ns)
         elif cob_id == SDO_REQUEST_BASE + self.node_id:
             if self.state is not NmtState.STOPPED:
@@ -129,30 +124,34 @@ class EmulatedDrive:
             order = decode_nmt(data)
             if order is not None and order[1] in (0, self.node_id):
                 self._obey(order[0])
-        elif self._heartbeats.take(cob_id - HEARTBEAT_BASE, data, now_ns):
+        elif cob_id > HEARTBEAT_BASE and self._heartbeats.take(
+            cob_id - HEARTBEAT_BASE, data, now_ns
+        ):
             self._connection.over(HEARTBEAT_LOST, now_ns)
-        self._connection.forward(self._now_ns)
+        if self.axis.emergencies:
+            self._connection.forward(self._now_ns)
 
     def tick(self, now_ns: int) -> float:
         """Move until now and check the timers; returns the true motor position [rad]."""
         step_ns, self._now_ns, self._tick_ns = now_ns - self._tick_ns, now_ns, now_ns
         if step_ns <= 0:
             return self.axis.motion.angle
-        booting = self.state is NmtState.BOOT_UP
+        booting = self.state is _BOOT_UP
         running = self.axis.power.state is not DriveState.NOT_READY_TO_SWITCH_ON
         if booting and now_ns >= self._boot_ns and self.node_id != lss.UNCONFIGURED:
             self._boot()
         angle = self.axis.tick(now_ns, step_ns) if running else self.axis.motion.angle
         if not booting:
             self._timers()
-        self._connection.forward(self._now_ns)
+        if self.axis.emergencies:
+            self._connection.forward(self._now_ns)
         return angle
 
     def sense(self, link_pos: float, spring_torque: float) -> None:
         """Take over the state of the body in this tick: link angle [rad], spring torque [N m]."""
         self.axis.sense(link_pos, spring_torque)
         self.axis.publish()
-        if self.state is NmtState.OPERATIONAL:
+        if self.state is _OPERATIONAL:
             for frame in self._pdos.events(self._now_ns):
                 self._send(frame)
 
@@ -217,10 +216,11 @@ class EmulatedDrive:
     def _check(self, key: Key, value: int) -> Abort | None:
         if (refusal := self._dictionary.refusal(key, value)) is not None:
             return refusal
-        if Memory.owns(key):
-            return Memory.check(key, value, powered=self.axis.power.state in POWERED)
-        if ProcessData.owns(key):
-            return self._pdos.check(key, value)
+        if key[0] in COMMUNICATION_PROFILE:
+            if Memory.owns(key):
+                return Memory.check(key, value, powered=self.axis.power.state in POWERED)
+            if ProcessData.owns(key):
+                return self._pdos.check(key, value)
         return objection(key, value, self._values) or self.axis.check(key, value)
 
     def _read(self, index: int, sub: int) -> bytes:
@@ -229,7 +229,11 @@ class EmulatedDrive:
         return self._store.read(index, sub)
 
     def _written(self, key: Key) -> None:
-        if ProcessData.owns(key):
+        if key[0] >= 0x6000 or key == self._target:
+            if key == self._target:
+                self._reception.fresh = True
+            self.axis.written(key, self._now_ns)
+        elif ProcessData.owns(key):
             if key[0] & 0x200 or key[1] in (1, 2, 5):
                 self._pdos.rebuild()
         elif Memory.owns(key):
@@ -238,10 +242,6 @@ class EmulatedDrive:
             self._heartbeats.clear()
         elif key == ERROR_COUNT:
             self._values[LATEST_ERROR] = 0
-        elif key[0] >= 0x6000 or key == self._target:
-            if key == self._target:
-                self._reception.fresh = True
-            self.axis.written(key, self._now_ns)
 
     def _boot(self) -> None:
         self.state = NmtState.PRE_OPERATIONAL
@@ -259,7 +259,7 @@ class EmulatedDrive:
             self._restart(SET_BACK)
             self._connection.end(self._now_ns)
         else:
-            self._enter(_ORDERS[command])
+            self._enter(nmt.ORDERED[command])
 
     def _enter(self, state: NmtState) -> None:
         before, self.state = self.state, state

@@ -12,14 +12,18 @@ INHIBIT_NS = 100_000
 
 @final
 class EmergencyOutlet:
-    """Sends the emergency messages of a drive, not too fast and only while it may send."""
+    """Sends the emergency messages of a drive, not too fast and only while it may send.
+
+    Attributes:
+        ready: messages that `take` returns.
+    """
 
     def __init__(self, values: Mapping[Key, int]) -> None:
         self._values = values
         self._free_ns = 0
         self._muted = False
         self._held: list[Frame] = []
-        self._out: list[tuple[int, Frame]] = []
+        self.ready: list[tuple[int, Frame]] = []
 
     def put(self, frame: Frame | None, now_ns: int) -> None:
         """Send a message, if there is one, as soon as the inhibit time allows."""
@@ -30,7 +34,7 @@ class EmergencyOutlet:
             return
         at_ns = max(now_ns, self._free_ns)
         self._free_ns = at_ns + INHIBIT_NS * self._values[0x1015, 0]
-        self._out.append((at_ns, frame))
+        self.ready.append((at_ns, frame))
 
     def mute(self) -> None:
         """Keep messages back: the drive is off the bus, or boots."""
@@ -45,11 +49,11 @@ class EmergencyOutlet:
 
     def take(self) -> list[tuple[int, Frame]]:
         """Messages since the last call, each with the time at which it is ready [ns]."""
-        out, self._out = self._out, []
+        out, self.ready = self.ready, []
         return out
 
     def clear(self) -> None:
         """Forget all messages, as after power-on."""
         self._held.clear()
-        self._out.clear()
+        self.ready.clear()
         self._free_ns = 0

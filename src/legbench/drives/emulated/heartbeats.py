@@ -36,7 +36,7 @@ class HeartbeatConsumer:
 
     def lost(self, now_ns: int) -> bool:
         """Whether any heartbeat is overdue."""
-        return any(watch.lost(now_ns) for watch in self._watches.values())
+        return any([watch.lost(now_ns) for watch in self._watches.values()])
 
     def _consumed(self) -> Iterator[tuple[int, int]]:
         """Yield the node and time-out [ns] of every heartbeat to watch (1016h)."""

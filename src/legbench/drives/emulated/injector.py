@@ -48,20 +48,26 @@ def _strike_parts(drive: EmulatedDrive, fault: NodeFault, *, begins: bool) -> No
 
 @final
 class Injector:
-    """Faults of one bus; it also counts as the sender of the frames of babbling nodes."""
+    """Faults of one bus; it also counts as the sender of the frames of babbling nodes.
+
+    Attributes:
+        unplugged: ids of the nodes whose connector is unplugged.
+        frames: faults of frames.
+    """
 
     def __init__(self, faults: Sequence[Fault]) -> None:
-        self._frames: list[FrameFault] = []
+        self.frames: list[FrameFault] = []
         self._nodes: list[NodeFault] = []
         self._babbles: list[Babble] = []
         self._begun: list[NodeFault] = []
+        self.unplugged: frozenset[int] = frozenset()
         for fault in faults:
             self.add(fault)
 
     def add(self, fault: Fault) -> None:
         """Add a fault, which acts in its window of time."""
         if isinstance(fault, FrameFault):
-            self._frames.append(fault)
+            self.frames.append(fault)
         elif isinstance(fault, NodeFault):
             self._nodes.append(fault)
         else:
@@ -80,17 +86,15 @@ class Injector:
 
     def breaks(self, frame: Frame, now_ns: int) -> bool:
         """Whether a frame is destroyed on the wire."""
-        return any(
-            fault.kind is FrameFaultKind.BAD_BITS and fault.hits(frame, now_ns)
-            for fault in self._frames
-        )
+        for fault in self.frames:
+            if fault.kind is FrameFaultKind.BAD_BITS and fault.hits(frame, now_ns):
+                return True
+        return False
 
     def fate(self, frame: Frame, now_ns: int) -> Fate:
         """Delay [ns] and content of each copy that arrives of a frame that was not destroyed."""
-        if not self._frames:
-            return ((0, frame),)
         arrivals: Fate = ((0, frame),)
-        for fault in self._frames:
+        for fault in self.frames:
             if not fault.hits(frame, now_ns):
                 continue
             if fault.kind is FrameFaultKind.DROP:
@@ -117,16 +121,17 @@ class Injector:
             if now_ns >= fault.start_ns:
                 self._nodes.remove(fault)
                 self._begun.append(fault)
+                self._note_unplugged()
                 yield fault, True
         for fault in tuple(self._begun):
             if now_ns >= fault.end_ns:
                 self._begun.remove(fault)
+                self._note_unplugged()
                 yield fault, False
 
-    def silent(self, node_id: int, now_ns: int) -> bool:
-        """Whether a node's bus connector is unplugged."""
-        return any(
-            fault.kind is NodeFaultKind.SILENT and fault.node_id == node_id for fault in self._begun
+    def _note_unplugged(self) -> None:
+        self.unplugged = frozenset(
+            fault.node_id for fault in self._begun if fault.kind is NodeFaultKind.SILENT
         )
 
     @staticmethod

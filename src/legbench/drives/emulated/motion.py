@@ -70,7 +70,9 @@ class Motion:
     def span_ns(self) -> int:
         """Interpolation time 60C2h [ns]."""
         value, exponent = self._values[0x60C2, 1], self._values[0x60C2, 2]
-        return max(1, round(value * 10.0 ** max(-9, min(exponent, 3)) * SECOND_NS))
+        if not -9 <= exponent <= 3:
+            exponent = max(-9, min(exponent, 3))
+        return max(1, round(value * 10.0**exponent * SECOND_NS))
 
     def hold(self, now_ns: int) -> None:
         """Hold the motor where it is and drop the interpolated way to a target."""
@@ -112,9 +114,9 @@ class Motion:
 
     def follow(self, now_ns: int, step_ns: int) -> None:
         """Move the demand along the interpolated way to its place at `now_ns`."""
-        share = min(1.0, (now_ns - self._since_ns) / self.span_ns)
-        if not self._behaviour.interpolate:
-            share = 1.0
+        share = 1.0
+        if self._behaviour.interpolate:
+            share = min(share, (now_ns - self._since_ns) / self.span_ns)
         self._demand(self._from + share * (self._to - self._from), step_ns)
 
     def seek(self, speed: float, step_ns: int) -> None:

@@ -131,7 +131,7 @@ class Network:
         Raises:
             BusError: the controller is bus-off, or its queue is full.
         """
-        if self.off_bus(station):
+        if self.errors[station] >= BUS_OFF:
             raise BusError("the controller is bus-off; find the cause, then restart the interface")
         if station.waiting >= station.tx_queue:
             raise BusError(f"the transmit queue is full ({station.tx_queue} frames)")
@@ -144,7 +144,8 @@ class Network:
             at_ns, event = self._next()
             if at_ns > until_ns:
                 break
-            self.now_ns = max(self.now_ns, at_ns)
+            if at_ns > self.now_ns:
+                self.now_ns = at_ns
             event()
         else:
             return
@@ -158,20 +159,15 @@ class Network:
         """Time and handler of the next event; at equal times the grid of the body goes first."""
         if self._flying is not None:
             at_ns, event = self._end_ns, self._land
-        elif self._queue:
-            at_ns = max(self._end_ns, self._queue.earliest_ns)
-            event = self._arbitrate
         else:
-            return self._tick_ns, self._tick
+            at_ns, event = max(self._end_ns, self._queue.earliest_ns), self._arbitrate
         if self._tick_ns <= at_ns:
             return self._tick_ns, self._tick
         return at_ns, event
 
-    def _collect(self, node: Node) -> None:
-        if isinstance(node, Station):
-            return
-        for ready_ns, frame in node.take():
-            if not self.off_bus(node):
+    def _enqueue(self, node: Participant, frames: Sequence[tuple[int, Frame]]) -> None:
+        if not self.off_bus(node):
+            for ready_ns, frame in frames:
                 self._queue.put(node, ready_ns, frame)
 
     def _tick(self) -> None:
@@ -189,14 +185,18 @@ class Network:
         for other in self._others:
             other.tick(now_ns)
         for node in self._nodes:
-            self._collect(node)
+            if not isinstance(node, Station) and (frames := node.take()):
+                self._enqueue(node, frames)
 
     def _arbitrate(self) -> None:
         """Start the ready frame with the lowest identifier, as arbitration does (ISO 11898-1)."""
         now_ns = self.now_ns
         self._flying = winner = self._queue.pop(now_ns)
         frame = winner.frame
-        self._broken = self._injector.breaks(frame, now_ns) or self._garbled(winner.sender)
+        injector = self._injector
+        self._broken = bool(injector.frames) and injector.breaks(frame, now_ns)
+        if self._strangers and not self._broken:
+            self._broken = self._garbled(winner.sender)
         bits = ERROR_BITS + worst_bits(0) if self._broken else bits_of(frame, self._stuffing)
         self._end_ns = now_ns + bits * self._bit_ns
 
@@ -223,8 +223,8 @@ class Network:
         if self._broken:
             self._fail(flying)
             return
-        if sender in self.errors:
-            self.errors[sender] = max(0, self.errors[sender] - 1)
+        if self.errors.get(sender):
+            self.errors[sender] -= 1
         if isinstance(sender, Station):
             sender.waiting -= 1
             if sender.echo:
@@ -232,6 +232,9 @@ class Network:
         if sender is self._injector:
             # No node receives a copy of its own frames.
             self._deliver(self._copied.pop(sequence, sender), frame)
+            return
+        if not self._injector.frames:
+            self._deliver(sender, frame)
             return
         for delay_ns, changed in self._injector.fate(frame, self.now_ns):
             if delay_ns:
@@ -244,21 +247,20 @@ class Network:
         now_ns = self.now_ns
         if self.log is not None:
             self.log.append((now_ns, frame))
-        if isinstance(sender, EmulatedDrive) and self._injector.silent(sender.node_id, now_ns):
+        unplugged = self._injector.unplugged
+        if isinstance(sender, EmulatedDrive) and sender.node_id in unplugged:
             return
+        errors = self.errors
         for node in self._nodes:
-            if node is sender:
+            if node is sender or errors[node] >= BUS_OFF:
                 continue
             if isinstance(node, Station):
-                if not self.off_bus(node):
-                    heard = ERROR_FRAME if node in self._strangers else frame
-                    node.received.append(Heard(now_ns, heard))
-            elif not (self.off_bus(node) or self._deaf(node)):
+                heard = ERROR_FRAME if node in self._strangers else frame
+                node.received.append(Heard(now_ns, heard))
+            elif not (isinstance(node, EmulatedDrive) and node.node_id in unplugged):
                 node.receive(frame, now_ns)
-                self._collect(node)
-
-    def _deaf(self, node: Participant) -> bool:
-        return isinstance(node, EmulatedDrive) and self._injector.silent(node.node_id, self.now_ns)
+                if answers := node.take():
+                    self._enqueue(node, answers)
 
     def _fail(self, flying: Waiting) -> None:
         """Send an error frame to all nodes; the sender repeats its frame until it is bus-off."""

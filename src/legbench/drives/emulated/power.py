@@ -20,6 +20,12 @@ _WORDS = {
 STAY_IN_QUICK_STOP = 5
 """Lowest value of 605Ah with which a drive stays in quick stop active."""
 HALT = 1 << 8
+# Members by names of their own: looking one up in its class takes as long as all else here.
+_DISABLED, _READY, _SWITCHED_ON = _S.SWITCH_ON_DISABLED, _S.READY_TO_SWITCH_ON, _S.SWITCHED_ON
+_ENABLED, _FAULT = _S.OPERATION_ENABLED, _S.FAULT
+_DEAF = (_S.FAULT_REACTION_ACTIVE, _S.NOT_READY_TO_SWITCH_ON)
+"""States in which a drive obeys no controlword."""
+_FAULTY = (_S.FAULT, _S.FAULT_REACTION_ACTIVE)
 POWERED = (_S.OPERATION_ENABLED, _S.QUICK_STOP_ACTIVE, _S.FAULT_REACTION_ACTIVE)
 """States in which the motor holds or stops a load."""
 
@@ -49,7 +55,7 @@ class PowerStage:
     @property
     def faulted(self) -> bool:
         """Whether the drive is in a fault, or on its way there."""
-        return self.state in (_S.FAULT, _S.FAULT_REACTION_ACTIVE)
+        return self.state in _FAULTY
 
     def boot(self) -> None:
         """Enter switch on disabled after the self-test (transition 1)."""
@@ -58,16 +64,13 @@ class PowerStage:
     def command(self, controlword: int, *, cause_gone: bool) -> bool:
         """Obey a controlword (6040h); returns whether a fault was reset."""
         before, self._before = self._before, controlword
-        if self.state is DriveState.FAULT:
+        if self.state is _FAULT:
             edge = controlword & 0x80 and not before & 0x80
             if edge and cause_gone:
                 self._enter(DriveState.SWITCH_ON_DISABLED)
                 return True
             return False
-        if controlword & 0x80 or self.state in (
-            DriveState.FAULT_REACTION_ACTIVE,
-            DriveState.NOT_READY_TO_SWITCH_ON,
-        ):
+        if controlword & 0x80 or self.state in _DEAF:
             return False
         self._transit(controlword)
         return False
@@ -77,27 +80,27 @@ class PowerStage:
         disable, quick = not word & 0x02, word & 0x06 == 0x02
         shutdown, on = word & 0x07 == 0x06, word & 0x07 == 0x07
         enable = on and bool(word & 0x08)
-        if state is _S.SWITCH_ON_DISABLED:
+        if state is _DISABLED:
             if shutdown:
-                self._enter(_S.READY_TO_SWITCH_ON)  # 2
+                self._enter(_READY)  # 2
         elif disable:
-            self._enter(_S.SWITCH_ON_DISABLED)  # 7, 9, 10, 12
-        elif state is _S.READY_TO_SWITCH_ON:
+            self._enter(_DISABLED)  # 7, 9, 10, 12
+        elif state is _READY:
             if quick:
-                self._enter(_S.SWITCH_ON_DISABLED)  # 7
+                self._enter(_DISABLED)  # 7
             elif on:
-                self._enter(_S.SWITCHED_ON)  # 3
-        elif state is _S.SWITCHED_ON:
+                self._enter(_SWITCHED_ON)  # 3
+        elif state is _SWITCHED_ON:
             if quick:
-                self._enter(_S.SWITCH_ON_DISABLED)  # 10
+                self._enter(_DISABLED)  # 10
             elif shutdown:
-                self._enter(_S.READY_TO_SWITCH_ON)  # 6
+                self._enter(_READY)  # 6
             elif enable:
-                self._enter(_S.OPERATION_ENABLED)  # 4
-        elif state is _S.OPERATION_ENABLED:
+                self._enter(_ENABLED)  # 4
+        elif state is _ENABLED:
             self._from_enabled(quick=quick, shutdown=shutdown, on=on, enable=enable)
         elif enable and self._values[0x605A, 0] >= STAY_IN_QUICK_STOP:
-            self._enter(_S.OPERATION_ENABLED)  # 16; only quick stop active is left here
+            self._enter(_ENABLED)  # 16; only quick stop active is left here
 
     def _from_enabled(self, *, quick: bool, shutdown: bool, on: bool, enable: bool) -> None:
         if quick:

@@ -119,9 +119,11 @@ class ProcessData:
     def _build(self, comm: int, old: dict[int, Pdo]) -> Pdo | None:
         values = self._store.values
         cob = values[comm, 1]
+        if cob & COB_INVALID:
+            return None
         mapping = comm + 0x200
         count = min(values.get((mapping, 0), 0), MAX_MAPPED)
-        if cob & COB_INVALID or not count:
+        if not count:
             return None
         words = [values.get((mapping, sub), 0) for sub in range(1, count + 1)]
         entries = [self._mapped(word, mapping) for word in words]
@@ -179,12 +181,10 @@ class ProcessData:
     def apply(self, pdo: Pdo, values: tuple[int, ...]) -> None:
         """Write the values of an RPDO to its objects; one that is refused keeps its value."""
         for key, value in zip(pdo.keys, values, strict=True):
-            entry = self._store.entry(key)
-            if entry is not None:
-                try:
-                    self._store.put(entry, value)
-                except SdoAbortError:
-                    continue
+            try:
+                self._store.put(key, value)
+            except SdoAbortError:
+                continue
 
     def events(self, now_ns: int) -> list[Frame]:
         """Sample the event-driven TPDOs that have changed or whose timer has run out."""

@@ -15,6 +15,8 @@ COMMUNICATION_PROFILE = range(0x1000, 0x2000)
 """Objects that NMT's reset communication sets back (CiA 301, 7.3.2.2)."""
 ERRORS = (0x1001, 0x1003)
 """Objects of the communication profile that show the state of the drive, which a reset keeps."""
+SET_BACK = tuple(index for index in COMMUNICATION_PROFILE if index not in ERRORS)
+"""Objects that reset communication sets back."""
 ALLOWED: Mapping[Key, Container[int]] = {
     (0x1003, 0): range(1),
     (0x1019, 0): (0, *range(2, 241)),

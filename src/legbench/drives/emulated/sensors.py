@@ -19,6 +19,9 @@ class SensorFault(Enum):
     """The encoder's reading drifts away at a constant speed [rad/s]."""
 
 
+_FROZEN, _STEP, _DRIFT = SensorFault.FROZEN, SensorFault.STEP, SensorFault.DRIFT
+
+
 @final
 class Encoder:
     """Encoder that turns true counts into shown counts, with its fault if it has one.
@@ -40,9 +43,9 @@ class Encoder:
 
     def tick(self, step_ns: int) -> None:
         """Advance the time of the fault [ns]."""
-        if self._ailment is SensorFault.DRIFT:
+        if self._ailment is _DRIFT:
             self._offset += self._size * step_ns / SECOND_NS
-        elif self._ailment is SensorFault.STEP:
+        elif self._ailment is _STEP:
             self._offset = self._size
 
     def disturb(self, error: float) -> None:
@@ -51,8 +54,9 @@ class Encoder:
 
     def show(self, counts: int) -> int:
         """Return the reading for a true position [counts]."""
-        if self._ailment is not SensorFault.FROZEN:
-            self._shown = counts + round((self._offset + self._noise) * self._counts_per_rad)
+        if self._ailment is not _FROZEN:
+            error = self._offset + self._noise
+            self._shown = counts + round(error * self._counts_per_rad) if error else counts
         return self._shown
 
 

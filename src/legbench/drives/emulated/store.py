@@ -102,15 +102,15 @@ class ObjectStore:
         if not isinstance(value, int):
             self._texts[entry.key] = value
             return
-        self.put(entry, value)
+        self.put((index, sub), value)
 
-    def put(self, entry: ObjectEntry, value: int) -> None:
-        """Write as the bus does, by SDO or PDO; raises SdoAbortError."""
-        refusal = self._check(entry.key, value)
+    def put(self, key: Key, value: int) -> None:
+        """Write an object that there is as the bus does, by SDO or PDO; raises SdoAbortError."""
+        refusal = self._check(key, value)
         if refusal is not None:
-            raise abort_error(refusal, entry.index, entry.sub)
-        self.values[entry.key] = value
-        self._written(entry.key)
+            raise abort_error(refusal, *key)
+        self.values[key] = value
+        self._written(key)
 
     def show(self, key: Key, value: float) -> None:
         """Publish a measured value, rounded and saturated to what its object holds."""

@@ -1,5 +1,6 @@
 """Network management and heartbeat (CiA 301, 7.2.8)."""
 
+from collections.abc import Mapping
 from enum import IntEnum
 from typing import final
 
@@ -25,6 +26,12 @@ class NmtState(IntEnum):
     PRE_OPERATIONAL = 127
 
 
+ORDERED: Mapping[NmtCommand, NmtState] = {
+    NmtCommand.START: NmtState.OPERATIONAL,
+    NmtCommand.STOP: NmtState.STOPPED,
+    NmtCommand.ENTER_PRE_OPERATIONAL: NmtState.PRE_OPERATIONAL,
+}
+"""State that a command leads to, unless it is a reset."""
 _COMMANDS = {int(command): command for command in NmtCommand}
 _STATES = {int(state): state for state in NmtState}
 

@@ -1,6 +1,7 @@
 """Service data: what both sides share (CiA 301, 7.2.4)."""
 
 import struct
+from collections.abc import Mapping
 from enum import IntEnum
 
 from legbench.drives.errors import SdoAbortError
@@ -51,7 +52,7 @@ ABSENT = (Abort.NO_OBJECT, Abort.NO_SUB_INDEX, Abort.UNSUPPORTED_ACCESS, Abort.G
 """Codes with which drives refuse objects that they have not; the last two are not the standard's
 way, and may mean something else on an object that is there."""
 
-MEANINGS = {
+MEANINGS: Mapping[int, str] = {
     Abort.TOGGLE: "toggle bit not alternated",
     Abort.TIMED_OUT: "SDO protocol timed out",
     Abort.COMMAND: "command specifier not valid or unknown",
@@ -81,8 +82,7 @@ MEANINGS = {
 
 def abort_error(code: int, index: int, sub: int) -> SdoAbortError:
     """The error of an abort code, in words."""
-    known = {int(abort): text for abort, text in MEANINGS.items()}
-    return SdoAbortError(code, index, sub, known.get(code, "aborted"))
+    return SdoAbortError(code, index, sub, MEANINGS.get(code, "aborted"))
 
 
 def abort_data(code: int, index: int, sub: int) -> bytes:

@@ -41,6 +41,10 @@ class AxisUnits:
     a signed object [counts]."""
     counts_per_rad: float = field(init=False)
     """Counts for one radian of the axis, negative for a mirrored one [counts/rad]."""
+    modulus: int = field(init=False, repr=False, compare=False)
+    """Counts after which the position repeats."""
+    lowest: int = field(init=False, repr=False, compare=False)
+    """Lowest count that the position object shows."""
 
     def __post_init__(self) -> None:
         if not 0 < self.counts_per_rev <= MOST_COUNTS:
@@ -65,36 +69,29 @@ class AxisUnits:
             raise ConfigError(
                 f"bits is {self.bits}; a position object has {', '.join(map(str, LENGTHS))}"
             )
-        self._check_window()
+        self._set_window()
         scale = self.sign * self.gear * self.counts_per_rev / (2.0 * math.pi)
         object.__setattr__(self, "counts_per_rad", scale)
 
-    def _check_window(self) -> None:
-        """Refuse counts that no object of this length shows."""
-        modulus, low = self.modulus, self.lowest
-        if not FEWEST_COUNTS <= modulus <= 1 << self.bits:
+    def _set_window(self) -> None:
+        """Set the counts that the object shows, refusing those that none of this length does."""
+        half = 1 << self.bits - 1
+        modulus = 2 * half if self.modulus_counts is None else self.modulus_counts
+        low = -half if self.modulus_counts is None else 0
+        if self.lowest_count is not None:
+            low = self.lowest_count
+        if not FEWEST_COUNTS <= modulus <= 2 * half:
             raise ConfigError(
                 f"modulus_counts is {modulus}; an object of {self.bits} bits repeats after "
-                f"{FEWEST_COUNTS} to {1 << self.bits} counts"
+                f"{FEWEST_COUNTS} to {2 * half} counts"
             )
-        if not -(1 << self.bits - 1) <= low <= (1 << self.bits) - modulus:
+        if not -half <= low <= 2 * half - modulus:
             raise ConfigError(
                 f"lowest_count is {low}; an object of {self.bits} bits that repeats after "
-                f"{modulus} counts begins at {-(1 << self.bits - 1)} to "
-                f"{(1 << self.bits) - modulus}"
+                f"{modulus} counts begins at {-half} to {2 * half - modulus}"
             )
-
-    @property
-    def modulus(self) -> int:
-        """Counts after which the position repeats."""
-        return 1 << self.bits if self.modulus_counts is None else self.modulus_counts
-
-    @property
-    def lowest(self) -> int:
-        """Lowest count that the position object shows."""
-        if self.lowest_count is not None:
-            return self.lowest_count
-        return -(1 << self.bits - 1) if self.modulus_counts is None else 0
+        object.__setattr__(self, "modulus", modulus)
+        object.__setattr__(self, "lowest", low)
 
     @property
     def lap(self) -> float:

@@ -3,6 +3,7 @@
 import io
 import struct
 from collections.abc import Iterator
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -44,8 +45,12 @@ def load_sheet(path: Path) -> DataSheet:
         raise ConfigError(f"{path}: {error}") from None
 
 
+@lru_cache(maxsize=4)
 def sheet_of(content: bytes, name: str) -> DataSheet:
-    """Return the data sheet of a file's content; raises UnreadableError, MissingExtraError."""
+    """Return the data sheet of a file's content; raises UnreadableError, MissingExtraError.
+
+    A proposed bus file is checked, and may be emulated, on the sheet that it was proposed from.
+    """
     sections = split(decode(content))
     variables = list(_variables(clean_text(sections)))
     if not variables:
