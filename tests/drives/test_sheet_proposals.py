@@ -226,6 +226,8 @@ def test_parameters_are_those_that_a_drive_takes_within_its_limits() -> None:
         assert parameters(fixed) == [each for each in (window, time, torque, ramp) if each != line]
     limited = drive(limits={(0x6065, 0): (30_000, 40_000), (0x6072, 0): (0, 500)})
     assert parameters(limited)[:3] == ['"6065:00 u32" = 30000', time, '"6072:00 u16" = 500']
+    nothing = drive(limits={(0x6066, 0): (-5, 0)})
+    assert parameters(nothing)[1] == '"6066:00 u16" = 0'
     # A motor stops within 0.2 rad from 40 rad/s at 4000 rad/s2, in counts of the emulated leg.
     least = math.ceil(4000.0 * 65536 * 6.0 / (2.0 * math.pi))
     for most, key in ((least, (0x6085, 0)), (least - 1, (0x6084, 0))):
