@@ -236,8 +236,9 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
 def test_a_missing_library_is_said_with_the_way_to_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delitem(sys.modules, "legbench.drives.sheet._canopen", raising=False)
     monkeypatch.setitem(sys.modules, "canopen.objectdictionary", None)
+    # By a name of its own, as one that has been read is remembered.
     with pytest.raises(MissingExtraError, match=r"pip install 'legbench\[eds\]'"):
-        sheet_of(TEXT.encode(), "it.eds")
+        sheet_of(TEXT.encode(), "without a library.eds")
 
 
 @pytest.mark.long

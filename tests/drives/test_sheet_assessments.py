@@ -10,15 +10,18 @@ from test_sheet_proposals import I16, I32, U8, U16, U32, drive, entry, with_obje
 from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.objects import Access, Key
 from legbench.drives.protocol.pdo import Mapped
+from legbench.drives.protocol.sdo import Abort
 from legbench.drives.setup.config import (
     LINK_POSITION,
     POSITION_ACTUAL,
     STATUSWORD,
     NodeConfig,
+    Parameter,
     PdoConfig,
 )
 from legbench.drives.sheet.assess import Assessment, State, assess, short_name
 from legbench.drives.sheet.data_sheet import DataSheet
+from legbench.drives.sheet.predict import predict
 
 TPDOS = (
     PdoConfig(number=1, objects=(STATUSWORD, POSITION_ACTUAL)),
@@ -253,3 +256,41 @@ def test_types_have_the_names_of_bus_files() -> None:
     names = {I16: "i16", I32: "i32", U8: "u8", U16: "u16", U32: "u32"}
     assert {kind: short_name(kind) for kind in names} == names
     assert [state.value for state in State] == ["has", "fixed", "lacks"]
+
+
+# --- what becomes of what is written ---------------------------------------------------------
+
+
+def test_a_value_beyond_a_limit_of_the_data_sheet_is_refused_on_its_side() -> None:
+    sheet = drive(limits={(0x6065, 0): (10, 40_000)})
+    for value, code in ((9, Abort.TOO_LOW), (10, None), (40_000, None), (40_001, Abort.TOO_HIGH)):
+        given = Parameter(index=0x6065, sub=0, kind=U32, value=value)
+        (found,) = [
+            one
+            for one in predict(sheet, config(), node(parameters=(given,)))
+            if one.parameter.key == (0x6065, 0)
+        ]
+        assert found.code == code
+        assert found.there == (value if code is None else sheet.default((0x6065, 0), 1))
+
+
+def test_pdos_beyond_the_fourth_that_are_on_are_switched_off() -> None:
+    more = []
+    for comm, cobs in ((0x1400, (0x4F0, 0x8000_04F1, 0)), (0x1800, (0x4000_04D0, 0x4D1, 0))):
+        for place, cob in enumerate(cobs, start=4):
+            more += [
+                entry((comm + place, 1), U32, Access.RW, cob, mappable=False),
+                entry((comm + place + 0x200, 0), U8, Access.RW, mappable=False),
+            ]
+    sheet = with_objects(drive(), *more)
+    written = {one.parameter.key: one.parameter.value for one in predict(sheet, config(), node())}
+    # Bit 31 says that a PDO is not there (CiA 301); 29 bits below are its identifier.
+    beyond = {key: value for key, value in written.items() if key[0] & 0x1FF >= 4 and key[1] == 1}
+    beyond = {key: value for key, value in beyond.items() if 0x1400 <= key[0] < 0x1A00}
+    assert beyond == {
+        (0x1404, 1): 0x8000_04F0,
+        (0x1406, 1): 0x8000_0000,
+        (0x1804, 1): 0x8000_04D0,
+        (0x1805, 1): 0x8000_04D1,
+        (0x1806, 1): 0x8000_0000,
+    }

@@ -188,6 +188,9 @@ def test_objects_fill_frames_of_eight_bytes_in_their_order() -> None:
     assert carried(drive(), *others[:6]) == [
         (number, tuple(others[2 * number - 2 : 2 * number])) for number in (1, 2, 3)
     ]
+    # A byte more than eight goes into the next frame.
+    byte = Mapped(0x3001, 0, U8)
+    assert carried(drive(), POSITION, LINK, byte) == [(1, (POSITION, LINK)), (2, (byte,))]
     # Three frames are the most.
     assert carried(drive(), *others) is None
     assert carried(drive((0x1801, 1)), STATUSWORD, POSITION, LINK) == [two[0], (3, (LINK,))]
@@ -281,6 +284,35 @@ def test_a_transmission_type_that_cannot_be_changed_is_synchronous() -> None:
             free = with_objects(sheet, entry((comm, 2), U8, Access.RW, kind))
             for other in (told, free):
                 assert carried(other, *needed, commands=commands) == [(1, needed)]
+
+
+def test_a_pdo_beyond_the_fourth_has_no_identifier_of_its_own_and_is_not_used() -> None:
+    for commands, comm in ((True, 0x1400), (False, 0x1800)):
+        free = [entry((comm + 4, sub), U32, Access.RW) for sub in (1, 2)]
+        free += [entry((comm + 0x204, sub), U32, Access.RW) for sub in range(9)]
+        none = drive(*[(comm + place, 1) for place in range(4)])
+        sheet = with_objects(none, *free)
+        assert sheet.pdos(commands=commands) == (5,)
+        assert choose(sheet, (STATUSWORD,), commands=commands) is None
+
+
+@pytest.mark.parametrize(
+    ("index", "kind"),
+    [
+        # CiA 402: mode, target torque, offsets of position, velocity and torque, target velocity.
+        *((0x6060, DataType.INTEGER8), (0x6071, I16), (0x60B0, I32)),
+        *((0x60B1, I32), (0x60B2, I16), (0x60FF, I32)),
+    ],
+)
+def test_what_has_no_part_in_the_cyclic_mode_may_stand_in_a_fixed_command(
+    index: int, kind: DataType
+) -> None:
+    only = drive(*[(0x1400 + place, 1) for place in (1, 2, 3)])
+    extra = Mapped(index, 0, kind)
+    sheet = with_objects(only, entry((index, 0), kind, Access.RW))
+    words = (COMMAND[1], index << 16 | extra.bits)
+    found = carried(fixed(sheet, 0x1400, words, None), TARGET, commands=True)
+    assert found == [(1, (TARGET, extra))]
 
 
 # --- proposals -------------------------------------------------------------------------------
