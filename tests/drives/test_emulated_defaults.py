@@ -1,12 +1,15 @@
 """An emulated drive of which nothing is said, and what it shows of its motor in each period."""
 
+import random
 from typing import Any, cast
 
 import pytest
-from drives_rig import config
+from drives_rig import MS, config, node
 
 from legbench.drives.emulated.behaviour import Behaviour, MissingSetpoint
 from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.drive import EmulatedDrive
+from legbench.drives.protocol.frame import Frame
 from legbench.drives.protocol.sdo import Abort
 
 ASKED = {
@@ -87,3 +90,60 @@ def test_a_mode_that_is_set_already_is_taken_while_the_drive_is_halted() -> None
             assert axis.check((0x6060, 0), 8) is None
             assert axis.check((0x6060, 0), 6) is other
             assert axis.check((0x6060, 0), 99) is Abort.INVALID_VALUE
+
+
+# --- the drive by itself ---------------------------------------------------------------------
+
+
+def booted(**how: Any) -> EmulatedDrive:
+    """A drive that has booted after 5 ms, and whose message of it is sent."""
+    drive = EmulatedDrive(node(0), Behaviour(**how))
+    drive.tick(5 * MS)
+    assert drive.take() == [(5 * MS, Frame(0x701, b"\0"))]
+    return drive
+
+
+@pytest.mark.parametrize("seed", [0, 3])
+def test_replies_are_as_late_as_the_dice_of_their_seed_and_node_say(seed: int) -> None:
+    drive = booted(seed=seed)
+    # 127 nodes have dice of their own, and so has each seed.
+    dice = random.Random(127 * seed + 1)
+    for number in range(4):
+        now_ns = (6 + number) * MS
+        drive.receive(Frame(0x601, bytes.fromhex("4000100000000000")), now_ns)
+        ((at_ns, frame),) = drive.take()
+        assert at_ns == now_ns + 1000 * dice.randint(50, 250)
+        assert frame.cob_id == 0x581
+
+
+def test_a_reset_takes_back_what_was_not_sent_yet() -> None:
+    drive = booted()
+    drive.receive(Frame(0x601, bytes.fromhex("4000100000000000")), 6 * MS)
+    drive.reset(7 * MS)
+    assert drive.take() == []
+    drive.tick(12 * MS)
+    assert drive.take() == [(12 * MS, Frame(0x701, b"\0"))]
+
+
+def test_a_drive_takes_over_where_its_link_is_and_what_its_spring_carries() -> None:
+    drive = booted()
+    values = drive.axis._values
+    drive.sense(0.5, 2.5)
+    # 65536 counts a turn from -55 on; 2.5 of 10 N m in permille.
+    link = round(-55 + 0.5 * 65536 / 6.283185307179586)
+    assert (values[0x2064, 0], values[0x60E4, 1], values[0x6077, 0]) == (link, link, 250)
+
+
+def test_a_consumer_that_is_told_anew_waits_for_its_producer_once_more() -> None:
+    for told_anew in (True, False):
+        drive = booted()
+        watched = (126 << 16 | 30).to_bytes(4, "little")
+        drive._store.write(0x1016, 1, watched)
+        drive.receive(Frame(0x000, b"\x01\x01"), 6 * MS)
+        drive.receive(Frame(0x77E, b"\x05"), 7 * MS)
+        if told_anew:
+            drive._store.write(0x1016, 1, watched)
+        drive.tick(60 * MS)
+        # 8130h: life guard or heartbeat error (CiA 301).
+        lost = [frame for _, frame in drive.take() if frame.cob_id == 0x081]
+        assert [frame.data[:2] for frame in lost] == ([] if told_anew else [b"\x30\x81"])
