@@ -1,16 +1,23 @@
 """An emulated drive of which nothing is said, and what it shows of its motor in each period."""
 
 import random
+from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
 from drives_rig import MS, config, node
 
+from legbench.drives.emulated.actual_values import ActualValues
 from legbench.drives.emulated.behaviour import Behaviour, MissingSetpoint
 from legbench.drives.emulated.build import emulate
 from legbench.drives.emulated.drive import EmulatedDrive
+from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.frame import Frame
+from legbench.drives.protocol.objects import Key
+from legbench.drives.protocol.pdo import Mapped
 from legbench.drives.protocol.sdo import Abort
+from legbench.drives.setup.units import AxisUnits
 
 ASKED = {
     "reply_delay_us": (50, 250),
@@ -90,6 +97,41 @@ def test_a_mode_that_is_set_already_is_taken_while_the_drive_is_halted() -> None
             assert axis.check((0x6060, 0), 8) is None
             assert axis.check((0x6060, 0), 6) is other
             assert axis.check((0x6060, 0), 99) is Abort.INVALID_VALUE
+
+
+def test_each_object_shows_the_link_in_its_own_bits_and_the_torque_in_its_own_scale() -> None:
+    torque = Mapped(0x2065, 0, DataType.INTEGER16)
+    own = AxisUnits(counts_per_rev=4096, bits=16, modulus_counts=4096)
+    one = replace(node(0), link=own)
+    assert one.link_object.key == (0x2064, 0)
+    values: dict[Key, int] = {}
+    how = SimpleNamespace(
+        link=own,
+        link_units=own,
+        link_object=one.link_object,
+        motor=one.motor,
+        motor_object=one.motor_object,
+        torque_object=torque,
+        torque_scale=0.01,
+    )
+    links = ((0x60E4, 1), (0x2064, 0))
+    shown = ActualValues(cast(Any, how), 10.0, values, links)
+    same = SimpleNamespace(show=lambda counts: counts)
+    sensors = cast(Any, SimpleNamespace(motor=same, link=same))
+    motion = cast(Any, SimpleNamespace(sign=1, actual=500.0, demand=700.0, beside=100.0))
+    for counts, long, short in ((5000, 5000, 904), (-1, -1, 4095), (1 << 31, -1 << 31, 0)):
+        shown.update(motion, sensors, counts, 2.5)
+        assert (values[0x60E4, 1], values[0x2064, 0]) == (long, short)
+    # What stands beside the motor is shown with it: the link's encoder leads the loop.
+    assert (values[0x6064, 0], values[0x6062, 0], values[0x60F4, 0]) == (600, 700, 100)
+    assert (values[0x6077, 0], values[0x2065, 0]) == (250, 250)
+    shown.update(motion, sensors, 0, 400.0)
+    assert (values[0x6077, 0], values[0x2065, 0]) == (32767, 32767)
+    # The usual drive shows the same link in 16 bits besides, which repeat.
+    how.link_object = Mapped(0x60E4, 1, DataType.INTEGER32)
+    how.link_units = AxisUnits(counts_per_rev=4096)
+    ActualValues(cast(Any, how), 10.0, values, links).update(motion, sensors, 40_000, 0.0)
+    assert (values[0x60E4, 1], values[0x2064, 0]) == (40_000, 40_000 - 65_536)
 
 
 # --- the drive by itself ---------------------------------------------------------------------
