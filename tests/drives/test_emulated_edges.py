@@ -10,13 +10,20 @@ from test_sheet_proposals import drive
 
 from legbench.drives.emulated import bus_server
 from legbench.drives.emulated.build import emulate_channels
+from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.emulated.bus_server import BusServer
 from legbench.drives.emulated.channels_bus import ChannelsBus
 from legbench.drives.emulated.dictionary import dictionary_of
+from legbench.drives.emulated.emergencies import EmergencyOutlet
+from legbench.drives.emulated.faults import FrameFault, FrameFaultKind
+from legbench.drives.emulated.homing_methods import METHODS, Move, Until
+from legbench.drives.emulated.injector import Injector
+from legbench.drives.emulated.lss import LssSlave, address_of
 from legbench.drives.emulated.network import Network
 from legbench.drives.emulated.station import Heard
 from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.frame import Frame
+from legbench.drives.protocol.lss import LssMode
 from legbench.drives.protocol.sdo import Abort
 from legbench.drives.setup.config import BusConfig, Parameter
 from legbench.drives.transport.split_bus import SplitBus
@@ -141,3 +148,87 @@ def test_the_top_speed_of_a_data_sheet_stops_no_motor_unless_the_bus_file_gives_
         shown = dictionary_of(replace(node(0), parameters=parameters), drive())
         (entry,) = [entry for entry in shown.entries if entry.key == key]
         assert entry.kind is kind
+
+
+# --- services --------------------------------------------------------------------------------
+
+MINE = (0x1234, 7, 0x10002, 101)
+"""Vendor, product, revision and serial number of a drive."""
+
+
+def request(specifier: int, word: int, rest: bytes = bytes(3)) -> bytes:
+    return bytes([specifier]) + word.to_bytes(4, "little") + rest
+
+
+def test_an_address_is_the_four_words_of_an_identity() -> None:
+    values = {(0x1018, sub): word for sub, word in enumerate((*MINE, 999), start=1)}
+    assert address_of(values) == MINE
+    assert address_of({(0x1018, 3): 5}) == (0, 0, 5, 0)
+
+
+def test_a_drive_is_selected_by_four_words_in_their_order_however_often_it_is_tried() -> None:
+    # CiA 305: 40h to 43h, answered by 44h.
+    slave = LssSlave(MINE, 5)
+    others = ((1, *MINE[1:]), (*MINE[:3], 1), (MINE[0], 1, *MINE[2:]))
+    for words in (*others, MINE):
+        answers = [slave.feed(request(0x40 + place, word)) for place, word in enumerate(words)]
+        assert [answer and answer[0] for answer in answers] == [
+            *(None, None, None),
+            0x44 if words == MINE else None,
+        ]
+    assert slave.mode is LssMode.CONFIGURATION
+
+
+@pytest.mark.parametrize(("node_id", "answers"), [(0xFF, True), (5, False)])
+def test_a_drive_with_a_node_id_takes_no_part_in_a_scan(*, node_id: int, answers: bool) -> None:
+    # CiA 305, fast scan: 51h with bit 80h asks who has no node id, and 4Fh answers.
+    reset = request(0x51, 0, bytes((0x80, 0, 0)))
+    slave = LssSlave(MINE, node_id)
+    assert (slave.feed(reset) is not None) is answers
+    # One that has got its node id and has not left initialisation yet is silent, too.
+    slave.feed(request(0x04, 0x01))
+    slave.feed(request(0x11, 7))
+    slave.feed(request(0x04, 0x00))
+    assert slave.feed(reset) is None
+
+
+def test_every_fault_of_frames_may_destroy_one_and_every_message_that_was_held_is_sent() -> None:
+    faults = [
+        FrameFault(kind=kind, cob_id=cob_id)
+        for kind, cob_id in (
+            (FrameFaultKind.BAD_BITS, 0x181),
+            (FrameFaultKind.DROP, 0x182),
+            (FrameFaultKind.BAD_BITS, 0x183),
+        )
+    ]
+    injector = Injector(faults)
+    broken = [injector.breaks(Frame(0x180 + number), 0) for number in range(5)]
+    assert broken == [False, True, False, True, False]
+    outlet = EmergencyOutlet({(0x1015, 0): 10})
+    outlet.mute()
+    for number in (1, 2):
+        outlet.put(Frame(0x80 + number), 500)
+    assert outlet.take() == []
+    outlet.unmute(1000)
+    # 1015h is the inhibit time in units of 0.1 ms (CiA 301).
+    assert outlet.take() == [(1000, Frame(0x81)), (1_001_000, Frame(0x82))]
+
+
+def test_a_search_goes_one_way_or_the_other_and_turns_round_where_it_is_said() -> None:
+    moves = [move for method in METHODS.values() for move in method]
+    assert {move.direction for move in moves} == {-1, 1}
+    assert not Move(direction=1, until=Until.HOME).turns
+    # CiA 402-2: methods 7 to 14 and 23 to 30 begin towards a limit switch and turn round there.
+    turning = {number for number, method in METHODS.items() if any(move.turns for move in method)}
+    assert turning == {*range(7, 15), *range(23, 31)}
+
+
+def test_an_emulated_bus_is_let_go_when_it_is_shut_and_hears_itself_only_if_asked() -> None:
+    network = Network(())
+    for asked in ({}, {"receive_own_messages": False}, {"receive_own_messages": True}):
+        with LockstepBus("wire", network=network, **cast(Any, asked)) as bus:
+            assert network.alone(bus.station)
+            bus.send(can.Message(arbitration_id=0x101, is_extended_id=False))
+            heard = bus.recv(1e-3)
+            assert (heard is not None) is asked.get("receive_own_messages", False)
+        assert network._nodes == []
