@@ -1,0 +1,126 @@
+"""What an emulated drive makes of SYNC and commands by their times, on parts that take notes."""
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+from legbench.drives.emulated.reception import Reception
+from legbench.drives.protocol.cia402 import DriveState
+
+US, MS = 1_000, 1_000_000
+
+
+class Noted:
+    """A reception whose process data, axis and connection note what they are told."""
+
+    def __init__(self, *timers_ms: int, **objects: int) -> None:
+        values = {(0x1006, 0): 1000, (0x1007, 0): 0, (0x1019, 0): 0}
+        values |= {(int(name[1:], 16), 0): value for name, value in objects.items()}
+        self.told: list[tuple[Any, ...]] = []
+        layout = SimpleNamespace(size=2, unpack=lambda data: ("values", data))
+        self.rpdos = {
+            0x201 + place: SimpleNamespace(
+                layout=layout, kind=1, seen_ns=None, timer_ns=MS * timer, waiting=None
+            )
+            for place, timer in enumerate(timers_ms)
+        }
+        self.power = SimpleNamespace(state=DriveState.OPERATION_ENABLED)
+        axis = SimpleNamespace(
+            power=self.power,
+            sync=lambda fresh, now_ns: self.told.append(("sync", fresh, now_ns)),
+            fault=lambda code: self.told.append(("fault", code)),
+        )
+        pdos = SimpleNamespace(
+            rpdos=self.rpdos,
+            at_sync=lambda: ["sampled"],
+            latch=lambda: self.told.append(("latched",)),
+            apply=lambda pdo, values: self.told.append(("applied", values)),
+        )
+        connection = SimpleNamespace(
+            report=lambda code, now_ns: self.told.append(("report", code)),
+            over=lambda code, now_ns: None,
+        )
+        parts = cast(Any, (values, axis, pdos, connection))
+        self.made = Reception(*parts, 5)
+
+
+def test_a_target_is_fresh_for_one_sync_and_never_before_one_came() -> None:
+    it = Noted()
+    it.made.sync(1 * MS)
+    it.made.fresh = True
+    it.made.sync(2 * MS)
+    it.made.sync(3 * MS)
+    it.made.fresh = True
+    it.made.forget()
+    it.made.sync(4 * MS)
+    syncs = [entry for entry in it.told if entry[0] == "sync"]
+    assert syncs == [
+        ("sync", fresh, n * MS) for n, fresh in ((1, False), (2, True), (3, False), (4, False))
+    ]
+
+
+@pytest.mark.parametrize(("late_us", "waits"), [(399, True), (400, True), (401, False)])
+def test_a_command_is_latched_within_the_window_after_sync(late_us: int, waits: bool) -> None:
+    # 1007h: length of the synchronous window, in microseconds (CiA 301).
+    it = Noted(0, x1007=400)
+    it.made.sync(10 * MS)
+    it.made.rpdo(0x201, b"\1\2", 10 * MS + late_us * US)
+    assert (it.rpdos[0x201].waiting is not None) is waits
+    assert it.rpdos[0x201].seen_ns == 10 * MS + late_us * US
+
+
+def test_a_command_of_another_type_is_applied_at_once_and_one_that_is_too_short_is_not() -> None:
+    it = Noted(0)
+    for kind, applied in ((0, 0), (240, 0), (241, 1), (255, 1)):
+        it.rpdos[0x201].kind = kind
+        it.told.clear()
+        it.made.rpdo(0x201, b"\1\2\3", 0)
+        # 8220h: longer than what is mapped; the rest is not looked at.
+        assert it.told[0] == ("report", 0x8220)
+        assert it.told[1:] == [("applied", ("values", b"\1\2"))] * applied
+    it.told.clear()
+    it.rpdos[0x201].seen_ns = None
+    it.made.rpdo(0x201, b"\1", 5)
+    assert it.told == [("report", 0x8210)]
+    assert it.rpdos[0x201].seen_ns is None
+
+
+def test_each_command_that_is_late_counts_once() -> None:
+    it = Noted(10, 20, 0, 20)
+    for cob_id in it.rpdos:
+        if cob_id != 0x204:
+            it.made.rpdo(cob_id, b"\1\2", MS)
+    counts = [it.made.late_rpdos(now * MS) for now in (11, 12, 13, 21, 22, 23)]
+    # After 10 and after 20 ms; one has no deadline, and one was never sent.
+    assert counts == [0, 1, 0, 0, 1, 0]
+    for cob_id in (0x201, 0x202):
+        it.made.rpdo(cob_id, b"\1\2", 30 * MS)
+    assert it.made.late_rpdos(60 * MS) == 2
+
+
+@pytest.mark.parametrize("cycle_us", [1000, 2000])
+def test_a_motor_with_power_is_stopped_after_five_cycles_without_sync(cycle_us: int) -> None:
+    it = Noted(x1006=cycle_us)
+    it.made.watch_sync(100 * MS)
+    it.made.sync(100 * MS)
+    limit = 100 * MS + 5 * cycle_us * US
+    it.told.clear()
+    for now_ns in (limit - 1, limit):
+        it.made.watch_sync(now_ns)
+        assert it.told == []
+    for now_ns in (limit + 1, limit + 2):
+        it.made.watch_sync(now_ns)
+        # A code of the maker (CiA 402 leaves him FF00h to FFFFh).
+        assert it.told == [("fault", 0xFF11)]
+    it.power.state = DriveState.SWITCHED_ON
+    it.made.sync(200 * MS)
+    it.told.clear()
+    it.made.watch_sync(300 * MS)
+    assert it.told == []
+    # Without a period nothing is expected.
+    off = Noted(x1006=0)
+    off.made.sync(1 * MS)
+    off.told.clear()
+    off.made.watch_sync(10_000 * MS)
+    assert off.told == []
