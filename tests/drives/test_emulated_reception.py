@@ -4,7 +4,10 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
+from drives_rig import node
 
+from legbench.drives.emulated.drive import EmulatedDrive
+from legbench.drives.emulated.process_data import ProcessData
 from legbench.drives.emulated.reception import Reception
 from legbench.drives.protocol.cia402 import DriveState
 
@@ -124,3 +127,60 @@ def test_a_motor_with_power_is_stopped_after_five_cycles_without_sync(cycle_us: 
     off.told.clear()
     off.made.watch_sync(10_000 * MS)
     assert off.told == []
+
+
+# --- process data objects --------------------------------------------------------------------
+
+
+def pdo(**how: Any) -> Any:
+    """A PDO of nothing that was sent and received before."""
+    layout = SimpleNamespace(pack=lambda values: bytes(values), entries=())
+    usual = {"cob_id": 0x181, "kind": 1, "syncs": 0, "keys": (), "last": b"", "layout": layout}
+    return SimpleNamespace(**(usual | {"waiting": (1,), "seen_ns": 5} | how))
+
+
+def test_objects_of_process_data_are_1400h_to_1bffh() -> None:
+    owned = [index for index in range(0x1000, 0x2000) if ProcessData.owns((index, 1))]
+    assert owned == list(range(0x1400, 0x1C00))
+
+
+def test_all_that_waits_is_forgotten_and_nothing_of_before_is_compared_with() -> None:
+    made = EmulatedDrive(node(0))._pdos
+    made.rpdos = {0x201: pdo(), 0x301: pdo()}
+    made.tpdos = [pdo(), pdo()]
+    made.forget()
+    commands, answers = made.rpdos.values(), made.tpdos
+    assert [(one.waiting, one.seen_ns) for one in commands] == [(None, None)] * 2
+    assert [(one.last, one.seen_ns) for one in answers] == [(None, None)] * 2
+
+
+def test_synchronous_answers_come_with_every_so_many_syncs_up_to_240() -> None:
+    made = EmulatedDrive(node(0))._pdos
+    made.tpdos = [pdo(cob_id=0x180 + kind, kind=kind) for kind in (1, 2, 240, 241, 254, 255)]
+    sent = [[frame.cob_id - 0x180 for frame in made.at_sync()] for _ in range(240)]
+    assert sent[0] == [1]
+    assert sent[1] == [1, 2]
+    assert sent[238] == [1]
+    # CiA 301: 241 to 253 are reserved, 254 and 255 are sent by events.
+    assert sent[239] == [1, 2, 240]
+
+
+def test_an_answer_that_is_mapped_anew_as_before_keeps_its_time_and_repeats_if_it_shall() -> None:
+    drive = EmulatedDrive(node(0))
+    made, values = drive._pdos, drive.axis._values
+    # TPDO1 of the usual drive, switched on with the statusword alone in it.
+    values[0x1A00, 0], values[0x1A00, 1], values[0x1800, 1] = 1, 0x60410010, 0x181
+    made.rebuild()
+    (first,) = [one for one in made.tpdos if one.cob_id == 0x181]
+    first.seen_ns = 77
+    values[0x6041, 0] = 0x1234
+    assert made.sample(first) == b"\x34\x12"
+    made.repeats = True
+    values[0x6041, 0] = 0x5678
+    assert made.sample(first) == b"\x34\x12"
+    made.repeats = False
+    assert made.sample(first) == b"\x78\x56"
+    made.rebuild()
+    (again,) = [one for one in made.tpdos if one.cob_id == 0x181]
+    assert again is not first
+    assert again.seen_ns == 77
