@@ -44,8 +44,8 @@ class Noted:
             report=lambda code, now_ns: self.told.append(("report", code)),
             over=lambda code, now_ns: None,
         )
-        parts = cast(Any, (values, axis, pdos, connection))
-        self.made = Reception(*parts, 5)
+        stubs: Any = (axis, pdos, connection)
+        self.made = Reception(values, *stubs, sync_loss_periods=5)
 
 
 def test_a_target_is_fresh_for_one_sync_and_never_before_one_came() -> None:
