@@ -1,7 +1,7 @@
 """What an emulated drive makes of SYNC and commands by their times, on parts that take notes."""
 
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import pytest
 from drives_rig import node
