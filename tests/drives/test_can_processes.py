@@ -184,10 +184,12 @@ def test_interrupting_the_master_stops_both_drives_and_keeps_the_run(
 def test_drives_stop_by_themselves_when_the_master_is_gone(
     name: str, led: tuple[Served, Popen[str], Path]
 ) -> None:
-    """The drives that the test above has left without power, led by another master."""
-    drives, _, folder = led
-    with leading(folder, drives, name) as run:
-        os.kill(run.pid, getattr(signal, name))
+    """The drives of the tests above, led by another master."""
+    drives, run, folder = led
+    if run.poll() is None:
+        interrupted(drives, run)
+    with leading(folder, drives, name) as other:
+        os.kill(other.pid, getattr(signal, name))
         drives.await_state("switch on disabled")
     assert [state for _, state in drives.seen[-4:]].count("quick stop active") >= 1
     assert recover(run_folder(folder, name)).rows_kept > 0
