@@ -12,6 +12,7 @@ from legbench.drives.emulated.actual_values import ActualValues
 from legbench.drives.emulated.behaviour import Behaviour, MissingSetpoint
 from legbench.drives.emulated.build import emulate
 from legbench.drives.emulated.drive import EmulatedDrive
+from legbench.drives.emulated.sensors import Encoder, SensorFault
 from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.frame import Frame
 from legbench.drives.protocol.objects import Key
@@ -189,3 +190,21 @@ def test_a_consumer_that_is_told_anew_waits_for_its_producer_once_more() -> None
         # 8130h: life guard or heartbeat error (CiA 301).
         lost = [frame for _, frame in drive.take() if frame.cob_id == 0x081]
         assert [frame.data[:2] for frame in lost] == ([] if told_anew else [b"\x30\x81"])
+
+
+def test_an_encoder_that_fails_by_nothing_shows_what_is_and_one_that_froze_at_once_zero() -> None:
+    for ailment in (SensorFault.STEP, SensorFault.DRIFT):
+        encoder = Encoder(1000.0)
+        encoder.fail(ailment)
+        encoder.tick(1_000_000_000)
+        assert encoder.show(5) == 5
+        encoder.fail(ailment, 0.25)
+        encoder.tick(1_000_000_000)
+        assert encoder.show(5) == 255
+    encoder = Encoder(1000.0)
+    encoder.fail(SensorFault.FROZEN)
+    assert encoder.show(5) == 0
+    encoder.fail(None)
+    assert encoder.show(5) == 5
+    encoder.fail(SensorFault.FROZEN)
+    assert encoder.show(9) == 5
