@@ -120,6 +120,24 @@ def test_every_object_has_the_lines_of_the_standard_and_what_is_left_out_is_coun
     ]
 
 
+@pytest.mark.parametrize(
+    ("kind", "kept"),
+    # CiA 301: visible, octet and Unicode strings and domains have words, a time of day has none.
+    [(0x09, True), (0x0A, True), (0x0B, True), (0x0F, True), (0x0C, False), (0x10, False)],
+)
+def test_words_are_a_default_of_texts_alone(kind: int, kept: bool) -> None:
+    text = clean_text(split(f"[2000]\nDataType={kind}\nDefaultValue=words ; and a comment\n"))
+    assert ("DefaultValue=words\n" in text) is kept
+    assert ("DefaultValue" in text) is kept
+
+
+def test_a_compact_array_has_254_sub_objects_at_most() -> None:
+    for count, last in ((3, 3), (254, 254), (255, 254), (1000, 254)):
+        text = clean_text(split(f"[2000]\nDataType=5\nCompactSubObj={count}\n"))
+        # The count itself is one more.
+        assert text.count("DataType") == last + 1
+
+
 def test_sub_objects_count_as_objects_up_to_a_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(clean, "MOST_OBJECTS", 6)
     array = "[2000]\nParameterName=x\nDataType=5\nCompactSubObj=3\n"
