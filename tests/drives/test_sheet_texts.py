@@ -206,6 +206,27 @@ def test_defaults_are_kept_in_the_type_of_their_object() -> None:
     assert sheet.objects[0x2007, 0].kind is DataType.UNSIGNED64
 
 
+@pytest.mark.parametrize(
+    ("kind", "length"),
+    # CiA 301, table of data types: times of day, odd whole numbers, double precision.
+    [
+        *((0x0C, 6), (0x0D, 6), (0x10, 3), (0x11, 8), (0x12, 5), (0x13, 6), (0x14, 7)),
+        *((0x16, 3), (0x18, 5), (0x19, 6), (0x1A, 7)),
+    ],
+)
+def test_a_number_of_another_length_is_as_many_bytes(kind: int, length: int) -> None:
+    sheet = read(("2000", f"0x{kind:02X}", None))
+    assert sheet.objects[0x2000, 0].kind is DataType.OCTET_STRING
+    assert sheet.objects[0x2000, 0].default == bytes(length)
+
+
+def test_a_configured_device_has_a_node_id_from_1_to_127() -> None:
+    one = ("2000", "5", "0")
+    for name in ("DeviceComissioning", "DeviceCommissioning"):
+        for text, node_id in (("0", None), ("1", 1), ("127", 127), ("128", None)):
+            assert read(one, more=f"[{name}]\nNodeID={text}\n").node_id == node_id
+
+
 def test_limits_are_those_between_which_there_is_something() -> None:
     def limits(low: str, high: str) -> object:
         more = f"[2000]\nParameterName=x\nDataType=3\nLowLimit={low}\nHighLimit={high}\n"
