@@ -51,8 +51,12 @@ def pytest_collection_finish() -> None:
 
 
 @pytest.hookimpl(optionalhook=True)
-def pytest_xdist_make_scheduler(config: pytest.Config, log: "Producer") -> "FolderScheduling":
-    """Hand out a folder at a time to the processes of a run that has several."""
+def pytest_xdist_make_scheduler(
+    config: pytest.Config, log: "Producer"
+) -> "FolderScheduling | None":
+    """Hand out a folder, not a file, at a time; another `--dist` stands as it was asked for."""
+    if config.getoption("dist") != "loadfile":
+        return None
     from folder_scheduling import FolderScheduling  # noqa: PLC0415 xdist may be switched off
 
     return FolderScheduling(config, log)

@@ -1,5 +1,6 @@
 """One cycle by itself: the grid, and answers that are late, missing, garbled or one too many."""
 
+import can
 import pytest
 from cycle_wire import BOTH, DATA, US, Wire, cycle, missed, stale
 from drives_rig import MS, config
@@ -49,6 +50,28 @@ def test_a_late_tick_is_made_from_half_a_period_on_at_the_next_place_of_the_grid
     assert told == Tick(at, at - (2 + skipped) * MS, skipped, 0, True)
     # The grid does not move.
     assert it.tick() == Tick((3 + skipped) * MS, 0, 0, 0, True)
+
+
+@pytest.mark.parametrize("after_answers", [0, 1])
+def test_after_an_interrupted_cycle_the_next_sync_leaves_a_period_later(after_answers: int) -> None:
+    wire = Wire()
+    it, receive, left = cycle(wire), wire.receive, [after_answers]
+
+    def interrupted(until_ns: int) -> can.Message | None:
+        if wire.syncs and left:
+            if left[0] == 0:
+                left.clear()
+                raise KeyboardInterrupt
+            left[0] -= 1
+        return receive(until_ns)
+
+    wire.receive = interrupted
+    with pytest.raises(KeyboardInterrupt):
+        it.tick()
+    # What answers the interrupted SYNC passes for nothing; the next one has answers of its own.
+    assert it.tick() == Tick(2 * MS, 0, 0, 0, True)
+    assert wire.when(0x080) == [1 * MS, 2 * MS]
+    assert it.late_frames == 2 - after_answers
 
 
 def test_answers_count_until_the_deadline_and_no_longer() -> None:

@@ -23,7 +23,11 @@ def first_doubt(watch: EncoderWatch, silent: int | None = None) -> int | None:
     """Number of cycles until the leg is doubted, while drive 2 is silent in some."""
     for cycle in range(1, 1300):
         fresh = (True, silent is None or cycle % silent != 0)
-        if watch.see(MOTORS, POSTURE, MOTORS, fresh, 1, PERIOD) is not None:
+        assert watch.see(MOTORS, POSTURE, MOTORS, fresh, 1, PERIOD) is None
+        found = watch.see_momentum()
+        # A cycle is held against the momentum once.
+        assert watch.see_momentum() is None
+        if found is not None:
             return cycle
     return None
 
@@ -39,6 +43,18 @@ def test_a_start_forgets_what_was_learned_of_the_leg() -> None:
     assert found is not None
     watch.start(MOTORS)
     assert first_doubt(watch) == found
+
+
+def test_nothing_of_the_cycle_before_is_left_after_a_start_or_a_row_without_an_answer() -> None:
+    for after in ("start", "silent"):
+        watch = watching()
+        assert first_doubt(watch) is not None
+        watch.see(MOTORS, POSTURE, MOTORS, (True, True), 1, PERIOD)
+        if after == "start":
+            watch.start(MOTORS)
+        else:
+            watch.see(MOTORS, POSTURE, MOTORS, (True, False), 1, PERIOD)
+        assert watch.see_momentum() is None
 
 
 # --- motors before links ---------------------------------------------------------------------

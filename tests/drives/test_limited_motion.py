@@ -29,6 +29,7 @@ class Told:
 
     checks: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
     encoders: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
+    momenta: int = 0
     began: list[Sequence[float]] = field(default_factory=list[Sequence[float]])
     applied: tuple[float, ...] = ()
 
@@ -37,6 +38,9 @@ class Told:
 
     def check_encoders(self, **told: Any) -> None:
         self.encoders.append(told)
+
+    def check_momentum(self) -> None:
+        self.momenta += 1
 
     def start_at(self, motor_pos: Sequence[float]) -> None:
         self.began.append(motor_pos)
@@ -90,30 +94,24 @@ class Leg:
         return self.guard.checks[-1]
 
     def judge(self, at_ms: int, skipped: int = 0) -> dict[str, Any]:
-        """What the guard is told of the encoders of a cycle, later."""
-        self.check(at_ms, skipped)
+        """What the guard is told of the encoders of a cycle."""
         before = len(self.guard.encoders)
-        self.motion.check_encoders()
+        self.check(at_ms, skipped)
         (told,) = self.guard.encoders[before:]
         return told
 
 
-def test_encoders_are_judged_once_a_cycle_and_only_while_the_leg_is_commanded() -> None:
+def test_encoders_are_judged_only_while_the_leg_is_commanded_and_its_momentum_when_asked() -> None:
     leg = Leg()
     leg.show((0.1, -0.2), (0.1, -0.2))
-    leg.motion.check_encoders()
     # As long as nothing is commanded a motor may be moved by hand.
     leg.check(1)
-    leg.motion.check_encoders()
     assert leg.guard.encoders == []
     leg.motion.begin()
-    leg.motion.check_encoders()
-    assert leg.guard.encoders == []
     leg.check(2)
-    assert leg.guard.encoders == []
-    for _ in range(2):
-        leg.motion.check_encoders()
-        assert len(leg.guard.encoders) == 1
+    assert (len(leg.guard.encoders), leg.guard.momenta) == (1, 0)
+    leg.motion.check_momentum()
+    assert (len(leg.guard.encoders), leg.guard.momenta) == (1, 1)
 
 
 def test_a_command_is_expected_to_have_acted_two_looks_later() -> None:

@@ -294,8 +294,13 @@ def guarded(sway: float, leg: LegMomentum | None) -> str | None:
     motors = (POSTURE[0] + 0.2, POSTURE[1] + 0.2)
     guard.start_at(motors)
     seen = {"motor_pos": motors, "joint_pos": POSTURE, "expected_pos": motors}
-    doubts = (fault(guard.check_encoders, **seen) for _ in range(1300))
-    return next(filter(None, doubts), None)
+    for _ in range(1300):
+        assert fault(guard.check_encoders, **seen) is None
+        doubt = fault(guard.check_momentum)
+        assert fault(guard.check_momentum) is None
+        if doubt is not None:
+            return doubt
+    return None
 
 
 def test_momentum_is_asked_where_a_sway_may_hide_a_drift_alone() -> None:

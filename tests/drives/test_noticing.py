@@ -135,7 +135,7 @@ class Ticking:
             sync=lambda: note("sync"),
             answers=answering("answers", 2),
         )
-        status = SimpleNamespace(listening=self.listening)
+        status = LinkStatus(listening=self.listening)
         return cast(Any, SimpleNamespace(cycle=cycle, supervisor=supervisor, status=status))
 
 
@@ -170,6 +170,24 @@ def test_what_the_drives_answer_is_taken_though_the_work_meanwhile_raises() -> N
     assert caught.value is found
     assert it.asked == ["sync", "answers"]
     assert (ticks.last, ticks.skipped_total) == (Tick(MS, 0, 2, 0, True), 2)
+
+
+def test_a_fault_found_meanwhile_is_the_first_one_though_the_answers_are_interrupted() -> None:
+    found, before = PlantFault("joint encoder", "it contradicts"), PlantFault("sway", "it sways")
+
+    def work() -> None:
+        raise found
+
+    def interrupted() -> Tick:
+        raise KeyboardInterrupt
+
+    for first, kept in ((None, found), (before, before)):
+        parts = Ticking(False).parts()
+        cast(Any, parts.cycle).answers = interrupted
+        parts.status.fault = first
+        with pytest.raises(KeyboardInterrupt):
+            Ticks(parts, work).watched()
+        assert parts.status.fault is kept
 
 
 # --- enabling --------------------------------------------------------------------------------

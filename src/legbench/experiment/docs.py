@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from functools import lru_cache
 from itertools import pairwise
+from types import MappingProxyType
 from typing import Any
 
 _UNIT = re.compile(r"\[([^\[\]]+)\]\.?\s*$")
@@ -22,7 +23,7 @@ def field_docs(kind: type[Any]) -> Mapping[str, str]:
     try:
         tree = ast.parse(textwrap.dedent(inspect.getsource(kind)))
     except (OSError, TypeError, SyntaxError):
-        return {}
+        return MappingProxyType({})
     (body,) = [node.body for node in tree.body if isinstance(node, ast.ClassDef)]
     found: dict[str, str] = {}
     for entry, after in pairwise(body):
@@ -30,7 +31,7 @@ def field_docs(kind: type[Any]) -> Mapping[str, str]:
             text = after.value if isinstance(after, ast.Expr) else None
             if isinstance(text, ast.Constant) and isinstance(text.value, str):
                 found[entry.target.id] = " ".join(text.value.split())
-    return found
+    return MappingProxyType(found)
 
 
 def unit_comments(value: Any, tables: Mapping[str, Any], at: str = "") -> dict[str, str]:

@@ -37,6 +37,8 @@ class EncoderWatch:
         self._momentum = None
         self._asked = False
         """Whether the momentum was asked in the cycle before."""
+        self._unweighed: MomentumReading | None = None
+        """Reading of the cycle seen last that is not held against the momentum yet."""
         if momentum is not None and limits.link_error is not None:
             self._momentum = MomentumWatch(momentum, limits.link_error, period)
 
@@ -45,6 +47,7 @@ class EncoderWatch:
         for watch, value in zip(self._motors, motor_pos, strict=False):
             watch.start_at(value)
         self._links.start()
+        self._unweighed = None
         if self._momentum is not None:
             self._momentum.start()
 
@@ -57,7 +60,7 @@ class EncoderWatch:
         elapsed: int,
         interval: float,
     ) -> Doubt | None:
-        """Look at one cycle; returns what a healthy leg would not show.
+        """Look at one cycle, but for its momentum; returns what a healthy leg would not show.
 
         Args:
             motor_pos: positions that the drives' loops lead [rad].
@@ -75,19 +78,30 @@ class EncoderWatch:
         if not self._two_encoders:
             return found
         doubt = self._links.see(motor_pos, joint_pos, expected_pos, fresh, elapsed)
+        self._unweighed = None
         momentum = self._momentum
         if momentum is not None and doubt is None:
             # It is asked where a sway may hide an encoder that is wrong.
             if self._links.hides_drift and all(fresh):
                 self._asked = True
                 joint_1, joint_2 = joint_pos
-                reading = MomentumReading(interval, (motor_1, motor_2), (joint_1, joint_2))
-                doubt = momentum.see(reading, stands=self._links.stands)
+                self._unweighed = MomentumReading(interval, (motor_1, motor_2), (joint_1, joint_2))
             elif self._asked:
                 self._asked = False
                 momentum.restart()
-        if found is None and doubt is not None:
-            # A motor that is not where it should be makes the springs sway, too: it is the cause.
-            suspects = [watch.suspicion for watch in self._motors if watch.suspicion is not None]
-            found = suspects[0] if suspects else doubt
-        return found
+        return self._first(doubt) if found is None else found
+
+    def see_momentum(self) -> Doubt | None:
+        """Hold the cycle seen last against the leg's momentum, once; where a sway asks for it."""
+        reading, momentum = self._unweighed, self._momentum
+        if reading is None or momentum is None:
+            return None
+        self._unweighed = None
+        return self._first(momentum.see(reading, stands=self._links.stands))
+
+    def _first(self, doubt: Doubt | None) -> Doubt | None:
+        """Name a suspected motor before a doubt about the links: it makes the springs sway, too."""
+        if doubt is None:
+            return None
+        suspects = [watch.suspicion for watch in self._motors if watch.suspicion is not None]
+        return suspects[0] if suspects else doubt

@@ -229,6 +229,8 @@ class Guard:
     ) -> None:
         """Check whether motors and encoders work, by all that a healthy leg can show in a cycle.
 
+        What takes longer than that is left to `check_momentum`.
+
         Args:
             motor_pos: positions that the drives' loops lead [rad].
             joint_pos: links [rad].
@@ -242,6 +244,16 @@ class Guard:
         """
         after = elapsed * self._period if interval is None else interval
         doubt = self._encoders.see(motor_pos, joint_pos, expected_pos, fresh, elapsed, after)
+        if doubt is not None:
+            raise PlantFault(doubt.cause, doubt.message)
+
+    def check_momentum(self) -> None:
+        """Check the encoders seen last against the leg's momentum, once, where a sway asks for it.
+
+        Raises:
+            PlantFault: an encoder contradicts the springs and the motion of the links.
+        """
+        doubt = self._encoders.see_momentum()
         if doubt is not None:
             raise PlantFault(doubt.cause, doubt.message)
 

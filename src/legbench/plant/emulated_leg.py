@@ -27,8 +27,8 @@ WHOLE = int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
 class EmulatedLeg:
     """Body on the drives' shafts: the leg of `SimPlant` whose motors are where the drives put them.
 
-    It moves to the bit as in `SimPlant`, and nobody looks at it: there are no sensors, no energy
-    and no shapes but those that touch. It rests in its start posture until the drives move. It
+    It moves to the bit as in `SimPlant`, but its model has no sensors, no energy and no shapes but
+    those that touch. It rests in its start posture until the drives move. It
     knows nothing of time: one call is one period of `plant.start.PERIOD`. Imperfections of the leg
     and of its encoders are its own; how motors follow their targets is the drives'.
 

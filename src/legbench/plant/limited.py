@@ -68,6 +68,7 @@ class LimitedPlant(AbstractPlant):
             joint_pos=joint_pos,
             expected_pos=self._expected.popleft(),
         )
+        self._guard.check_momentum()
         return seen
 
     def rest(self, motor_pos: Floats, interrupted: Callable[[], bool]) -> str | None:

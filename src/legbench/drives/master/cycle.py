@@ -80,7 +80,7 @@ class Cycle:
         # SYNC is still sent up to half a period late; later it would crowd the next one.
         self._latest_ns = config.period_ns - config.period_ns // 2
         self._deadline_ns = 1000 * config.deadline_us
-        self._due_ns = self._sync_ns = 0
+        self._due_ns = self._tick_ns = self._sync_ns = 0
         self._skipped = self._silent = 0
         self._sent = False
         self._owed: set[int] = set()
@@ -110,7 +110,7 @@ class Cycle:
         return self.answers()
 
     def sync(self) -> None:
-        """Wait for the next tick of the grid and send SYNC; `answers` belongs to it."""
+        """Wait for the next tick of the grid and send SYNC; its answers are taken by `answers`."""
         timebase = self._port.timebase
         late_ns, skipped = timebase.now_ns() - self._due_ns, 0
         if late_ns >= self._latest_ns:
@@ -122,21 +122,21 @@ class Cycle:
         silent = int(bool(self._owed) and not self.stopping)
         if silent:
             self._keep_silent()
+        # Whatever is raised from here on, the next SYNC leaves a period later.
+        self._tick_ns, self._due_ns = self._due_ns, self._due_ns + self._period_ns
         self._skipped, self._silent, self._sync_ns = skipped, silent, timebase.now_ns()
         self._sent = self._outgoing.sync()
         for axis in self.axes:
             axis.begin_cycle()
 
     def answers(self) -> Tick:
-        """Gather process data after `sync`, until it is complete or the deadline; the tick."""
-        due_ns, sync_ns, silent = self._due_ns, self._sync_ns, self._silent
+        """Gather process data after `sync` until the deadline, and return the tick of both."""
+        due_ns, sync_ns, silent = self._tick_ns, self._sync_ns, self._silent
         complete = self._sent and self._gather(sync_ns + self._deadline_ns)
-        # The next SYNC leaves on the grid, however late this one was.
         asks = complete and not self.stopping
         self._requests.turn(self._port.timebase.now_ns() - due_ns if asks else None)
         if self._gaps or not complete:
             self._count()
-        self._due_ns = due_ns + self._period_ns
         return Tick(sync_ns, sync_ns - due_ns, self._skipped + silent, silent, complete)
 
     def hears_sync(self, until_ns: int) -> bool:
@@ -176,7 +176,7 @@ class Cycle:
         self._gaps = any(watch.gaps for watch in self.watches)
 
     def _between(self, message: can.Message) -> bool:
-        """Take a frame between two cycles; whether it is process data, which is late then."""
+        """Take a frame that comes between two cycles, and return whether it is late data."""
         if message.arbitration_id in self._tpdos and not message.is_error_frame:
             self.late_frames += 1
             return True

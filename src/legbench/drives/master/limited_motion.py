@@ -44,8 +44,6 @@ class LimitedMotion:
         """Command that acts by now; none before `begin` [rad]."""
         self._sent: tuple[float, ...] = ()
         """Command that acts in the next cycle [rad]."""
-        self._unjudged: tuple[Sample, tuple[float, ...]] | None = None
-        """Measurements of which the encoders are not checked yet, and the command that acted."""
         self._seen_ns = 0
 
     def begin(self) -> None:
@@ -70,37 +68,32 @@ class LimitedMotion:
         return tuple(axis.motor_pos for axis in self._cycle.axes)
 
     def check(self, sample: Sample) -> None:
-        """Check a cycle's measurements against the ranges of the leg; raises PlantFault.
-
-        What they tell of the encoders, `check_encoders` judges later, since it takes longer.
-        """
-        self._unjudged = None if self._acting is None else (sample, self._acting)
+        """Check a cycle's measurements against all limits but the momentum; raises PlantFault."""
+        interval = 1e-9 * (sample.time_ns - self._seen_ns)
+        self._seen_ns = sample.time_ns
         self._guard.check(
             joint_pos=sample.link_pos,
             spring_torque=sample.spring_torque,
             temperature=sample.temperature,
         )
+        if self._acting is not None:
+            self._guard.check_encoders(
+                motor_pos=sample.motor_pos if self._two_encoders else self.led_pos,
+                joint_pos=sample.link_pos,
+                expected_pos=self._acting,
+                fresh=sample.fresh,
+                elapsed=1 + sample.skipped,
+                interval=interval,
+            )
 
-    def check_encoders(self) -> None:
-        """Check whether motors and encoders worked in the cycle checked last; raises PlantFault.
+    def check_momentum(self) -> None:
+        """Check the measurements checked last against the leg's momentum; raises PlantFault.
 
-        Called while the drives answer the next SYNC, when this processor has nothing else to do.
-        Before the leg is commanded it does nothing.
+        Called while the drives answer the next SYNC, when this processor has nothing else to do:
+        it takes longer than all other limits together, and its evidence grows over ten cycles and
+        more, to which one adds little.
         """
-        if self._unjudged is None:
-            return
-        sample, acted = self._unjudged
-        self._unjudged = None
-        interval = 1e-9 * (sample.time_ns - self._seen_ns)
-        self._seen_ns = sample.time_ns
-        self._guard.check_encoders(
-            motor_pos=sample.motor_pos if self._two_encoders else self.led_pos,
-            joint_pos=sample.link_pos,
-            expected_pos=acted,
-            fresh=sample.fresh,
-            elapsed=1 + sample.skipped,
-            interval=interval,
-        )
+        self._guard.check_momentum()
 
     def aim(self, motor_pos: Sequence[float]) -> tuple[tuple[float, ...], list[int | None]]:
         """Set the targets of all drives; returns them [rad] and the controlwords to send.

@@ -8,7 +8,7 @@
 
 A cycle: tick of the grid, SYNC, process data of all drives until a deadline, watchdogs and limits
 (`exchange`), then the command, slewed and clamped, in RPDOs that act at the next SYNC (`command`);
-encoders are judged while drives answer that one. Whatever goes wrong, all drives are told to stop.
+momentum is judged while drives answer that one. Whatever goes wrong, all drives are told to stop.
 """
 
 import math
@@ -100,7 +100,7 @@ class Link(DriveLeader):
         self._motion = LimitedMotion(
             parts.cycle, self._guard, stiffness, two_encoders=config.two_encoders
         )
-        self._ticks = Ticks(parts, self._motion.check_encoders)
+        self._ticks = Ticks(parts, self._motion.check_momentum)
 
     # --- what has become of it ---------------------------------------------------------------
 

@@ -5,6 +5,7 @@ from typing import final
 
 from legbench.drives.master.link_parts import LinkParts
 from legbench.drives.master.tick import Tick
+from legbench.errors import PlantFault
 
 
 @final
@@ -43,6 +44,9 @@ class Ticks:
             self._cycle.sync()
             try:
                 self._meanwhile()
+            except PlantFault as fault:  # The first cause, whatever else is raised now.
+                self._status.fault = self._status.fault or fault
+                raise
             finally:  # What the drives answer must be no answer to the SYNC of a stop.
                 tick = self._keep(self._cycle.answers())
         self._supervisor.bus(tick)
