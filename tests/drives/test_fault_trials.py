@@ -177,13 +177,13 @@ def test_a_view_is_opened_where_one_is_tried_and_is_ended_and_set_going_again(
 
     monkeypatch.setattr(fault_trial, "_run", run)
     monkeypatch.setattr(fault_trial.os, "kill", lambda *how: told.append(how))
-    parts: Any = (None, None, SimpleNamespace(path=Path("run")))
+    opened, chosen, writer = cast(Any, (None, None, SimpleNamespace(path=Path("run"))))
     trial = FaultTrial(name="", viewer=viewer)
-    assert fault_trial._viewed(trial, *parts, cast(Any, start_view)) == "outcome"
+    assert fault_trial._viewed(trial, opened, chosen, writer, start_view) == "outcome"
     going = (Beside.pid, signal.SIGCONT)
     assert told == ([Path("run"), "Beside", "stopped", going] if viewer else ["NoneType"])
     told.clear()
-    fault_trial._viewed(trial, *parts, None)
+    fault_trial._viewed(trial, opened, chosen, writer, None)
     assert told == ["NoneType"]
 
 
@@ -219,8 +219,9 @@ def test_what_has_to_happen_in_mid_run_happens_from_the_strike_on(
     monkeypatch.setattr(fault_trial.os, "kill", lambda *given: told.append(given))
     opened: Any = SimpleNamespace(plant=None)
     view = cast(Any, Beside(told) if viewed else None)
-    parts: Any = (opened, SimpleNamespace(controller=None), None)
-    outcome = fault_trial._run(FaultTrial(name="", **how), *parts, view)
+    chosen: Any = SimpleNamespace(controller=None)
+    trial = replace(FaultTrial(name=""), **cast(Any, how))
+    outcome = fault_trial._run(trial, opened, chosen, cast(Any, None), view)
     assert outcome.status == status
     frozen = [(Beside.pid, signal.SIGSTOP)] * viewed
     assert told == [False, *frozen, stops, *frozen, stops]
