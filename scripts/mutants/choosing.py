@@ -100,15 +100,14 @@ def at_import(
     named = {file for file in near | seconds.keys() if _says(ROOT / file, name)}
     held = {file for file in near if holder and _says(ROOT / file, holder)}
 
-    telling = named | held
-
     def order(file: str) -> tuple[int, bool, float]:
-        closeness = (file in telling) + (file in near)
+        # Who says the very name comes before who says that of what holds it.
+        closeness = 2 * (file in named) + (file in held) + (file in near)
         return -closeness, file not in near, seconds.get(file, 0.0)
 
     chosen = sorted(near | seconds.keys(), key=order)[:IMPORTING_FILES]
     some = (passed.test for passed in tests if file_of(passed.test) in chosen)
-    return _affordable(some, budget, telling | near)
+    return _affordable(some, budget, named | held | near)
 
 
 @cache

@@ -94,8 +94,8 @@ def _faults(
         before, after = edit.lines(source)
         importing = edit.at_import or runs_at_import(tree, tests, module, line)
         if importing:
-            # The constant, field or member that a line begins with.
-            name = re.findall(r"\w+", before)[0]
+            # The constant, field, member or function that a line begins with.
+            name = next(word for word in re.findall(r"\w+", before) if word not in ("def", "self"))
             chosen = at_import(tests, budget, module, name, edit.scope)
         else:
             chosen = in_function(tests, budget, module, *span(tree, line))

@@ -13,6 +13,7 @@ from legbench.drives.protocol.pdo import Mapped
 from legbench.drives.setup.config import BusConfig
 from legbench.drives.setup.eds import eds_text, stamps_of
 from legbench.drives.setup.field_ranges import check_field_ranges
+from legbench.drives.setup.parameters import Parameter, check_parameter
 from legbench.drives.setup.units import AxisUnits
 from legbench.errors import ConfigError
 from legbench.limits.safety import SafetyLimits
@@ -109,3 +110,38 @@ def test_a_motor_shows_its_range_and_200_mrad_beyond_either_end(place: int, side
         assert taken or str(told).startswith(f"motor of '{name}': its range")
     assert refused(place, (-math.inf, 5.0), motor=units) is None
     assert refused(place, (-5.0, math.inf), motor=units) is None
+
+
+# --- objects that a bus file may give ----------------------------------------------------------
+
+WRITTEN, MEMORY = "is written by itself", "would wear out the drive's memory"
+SERVICE, DROPS = "moves a service of CiA 301", "lets the leg drop: give 1 to 4"
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "said"),
+    [
+        *((0x1005, 0x1006, WRITTEN), (0x1010, 0x1011, MEMORY), (0x1012, 0x1012, SERVICE)),
+        *((0x1014, 0x1014, SERVICE), (0x1016, 0x1017, WRITTEN), (0x1029, 0x1029, WRITTEN)),
+        *((0x1200, 0x12FF, SERVICE), (0x1400, 0x1BFF, WRITTEN), (0x6007, 0x6007, WRITTEN)),
+        *((0x6040, 0x6040, WRITTEN), (0x605A, 0x605A, WRITTEN), (0x605B, 0x605E, DROPS)),
+        *((0x6060, 0x6060, WRITTEN), (0x607A, 0x607A, WRITTEN)),
+        (0x607D, 0x607D, "would not move with offset_counts"),
+        *((0x60B0, 0x60B0, WRITTEN), (0x60C2, 0x60C2, WRITTEN)),
+    ],
+)
+def test_objects_that_are_written_otherwise_are_refused_from_their_first_to_their_last(
+    first: int, last: int, said: str
+) -> None:
+    for index in (first, last):
+        parameter = Parameter(index=index, sub=0, kind=DataType.INTEGER16, value=0)
+        with pytest.raises(ConfigError, match=said):
+            check_parameter("hip", parameter)
+
+
+def test_the_neighbours_of_such_objects_may_be_given() -> None:
+    beside = (0x1004, 0x1007, 0x100F, 0x1013, 0x1015, 0x1018, 0x1028, 0x102A, 0x11FF, 0x1300)
+    beside += (0x13FF, 0x1C00, 0x6006, 0x6008, 0x603F, 0x6041, 0x6059, 0x605F, 0x6061, 0x6079)
+    beside += (0x607B, 0x607C, 0x607E, 0x60AF, 0x60B1, 0x60C1, 0x60C3)
+    for index in beside:
+        check_parameter("hip", Parameter(index=index, sub=0, kind=DataType.INTEGER16, value=0))

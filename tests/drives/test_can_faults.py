@@ -35,10 +35,12 @@ def view(run: Path) -> LiveView:
 
 
 EXACT = {
-    # Three cycles without process data end a run, as does an emergency in the cycle that shows it.
+    # Three cycles without process data end a run, as do an emergency in the cycle that shows it,
+    # and an interruption before the next one.
     "cable pulled": 3,
     "drive unplugged": 3,
     "under-voltage": 1,
+    "^C": 0,
 }
 """Cycles from a fault to the reaction, where the limits leave no choice."""
 LOST = {"answers dropped for 2 cycles": 2, "drive warns": 0}

@@ -11,7 +11,8 @@ from drives_rig import MS, config, node
 from legbench.drives.emulated.actual_values import ActualValues
 from legbench.drives.emulated.behaviour import Behaviour, MissingSetpoint
 from legbench.drives.emulated.build import emulate
-from legbench.drives.emulated.drive import EmulatedDrive
+from legbench.drives.emulated.drive import UNDER_VOLTAGE, EmulatedDrive
+from legbench.drives.emulated.sensors import Encoder, SensorFault
 from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.frame import Frame
 from legbench.drives.protocol.objects import Key
@@ -189,3 +190,52 @@ def test_a_consumer_that_is_told_anew_waits_for_its_producer_once_more() -> None
         # 8130h: life guard or heartbeat error (CiA 301).
         lost = [frame for _, frame in drive.take() if frame.cob_id == 0x081]
         assert [frame.data[:2] for frame in lost] == ([] if told_anew else [b"\x30\x81"])
+
+
+def test_an_encoder_that_fails_by_nothing_shows_what_is_and_one_that_froze_at_once_zero() -> None:
+    for ailment in (SensorFault.STEP, SensorFault.DRIFT):
+        encoder = Encoder(1000.0)
+        encoder.fail(ailment)
+        encoder.tick(1_000_000_000)
+        assert encoder.show(5) == 5
+        encoder.fail(ailment, 0.25)
+        encoder.tick(1_000_000_000)
+        assert encoder.show(5) == 255
+    encoder = Encoder(1000.0)
+    encoder.fail(SensorFault.FROZEN)
+    assert encoder.show(5) == 0
+    encoder.fail(None)
+    assert encoder.show(5) == 5
+    encoder.fail(SensorFault.FROZEN)
+    assert encoder.show(9) == 5
+
+
+def test_what_strikes_a_drive_is_reported_in_the_instant_in_which_it_strikes() -> None:
+    drive = booted()
+    drive.trip(UNDER_VOLTAGE, 9 * MS)
+    ((at_ns, frame),) = drive.take()
+    # Emergencies of node 1 begin with their code, 3220h (CiA 301, CiA 402).
+    assert (at_ns, frame.cob_id, frame.data[:2]) == (9 * MS, 0x081, b"\x20\x32")
+    drive = booted()
+    drive.receive(Frame(0x000, b"\x01\x01"), 10 * MS)
+    # The first RPDO of the usual drive has six bytes; 8210h: too short to be processed.
+    drive._store.values[0x1600, 0], drive._store.values[0x1600, 1] = 1, 0x607A0020
+    drive._store.values[0x1400, 1] = 0x201
+    drive._pdos.rebuild()
+    drive.receive(Frame(0x201, b"\1"), 11 * MS)
+    ((at_ns, frame),) = drive.take()
+    assert (at_ns, frame.cob_id, frame.data[:2]) == (11 * MS, 0x081, b"\x10\x82")
+
+
+def test_what_is_not_sent_when_a_drive_leaves_the_bus_is_never_sent() -> None:
+    drive = booted()
+    drive.receive(Frame(0x601, bytes.fromhex("4000100000000000")), 6 * MS)
+    drive.bus_off(7 * MS)
+    assert [frame.cob_id for _, frame in drive.take()] == []
+
+
+def test_a_target_alone_is_a_fresh_set_point() -> None:
+    drive = booted()
+    for key, value, fresh in (((0x6060, 0), b"\x08", False), ((0x607A, 0), bytes(4), True)):
+        drive._store.write(*key, value)
+        assert drive._reception.fresh is fresh

@@ -20,6 +20,7 @@ from legbench.drives.emulated.homing_methods import METHODS, Move, Until
 from legbench.drives.emulated.injector import Injector
 from legbench.drives.emulated.lss import LssSlave, address_of
 from legbench.drives.emulated.network import Network
+from legbench.drives.emulated.shared_body import LockstepChannels
 from legbench.drives.emulated.station import Heard
 from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.frame import Frame
@@ -67,6 +68,17 @@ def test_what_waits_on_one_channel_is_received_without_a_wait_for_the_other(plac
         assert message is not None
         assert message.arbitration_id == 0x123
         assert [network.now_ns for network in networks] == [0, 0]
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_channels_pass_the_same_time_however_many_there_are(count: int) -> None:
+    networks = [Network(()) for _ in range(count)]
+    together = LockstepChannels(networks)
+    assert (together.now_ns(), together.next_ns()) == (0, 1_000_000)
+    together.advance(1_500_000, [])
+    assert together.now_ns() == 1_500_000
+    together.wait_until(2_500_000)
+    assert [network.now_ns for network in networks] == [2_500_000] * count
 
 
 # --- a server of several buses ---------------------------------------------------------------

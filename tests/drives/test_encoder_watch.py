@@ -57,6 +57,24 @@ def test_nothing_of_the_cycle_before_is_left_after_a_start_or_a_row_without_an_a
         assert watch.see_momentum() is None
 
 
+@pytest.mark.parametrize("after", ["start", "silent"])
+def test_a_reading_of_before_is_no_first_one_of_what_begins_anew(after: str) -> None:
+    counts = []
+    for asked in (True, False):
+        watch = watching()
+        assert first_doubt(watch) is not None
+        watch.see(MOTORS, POSTURE, MOTORS, (True, True), 1, PERIOD)
+        if after == "start":
+            watch.start(MOTORS)
+        else:
+            watch.see(MOTORS, POSTURE, MOTORS, (True, False), 1, PERIOD)
+        if asked:
+            assert watch.see_momentum() is None
+        counts.append(first_doubt(watch))
+    assert None not in counts
+    assert counts[0] == counts[1]
+
+
 # --- motors before links ---------------------------------------------------------------------
 
 JUMPED = (POSTURE[0], POSTURE[1] + 0.3)

@@ -1,5 +1,7 @@
 """The trials of faults and of dead parts: what strikes in each, what counts as safe, who waits."""
 
+import signal
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -9,10 +11,11 @@ import numpy as np
 import pytest
 from can_rig import BUS, MS, ROOT
 
+from legbench.commissioning import dead_part_stage as stage_module
 from legbench.commissioning import fault_trial
 from legbench.commissioning.broken_plant import Part
 from legbench.commissioning.dead_part_stage import Bench, Death, Emulation, _with_encoders, staged
-from legbench.commissioning.fault_table import TRIALS
+from legbench.commissioning.fault_table import TRIALS, FaultTrial
 from legbench.commissioning.fault_trial import Result
 from legbench.control import JumpConfig
 from legbench.design import load_design
@@ -20,6 +23,7 @@ from legbench.drives.emulated.faults import Babble, Fault, FrameFault, NodeFault
 from legbench.drives.protocol.cia402 import DriveState
 from legbench.drives.setup.bus_file import load_bus
 from legbench.experiment import Experiment, start_of
+from legbench.loop import Outcome
 from legbench.servo import ServoConfig
 
 STRIKE = 1000
@@ -141,6 +145,88 @@ def test_drives_are_waited_for_until_the_last_one_has_no_power_200_ms_at_most(
     assert fault_trial._wait_for_drives(cast(Any, Slowing(*ends))) == found * MS
 
 
+# --- one trial -------------------------------------------------------------------------------
+
+
+@final
+class Beside:
+    """A view beside a run, with a process that does not exist."""
+
+    pid = 4_000_000
+
+    def __init__(self, told: list[object]) -> None:
+        self._told = told
+
+    def stop(self) -> None:
+        self._told.append("stopped")
+
+
+@pytest.mark.parametrize("viewer", [True, False])
+def test_a_view_is_opened_where_one_is_tried_and_is_ended_and_set_going_again(
+    viewer: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[object] = []
+
+    def start_view(run: Path) -> Beside:
+        told.append(run)
+        return Beside(told)
+
+    def run(*given: Any) -> str:
+        told.append(type(given[-1]).__name__)
+        return "outcome"
+
+    monkeypatch.setattr(fault_trial, "_run", run)
+    monkeypatch.setattr(fault_trial.os, "kill", lambda *how: told.append(how))
+    opened, chosen, writer = cast(Any, (None, None, SimpleNamespace(path=Path("run"))))
+    trial = FaultTrial(name="", viewer=viewer)
+    assert fault_trial._viewed(trial, opened, chosen, writer, start_view) == "outcome"
+    going = (Beside.pid, signal.SIGCONT)
+    assert told == ([Path("run"), "Beside", "stopped", going] if viewer else ["NoneType"])
+    told.clear()
+    fault_trial._viewed(trial, opened, chosen, writer, None)
+    assert told == ["NoneType"]
+
+
+@pytest.mark.parametrize(
+    ("how", "stops", "status"),
+    [
+        ({}, False, "complete"),
+        ({"gone": True}, True, "interrupted"),
+        ({"interrupted": True}, True, "complete"),
+    ],
+)
+@pytest.mark.parametrize("viewed", [True, False])
+def test_what_has_to_happen_in_mid_run_happens_from_the_strike_on(
+    how: dict[str, bool], stops: bool, status: str, viewed: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    network = SimpleNamespace(now_ns=0)
+    told: list[object] = []
+
+    def run(
+        _plant: object, _law: object, cycles: int, *, stop: Any, progress: Any, **_: Any
+    ) -> Any:
+        assert cycles == 650
+        for now_ms in (999, 1000, 1001):
+            network.now_ns = now_ms * MS
+            progress(0, 0)
+            told.append(stop.is_set)
+        return Outcome(status="complete", cause=None, message=None, cycles=3, wall_time=0.0)
+
+    monkeypatch.setattr(fault_trial, "run", run)
+    monkeypatch.setattr(fault_trial, "_network", lambda _: network)
+    monkeypatch.setattr(fault_trial, "make_controller", lambda *_: None)
+    monkeypatch.setattr(fault_trial, "targets_of", lambda _: None)
+    monkeypatch.setattr(fault_trial.os, "kill", lambda *given: told.append(given))
+    opened: Any = SimpleNamespace(plant=None)
+    view = cast(Any, Beside(told) if viewed else None)
+    chosen: Any = SimpleNamespace(controller=None)
+    trial = replace(FaultTrial(name=""), **cast(Any, how))
+    outcome = fault_trial._run(trial, opened, chosen, cast(Any, None), view)
+    assert outcome.status == status
+    frozen = [(Beside.pid, signal.SIGSTOP)] * viewed
+    assert told == [False, *frozen, stops, *frozen, stops]
+
+
 # --- dead parts ------------------------------------------------------------------------------
 
 DESIGN = load_design(ROOT / "models" / "optimal.toml")
@@ -203,3 +289,18 @@ def test_a_healthy_stage_kills_nothing_and_contradicts_nothing() -> None:
     with staged(bench, Emulation.ANALYTIC, "jump", ServoConfig(), None) as stage:
         stage.kill()
         assert stage.contradiction() == 0.0
+
+
+@pytest.mark.parametrize(
+    ("emulation", "kind"), [(Emulation.SIM, "SimPlant"), (Emulation.ANALYTIC, "AnalyticPlant")]
+)
+def test_each_emulation_is_a_plant_of_its_own_behind_the_limits(
+    emulation: Emulation, kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[str] = []
+    monkeypatch.setattr(stage_module, kind, lambda *_: made.append(kind) or nullcontext())
+    monkeypatch.setattr(
+        stage_module, "open_limited", lambda plant, *_: SimpleNamespace(plant=plant)
+    )
+    with staged(Bench(design=DESIGN, bus_file=BUS), emulation, "jump", ServoConfig(), None):
+        assert made == [kind]

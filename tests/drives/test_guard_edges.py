@@ -126,6 +126,13 @@ def test_a_jump_to_the_other_side_is_as_long_as_it_is(axis: int, side: float) ->
     assert told.startswith(f"command step: the command of motor {axis + 1} jumps by 1.000 rad")
 
 
+def test_a_motor_that_jumps_by_its_limit_is_not_named_for_one_that_jumps_farther() -> None:
+    for side in (-1.0, 1.0):
+        guard = started(SafetyLimits(command_step=0.5), (0.0, 0.0))
+        told = fault(guard.command, (0.5 * side, 0.5625 * side))
+        assert str(told).startswith("command step: the command of motor 2 jumps by 0.562 rad")
+
+
 def test_a_jump_is_measured_from_the_last_wish_until_that_is_forgotten() -> None:
     limits = SafetyLimits(command_speed=STEP / PERIOD, command_step=0.5)
     for forgets in (False, True):

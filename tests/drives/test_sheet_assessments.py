@@ -276,7 +276,7 @@ def test_a_value_beyond_a_limit_of_the_data_sheet_is_refused_on_its_side() -> No
 
 def test_pdos_beyond_the_fourth_that_are_on_are_switched_off() -> None:
     more = []
-    for comm, cobs in ((0x1400, (0x4F0, 0x8000_04F1, 0)), (0x1800, (0x4000_04D0, 0x4D1, 0))):
+    for comm, cobs in ((0x1400, (0x4F0, 0x8000_04F1, 0)), (0x1800, (0x4000_04D0, 0x4D1))):
         for place, cob in enumerate(cobs, start=4):
             more += [
                 entry((comm + place, 1), U32, Access.RW, cob, mappable=False),
@@ -292,5 +292,18 @@ def test_pdos_beyond_the_fourth_that_are_on_are_switched_off() -> None:
         (0x1406, 1): 0x8000_0000,
         (0x1804, 1): 0x8000_04D0,
         (0x1805, 1): 0x8000_04D1,
-        (0x1806, 1): 0x8000_0000,
     }
+
+
+def test_what_is_refused_at_first_may_be_taken_later_or_as_another_value() -> None:
+    def outcome(key: Key, limits: tuple[int, int]) -> tuple[int | None, int | None]:
+        found = predict(drive(limits={key: limits}), config(), node())
+        return next((one.code, one.there) for one in found if one.parameter.key == key)
+
+    # A PDO that cannot be switched off is mapped as it is, and its identifier written in the end.
+    assert outcome((0x1400, 1), (0, 0x7FFF_FFFF)) == (None, 0x201)
+    # CiA 402: 3 is a quick stop by 6007h, and 1 a fault; 2 and 6 are a quick stop on its ramp.
+    assert outcome((0x6007, 0), (0, 3)) == (None, 3)
+    assert outcome((0x6007, 0), (0, 2)) == (None, 1)
+    assert outcome((0x605A, 0), (5, 8)) == (None, 6)
+    assert outcome((0x605A, 0), (7, 8)) == (Abort.TOO_LOW, 2)

@@ -120,6 +120,24 @@ def test_every_object_has_the_lines_of_the_standard_and_what_is_left_out_is_coun
     ]
 
 
+@pytest.mark.parametrize(
+    ("kind", "kept"),
+    # CiA 301: visible, octet and Unicode strings and domains have words, a time of day has none.
+    [(0x09, True), (0x0A, True), (0x0B, True), (0x0F, True), (0x0C, False), (0x10, False)],
+)
+def test_words_are_a_default_of_texts_alone(kind: int, kept: bool) -> None:
+    text = clean_text(split(f"[2000]\nDataType={kind}\nDefaultValue=words ; and a comment\n"))
+    assert ("DefaultValue=words\n" in text) is kept
+    assert ("DefaultValue" in text) is kept
+
+
+def test_a_compact_array_has_254_sub_objects_at_most() -> None:
+    for count, last in ((3, 3), (254, 254), (255, 254), (1000, 254)):
+        text = clean_text(split(f"[2000]\nDataType=5\nCompactSubObj={count}\n"))
+        # The count itself is one more.
+        assert text.count("DataType") == last + 1
+
+
 def test_sub_objects_count_as_objects_up_to_a_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(clean, "MOST_OBJECTS", 6)
     array = "[2000]\nParameterName=x\nDataType=5\nCompactSubObj=3\n"
@@ -186,6 +204,27 @@ def test_defaults_are_kept_in_the_type_of_their_object() -> None:
     }
     assert sheet.given == {(index, 0) for index in (0x2000, 0x2004, 0x2007)}
     assert sheet.objects[0x2007, 0].kind is DataType.UNSIGNED64
+
+
+@pytest.mark.parametrize(
+    ("kind", "length"),
+    # CiA 301, table of data types: times of day, odd whole numbers, double precision.
+    [
+        *((0x0C, 6), (0x0D, 6), (0x10, 3), (0x11, 8), (0x12, 5), (0x13, 6), (0x14, 7)),
+        *((0x16, 3), (0x18, 5), (0x19, 6), (0x1A, 7)),
+    ],
+)
+def test_a_number_of_another_length_is_as_many_bytes(kind: int, length: int) -> None:
+    sheet = read(("2000", f"0x{kind:02X}", None))
+    assert sheet.objects[0x2000, 0].kind is DataType.OCTET_STRING
+    assert sheet.objects[0x2000, 0].default == bytes(length)
+
+
+def test_a_configured_device_has_a_node_id_from_1_to_127() -> None:
+    one = ("2000", "5", "0")
+    for name in ("DeviceComissioning", "DeviceCommissioning"):
+        for text, node_id in (("0", None), ("1", 1), ("127", 127), ("128", None)):
+            assert read(one, more=f"[{name}]\nNodeID={text}\n").node_id == node_id
 
 
 def test_limits_are_those_between_which_there_is_something() -> None:
