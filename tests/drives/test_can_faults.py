@@ -101,8 +101,14 @@ def test_a_viewer_that_hangs_changes_neither_the_loop_nor_the_recording(tmp_path
             self.pid = self.view.pid
             views.append(self.view)
 
+        def state(self) -> str:
+            return Path(f"/proc/{self.pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
+
         def stop(self) -> None:
-            state = Path(f"/proc/{self.pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
+            # A process that waits for a processor takes its signal when it gets one.
+            until = time.monotonic() + 20.0
+            while (state := self.state()) != "T" and time.monotonic() < until:
+                time.sleep(0.01)
             stopped.append(state)
             self.view.stop()
 
