@@ -45,18 +45,6 @@ def test_a_start_forgets_what_was_learned_of_the_leg() -> None:
     assert first_doubt(watch) == found
 
 
-def test_nothing_of_the_cycle_before_is_left_after_a_start_or_a_row_without_an_answer() -> None:
-    for after in ("start", "silent"):
-        watch = watching()
-        assert first_doubt(watch) is not None
-        watch.see(MOTORS, POSTURE, MOTORS, (True, True), 1, PERIOD)
-        if after == "start":
-            watch.start(MOTORS)
-        else:
-            watch.see(MOTORS, POSTURE, MOTORS, (True, False), 1, PERIOD)
-        assert watch.see_momentum() is None
-
-
 @pytest.mark.parametrize("after", ["start", "silent"])
 def test_a_reading_of_before_is_no_first_one_of_what_begins_anew(after: str) -> None:
     counts = []
