@@ -116,7 +116,7 @@ def test_what_a_bus_waives_is_what_not_every_drive_has(
     learned = learn.learn(Path("it.eds"), Path("leg.toml"))
     assert told == [(False, False), (watched, braked)]
     assert ids == [(1, 2)]
-    assert learned.problems == ("'0': unfit", "'1': unfit")
+    assert learned.problems == ("'0', '1': unfit",)
 
 
 @pytest.mark.parametrize("fit", [True, False])

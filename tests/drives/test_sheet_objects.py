@@ -7,7 +7,7 @@ import pytest
 from test_sheet_proposals import I16, I32, U8, U16, U32, drive, entry, with_objects
 
 from legbench.drives.protocol.datatypes import DataType
-from legbench.drives.protocol.objects import OBJECTS, Access, Key
+from legbench.drives.protocol.objects import MAX_MAPPED, OBJECTS, Access, Key
 from legbench.drives.protocol.pdo import Mapped
 from legbench.drives.setup.config import PdoConfig
 from legbench.drives.sheet.candidates import link_candidates, temperature_candidates
@@ -64,13 +64,19 @@ def test_a_pdo_can_be_mapped_anew_where_all_of_it_can_be_written() -> None:
     for commands, comm in ((True, 0x1400), (False, 0x1800)):
         for number in (1, 2):
             it, mapping = comm + number - 1, comm + 0x200 + number - 1
-            assert drive().mappable(number, 2, commands=commands)
-            for fixed in ((it, 1), (mapping, 0), (mapping, 1), (mapping, 2)):
+            for fixed, room in (
+                ((it, 2), MAX_MAPPED),
+                ((mapping, MAX_MAPPED), MAX_MAPPED - 1),
+                ((mapping, 3), 2),
+                ((mapping, 1), 0),
+                ((mapping, 0), 0),
+                ((it, 1), 0),
+            ):
                 for sheet in (drive(fixed), with_objects(drive(), entry(fixed, U32))):
-                    assert not sheet.mappable(number, 2, commands=commands)
-            assert drive((it, 2), (mapping, 3)).mappable(number, 2, commands=commands)
+                    assert sheet.room(number, commands=commands) == room
     # What can only be written can be written.
-    assert with_objects(drive(), entry((0x1A00, 0), U8, Access.WO)).mappable(1, 2, commands=False)
+    only_written = with_objects(drive(), entry((0x1A00, 0), U8, Access.WO))
+    assert only_written.room(1, commands=False) == MAX_MAPPED
 
 
 def test_a_pdo_stays_on_where_its_identifier_is_valid_and_cannot_be_written() -> None:
@@ -321,12 +327,12 @@ def test_what_has_no_part_in_the_cyclic_mode_may_stand_in_a_fixed_command(
 def test_what_no_pdo_carries_and_what_is_missing_is_refused_by_name() -> None:
     none = drive(*[(0x1800 + place, 1) for place in range(4)])
     with pytest.raises(
-        ConfigError, match=r"^it\.eds: its 0 TPDOs cannot carry 6041h:00, 6064h:00, 60E4h"
+        ConfigError, match=r"^it\.eds: its TPDOs cannot carry 6041h:00, 6064h:00 at .*no TPDO\)"
     ):
         propose(none, "it.eds")
     none = drive(*[(0x1400 + place, 1) for place in range(4)])
     with pytest.raises(
-        ConfigError, match=r"^it\.eds: its 0 RPDOs cannot carry 6040h:00, 607Ah:00 at"
+        ConfigError, match=r"^it\.eds: its RPDOs cannot carry 6040h:00, 607Ah:00 at .*no RPDO\)"
     ):
         propose(none, "it.eds")
     with pytest.raises(ConfigError, match=r"3000h:00 is missing; name another object"):

@@ -201,14 +201,25 @@ def test_positions_of_other_types_are_named_and_unsigned_ones_begin_at_zero() ->
     sheet = with_objects(
         drive(),
         entry((0x6064, 0), U16),
-        entry((0x607A, 0), I16, Access.RW),
+        entry((0x607A, 0), U16, Access.RW),
         entry((0x60E4, 1), U32),
     )
     text = bus_text(propose(sheet, "it.eds"), (1,))
-    assert 'motor_object = "6064:00 u16"\ntarget_object = "607A:00 i16"\nlink_object = ' in text
+    assert 'motor_object = "6064:00 u16"\ntarget_object = "607A:00 u16"\nlink_object = ' in text
     lowest = "lowest_count = 0  # an unsigned object\n"
     assert text.count(f"bits = 16\n{lowest}") == text.count(f"bits = 32\n{lowest}") == 1
     assert text.count(lowest) == 2
+    # Somewhere within the range, so that the leg can be rehearsed before it is measured.
+    for bits in (16, 32):
+        assert f"offset_counts = {1 << bits - 2}  # MEASURE" in text
+
+
+def test_a_position_of_another_sign_than_its_target_counts_as_the_target_does() -> None:
+    for shown, taken in ((U16, I16), (I16, U16)):
+        sheet = with_objects(
+            drive(), entry((0x6064, 0), shown), entry((0x607A, 0), taken, Access.RW)
+        )
+        assert propose(sheet, "it.eds").motor.kind is taken
 
 
 def test_parameters_are_those_that_a_drive_takes_within_its_limits() -> None:

@@ -100,6 +100,13 @@ DefaultValue=words
 [2006]
 ParameterName=object 2006h
 ObjectType=0x9
+[2006sub0]
+ParameterName=count
+ObjectType=0x7
+DataType=0x0005
+AccessType=ro
+PDOMapping=0
+DefaultValue=2
 [2006sub2]
 ParameterName=alone
 ObjectType=0x7
@@ -117,6 +124,7 @@ def test_every_object_has_the_lines_of_the_standard_and_what_is_left_out_is_coun
         "1 objects have a default that is no value; it was left out",
         "2 objects without a data type were left out",
         "1 objects without a known access type count as readable and writable",
+        "1 objects without their sub-index 0 have got one",
     ]
 
 

@@ -58,7 +58,7 @@ def test_objects_are_as_the_sheet_tells(tmp_path: Path) -> None:
     assert refusal(bus, lambda it: it.put(0x6065, 0, U32, 1)) == Abort.READ_ONLY
     assert refusal(bus, lambda it: it.put(0x6085, 0, U32, 9)) == Abort.TOO_LOW
     assert refusal(bus, lambda it: it.put(0x6085, 0, U32, 0x1001)) == Abort.TOO_HIGH
-    assert refusal(bus, lambda it: it.put(0x6085, 0, U16, 20)) == Abort.TOO_SHORT
+    assert refusal(bus, lambda it: it.write(0x6085, 0, b"\x14\0")) == Abort.TOO_SHORT
     assert refusal(bus, lambda it: it.read(0x2002, 0)) == Abort.WRITE_ONLY
     assert asked(bus, lambda it: it.get_int(0x6065, 0, U32)) == 77
     assert asked(bus, lambda it: it.read(0x2001, 0)) == b"\x00\x00\xc0\x3f"

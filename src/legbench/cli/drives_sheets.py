@@ -64,7 +64,7 @@ class Check:
 
 
 def _ended(learned: "Learned") -> int:
-    """Report why drives cannot be used, the first reason of each; 1 if there is one."""
+    """Report why drives cannot be used, a line each; 1 if there is one."""
     for problem in learned.problems:
         report_error(problem)
     return 1 if learned.problems else 0
@@ -102,7 +102,7 @@ def _print(learned: "Learned", *, as_json: bool, out: Path | None) -> None:
             note(
                 f"a run also needs limits: copy hardware/{LIMITS_NAME} beside it, or give --limits"
             )
-    if learned.to_measure:
+    if learned.to_measure and not (out is not None and learned.problems):
         note(
             f"{len(learned.to_measure)} lines of the bus file are still to be measured; each says "
             "MEASURE"

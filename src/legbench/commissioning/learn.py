@@ -190,7 +190,11 @@ def _parsed(text: str, folder: Path) -> BusConfig:
 
 def _judged(config: BusConfig, sheets: Mapping[str, DataSheet], text: str) -> Learned:
     assessments = tuple(assess(sheets[node.name], config, node) for node in config.nodes)
-    problems = [f"'{one.node}': {problem}" for one in assessments for problem in one.problems]
+    told: dict[str, list[str]] = {}
+    for one in assessments:
+        for problem in one.problems:
+            told.setdefault(problem, []).append(f"'{one.node}'")
+    problems = [f"{', '.join(names)}: {problem}" for problem, names in told.items()]
     if not problems:
         try:
             check_taken(config, {one.node: one.outcomes for one in assessments})

@@ -7,10 +7,17 @@ import can
 
 from legbench.drives.errors import CodecError, DriveError, NoAnswerError, SdoAbortError
 from legbench.drives.master.port import Port
-from legbench.drives.protocol.datatypes import DataType, Value, pack
+from legbench.drives.protocol.datatypes import (
+    DataType,
+    Value,
+    pack,
+    range_of,
+    resized,
+    size_of,
+)
 from legbench.drives.protocol.frame import SDO_REPLY_BASE, SDO_REQUEST_BASE
 from legbench.drives.protocol.objects import name_of
-from legbench.drives.protocol.sdo import Abort, abort_data
+from legbench.drives.protocol.sdo import LENGTHS, Abort, abort_data
 from legbench.drives.protocol.sdo_client import Download, Progress, Upload
 
 Carried = TypeVar("Carried", Upload, Download)
@@ -93,8 +100,28 @@ class SdoPort:
             return None
 
     def put(self, index: int, sub: int, kind: DataType, value: int) -> None:
-        """Write the value of an object; raises as `read` does."""
-        self.write(index, sub, pack(kind, value))
+        """Write the value of an object, in the drive's own length if it has another one.
+
+        Raises as `read` does, also where the value does not fit that length.
+        """
+        try:
+            self.write(index, sub, pack(kind, value))
+        except SdoAbortError as error:
+            own = self._own_kind(index, sub, kind) if error.code in LENGTHS else None
+            if own is None:
+                raise
+            low, high = range_of(own)
+            if not low <= value <= high:
+                raise
+            self.write(index, sub, pack(own, value))
+
+    def _own_kind(self, index: int, sub: int, kind: DataType) -> DataType | None:
+        """Type of a whole number in the length that the drive answers with; none if it does not."""
+        try:
+            length = len(self.read(index, sub))
+        except SdoAbortError:
+            return None
+        return None if length == size_of(kind) else resized(kind, length)
 
     def _upload(self, index: int, sub: int) -> Upload:
         return self._transfer(lambda: Upload(index, sub), index, sub)

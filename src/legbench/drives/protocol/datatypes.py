@@ -73,6 +73,21 @@ def range_of(kind: DataType) -> tuple[int, int]:
     return (0, (1 << bits) - 1)
 
 
+def resized(kind: DataType, size: int) -> DataType | None:
+    """Whole number's type of another length [bytes] and the same sign; none if there is none."""
+    if kind not in FORMATS:
+        return None
+    signed = FORMATS[kind].islower()
+    return next(
+        (
+            other
+            for other, code in FORMATS.items()
+            if size_of(other) == size and code.islower() == signed and other is not DataType.BOOLEAN
+        ),
+        None,
+    )
+
+
 def pack(kind: DataType, value: Value) -> bytes:
     """A value as its bytes.
 

@@ -48,6 +48,8 @@ class Abort(IntEnum):
     NO_DATA = 0x08000024
 
 
+LENGTHS = (Abort.TYPE_LENGTH, Abort.TOO_LONG, Abort.TOO_SHORT)
+"""Codes with which drives refuse a value of another length than their object has."""
 ABSENT = (Abort.NO_OBJECT, Abort.NO_SUB_INDEX, Abort.UNSUPPORTED_ACCESS, Abort.GENERAL)
 """Codes with which drives refuse objects that they have not; the last two are not the standard's
 way, and may mean something else on an object that is there."""

@@ -4,7 +4,14 @@ from enum import Enum
 from typing import final
 
 from legbench.drives.errors import CodecError
-from legbench.drives.protocol.datatypes import DataType, Value, size_of, unpack
+from legbench.drives.protocol.datatypes import (
+    FORMATS,
+    DataType,
+    Value,
+    resized,
+    size_of,
+    unpack,
+)
 from legbench.drives.protocol.sdo import (
     EXPEDITED,
     FRAME,
@@ -16,6 +23,9 @@ from legbench.drives.protocol.sdo import (
     abort_data,
     abort_error,
 )
+
+WIDTHS = (1, 2, 4, 8)
+"""Lengths of whole numbers [bytes]."""
 
 
 class Progress(Enum):
@@ -75,21 +85,27 @@ class Upload(_Transfer):
         return bytes(self._got)
 
     def value(self, kind: DataType) -> Value:
-        """The object's value, from an answer of four bytes or without a size, too.
+        """The object's value, from an answer of another length or without a size, too.
 
-        Some drives answer for short numbers with all four bytes of the frame. What is beyond the
-        type is left out where no size is told; where one is, it must repeat the sign, or be zero.
+        Some drives have whole numbers in a shorter or a longer type than the standard, and some
+        answer for short ones with all four bytes of the frame. A shorter number is widened. What
+        is beyond the type is left out where no size is told; where one is, it must repeat the sign,
+        or be zero.
 
         Raises:
             CodecError: the bytes are none of this type.
         """
         content, size = self.result, size_of(kind)
-        if size is None or len(content) != EXPEDITED or size >= EXPEDITED:
+        if size is None or kind not in FORMATS or len(content) not in WIDTHS:
             return unpack(kind, content)
+        narrow = resized(kind, len(content))
+        if len(content) < size and narrow is not None:
+            return unpack(narrow, content)
         value = unpack(kind, content[:size])
-        padding = {bytes(EXPEDITED - size)}
+        beyond = len(content) - size
+        padding = {bytes(beyond)}
         if isinstance(value, int) and value < 0:
-            padding.add(b"\xff" * (EXPEDITED - size))
+            padding.add(b"\xff" * beyond)
         if self._sized and content[size:] not in padding:
             return unpack(kind, content)
         return value

@@ -5,14 +5,12 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from legbench.drives.protocol.objects import Key, name_of
-from legbench.drives.protocol.sdo import ABSENT, MEANINGS, Abort
+from legbench.drives.protocol.sdo import ABSENT, LENGTHS, MEANINGS, Abort
 from legbench.drives.setup.needs import Need, NeedRow, row_of
 from legbench.drives.setup.parameters import PDO_OBJECTS, Parameter
 
 MISSING = (Abort.NO_OBJECT, Abort.NO_SUB_INDEX)
 """Abort codes of a drive that has no such object."""
-LENGTHS = (Abort.TYPE_LENGTH, Abort.TOO_LONG, Abort.TOO_SHORT)
-"""Abort codes of an object of another type than the bus file says."""
 CYCLE, CYCLE_INDEX = (0x60C2, 1), (0x60C2, 2)
 """Interpolation time: its value, and its power of ten, which mean something together."""
 
@@ -79,9 +77,10 @@ class ObjectOutcome:
         """Reason for which the drive cannot be used, and the way out."""
         if self.row.need is Need.PROTECTION:
             return f"{self.row.purpose}: give a value and a type that the drive takes"
-        way = ": map its objects into the PDOs that the drive has, in the way that it has them"
-        pdo = self.parameter.index in PDO_OBJECTS
-        return f"it is required: {self.row.purpose}{way if pdo else ''}"
+        way = self.row.way
+        if self.parameter.index in PDO_OBJECTS:
+            way = "map its objects into the PDOs that the drive has, in the way that it has them"
+        return f"it is required: {self.row.purpose}{': ' if way else ''}{way}"
 
     @property
     def line(self) -> str | None:

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from enum import Enum
 
-from legbench.drives.protocol.datatypes import SHORT_NAMES, DataType
+from legbench.drives.protocol.datatypes import FORMATS, SHORT_NAMES, DataType, size_of
 from legbench.drives.protocol.objects import Access, Key, name_of
 from legbench.drives.protocol.pdo import Mapped
 from legbench.drives.setup.config import BusConfig, NodeConfig, PdoConfig
@@ -165,19 +165,37 @@ def _reads(sheet: DataSheet) -> Iterator[Finding]:
         )
 
 
+def unfit(sheet: DataSheet) -> tuple[str, ...]:
+    """Return why a device cannot lead a leg, whatever a bus file says, each with the way out."""
+    device = sheet.default((0x1000, 0), 0)
+    if device is not None and device & 0xFFFF != PROFILE_402:
+        return (
+            f"1000h:00 is {device:08X}h: it is no CiA 402 drive, whose type ends with 0192h; "
+            "another drive",
+        )
+    lacking = [(index, 0) for index in CYCLIC if not sheet.has((index, 0))]
+    if len(lacking) == len(CYCLIC):
+        names = ", ".join(f"{index:04X}h" for index in CYCLIC)
+        return (f"{names} are missing: it is no CiA 402 drive; another data sheet, or drive",)
+    modes = sheet.default((0x6502, 0), 0)
+    told = [
+        f"{name_of(*key)} is missing; no drive runs without it: another drive, or a complete data "
+        "sheet"
+        for key in (*lacking, *(key for key in NEEDED_READS if not sheet.has(key)))
+    ]
+    if modes is not None and not modes & CSP_BIT:
+        told.insert(
+            0,
+            f"6502h:00 is {modes:#x}: it knows no cyclic synchronous position mode; another drive",
+        )
+    return tuple(told)
+
+
 def _problems(
     sheet: DataSheet, node: NodeConfig, outcomes: Iterable[ObjectOutcome]
 ) -> Iterator[str]:
     """Yield reasons for which the drive cannot be used, each with its object and the way out."""
-    device = sheet.default((0x1000, 0), node.node_id)
-    if device is not None and device & 0xFFFF != PROFILE_402:
-        yield f"1000h:00 is {device:08X}h: it is no CiA 402 drive, whose type ends with 0192h"
-    modes = sheet.default((0x6502, 0), node.node_id)
-    if modes is not None and not modes & CSP_BIT:
-        yield f"6502h:00 is {modes:#x}: it knows no cyclic synchronous position mode; another drive"
-    for key in (*((index, 0) for index in CYCLIC), *NEEDED_READS):
-        if not sheet.has(key):
-            yield f"{name_of(*key)} is missing; no drive runs without it"
+    yield from unfit(sheet)
     for pdos, commands in ((node.rpdos, True), (node.tpdos, False)):
         for pdo in pdos:
             yield from _pdo_problems(sheet, pdo, commands=commands)
@@ -211,10 +229,20 @@ def _pdo_problems(sheet: DataSheet, pdo: PdoConfig, *, commands: bool) -> Iterat
 def _object_problems(sheet: DataSheet, entry: Mapped) -> Iterator[str]:
     known = sheet.objects.get(entry.key)
     if known is None:
-        yield f"{name_of(*entry.key)} is missing; name another object in the bus file"
-    elif known.kind is not entry.kind:
+        if entry.index not in CYCLIC:
+            yield f"{name_of(*entry.key)} is missing; name another object in the bus file"
+    elif known.kind is entry.kind or (entry.index in CYCLIC and _as_long(known.kind, entry)):
+        return
+    elif entry.index in CYCLIC and known.kind not in FORMATS:
+        yield f"{name_of(*entry.key)} is of type {short_name(known.kind)}, no whole number"
+    else:
         yield (
             f"{name_of(*entry.key)} is of type {short_name(known.kind)}, the bus file says "
             f'{short_name(entry.kind)}: write "{entry.index:04X}:{entry.sub:02X} '
             f'{short_name(known.kind)}"'
         )
+
+
+def _as_long(kind: DataType, entry: Mapped) -> bool:
+    """Whether a type is a whole number as long as an entry, and so the same bits on the wire."""
+    return kind in FORMATS and 8 * (size_of(kind) or 0) == entry.bits

@@ -4,7 +4,7 @@ import json
 import math
 from collections.abc import Iterator, Sequence
 
-from legbench.drives.protocol.datatypes import FORMATS, range_of
+from legbench.drives.protocol.datatypes import FORMATS, DataType, range_of
 from legbench.drives.protocol.objects import Key
 from legbench.drives.protocol.pdo import Mapped
 from legbench.drives.setup.bus_file import format_object
@@ -92,12 +92,22 @@ def _node(proposal: Proposal, place: int, node_id: int) -> Iterator[str]:
         entry = format_object(proposal.temperature)
         yield f'# temperature_object = "{entry}"  # {MARK}: its scale and its place'
         yield f"# temperature_scale = 1.0  # {MARK} [deg C a count]"
-    if place < len(SOFT_LIMITS) and all(sheet.writable((0x607D, sub)) for sub in (1, 2)):
+    if place < len(SOFT_LIMITS) and _limits_itself(proposal):
         low, high = SOFT_LIMITS[place]
         yield f"soft_limits = [{low}, {high}]  # {MARK}: of the motor, in the drive itself [rad]"
     yield from _axes(proposal, place)
     yield from _parameters(sheet)
     yield from _pdos(proposal)
+
+
+def _limits_itself(proposal: Proposal) -> bool:
+    """Whether the drive takes limits of its range on both sides of 0, in 32 bits or more."""
+    least, most = range_of(DataType.INTEGER32)
+    return range_of(proposal.motor.kind)[0] < 0 and all(
+        _holds(proposal.sheet, (0x607D, sub), most)
+        and range_of(proposal.sheet.objects[0x607D, sub].kind)[0] <= least
+        for sub in (1, 2)
+    )
 
 
 def _objects(proposal: Proposal) -> Iterator[str]:
@@ -129,9 +139,11 @@ def _axes(proposal: Proposal, place: int) -> Iterator[str]:
         yield f"counts_per_rev = {COUNTS_PER_REV}  # {MARK}: counts a turn of the encoder's shaft"
         yield f"gear = {gear}  # {MARK}: turns of that shaft for one turn of the {axis}"
         yield f"sign = {sign}  # {MARK}: 1 if counts grow forward"
-        yield f"offset_counts = 0  # {MARK}: legbench drives zero"
+        unsigned = range_of(entry.kind)[0] == 0
+        quarter = 1 << entry.bits - 2 if unsigned else 0
+        yield f"offset_counts = {quarter}  # {MARK}: legbench drives zero"
         yield f"bits = {entry.bits}"
-        if range_of(entry.kind)[0] == 0:
+        if unsigned:
             yield "lowest_count = 0  # an unsigned object"
 
 

@@ -7,10 +7,14 @@ there. What is left out here, or guessed, is remarked.
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 
+from legbench.drives.protocol.objects import OBJECTS, Key
+from legbench.drives.setup.needs import MAPPINGS
 from legbench.drives.sheet.text import Section, Sections, node_number, number, words
 from legbench.reading import UnreadableError
 
 RECORD = 0x9
+PROFILE = 0x6000
+"""First index of the device profile's objects."""
 LAST_BASIC_TYPE = 0x1B
 """Last data type of CiA 301's table; a later one is a maker's own, which an object defines."""
 TEXTS = (0x09, 0x0A, 0x0B, 0x0F)
@@ -46,16 +50,17 @@ def clean_text(found: Sections) -> str:
         if total > MOST_OBJECTS:
             raise UnreadableError(f"describes more than {MOST_OBJECTS} objects, the limit")
         if not subs:
-            lines += _variable(f"{index:04X}", head, found, remarks)
+            lines += _variable(f"{index:04X}", (index, 0), head, found, remarks)
             continue
+        subs = _numbered(index, subs, remarks)
         members = [
             line
             for sub, section in sorted(subs.items())
-            for line in _variable(f"{index:04X}sub{sub:X}", section, found, remarks)
+            for line in _variable(f"{index:04X}sub{sub:X}", (index, sub), section, found, remarks)
         ]
         name = words(head, "parametername") or f"object {index:04X}h"
         lines += [f"[{index:04X}]", f"ParameterName={name}", f"ObjectType=0x{RECORD:X}", *members]
-    found.remarks += [f"{count} objects {what}" for what, count in sorted(remarks.items())]
+    found.remarks += [f"{count} objects {what}" for what, count in sorted((+remarks).items())]
     return "\n".join(lines) + "\n"
 
 
@@ -73,8 +78,30 @@ def _expanded(found: Sections, index: int, head: Section, count: int) -> dict[in
     return subs
 
 
+def _numbered(index: int, subs: dict[int, Section], remarks: Counter[str]) -> dict[int, Section]:
+    """Return the sub-objects with the sub-index 0 that every array and record has (CiA 301, 7.4.7).
+
+    That of a mapping counts what is mapped, and is written where its entries are.
+    """
+    if 0 in subs:
+        return subs
+    remarks["without their sub-index 0 have got one"] += 1
+    counted = max(subs)
+    own = dict[str, str]()
+    if any(index in mapping for mapping in MAPPINGS):
+        mapped = [sub for sub, section in subs.items() if number(_told(section))]
+        counted = max(mapped, default=0)
+        own["accesstype"] = words(subs[min(subs)], "accesstype")
+    return {0: COUNT | {"defaultvalue": str(counted)} | own} | subs
+
+
+def _told(section: Section) -> str:
+    """Value at power-on: that of a configured device (DCF), else the default."""
+    return section.get("parametervalue") or section.get("defaultvalue", "")
+
+
 def _variable(
-    where: str, section: Section, found: Sections, remarks: Counter[str]
+    where: str, key: Key, section: Section, found: Sections, remarks: Counter[str]
 ) -> Iterator[str]:
     """Yield the lines of one object; none where its type is not told."""
     kind = _type(section, found)
@@ -90,17 +117,20 @@ def _variable(
     yield "ObjectType=0x7"
     yield f"DataType=0x{kind:04X}"
     yield f"AccessType={access}"
-    yield f"PDOMapping={int(bool(number(section.get('pdomapping'))))}"
-    for key, word in (("defaultvalue", "DefaultValue"), ("parametervalue", "ParameterValue")):
-        text = section.get(key, "")
-        if text:
-            value = _value(kind, text)
-            if value is None:
-                remarks["have a default that is no value; it was left out"] += 1
-            else:
-                yield f"{word}={value}"
-    for key, word in (("lowlimit", "LowLimit"), ("highlimit", "HighLimit")):
-        limit = number(section.get(key))
+    mappable = number(section.get("pdomapping"))
+    if mappable is None:
+        mappable = key[0] >= PROFILE and key in OBJECTS and OBJECTS[key].mappable
+        remarks["do not say whether they can be mapped; the profile's can"] += mappable
+    yield f"PDOMapping={int(bool(mappable))}"
+    text = _told(section)
+    if text:
+        value = _value(kind, text)
+        if value is None:
+            remarks["have a default that is no value; it was left out"] += 1
+        else:
+            yield f"DefaultValue={value}"
+    for name, word in (("lowlimit", "LowLimit"), ("highlimit", "HighLimit")):
+        limit = number(section.get(name))
         if limit is not None and kind not in (*TEXTS, *REALS):
             yield f"{word}={limit}"
 

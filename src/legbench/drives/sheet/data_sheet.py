@@ -69,15 +69,17 @@ class DataSheet:
         words = [self.default((mapping, sub), 0) for sub in range(1, min(count, 64) + 1)]
         return tuple(word for word in words if word)
 
-    def mappable(self, number: int, entries: int, *, commands: bool) -> bool:
-        """Whether a PDO can be mapped anew, with so many entries.
+    def room(self, number: int, *, commands: bool) -> int:
+        """Number of entries that a PDO can be mapped anew with; 0 where its mapping is fixed.
 
         It has to be switched off for that, by its COB-ID (CiA 301, 7.5.2.36).
         """
         mapping = (0x1600 if commands else 0x1A00) + number - 1
-        return self.writable((mapping - 0x200, 1)) and all(
-            self.writable((mapping, sub)) for sub in range(entries + 1)
-        )
+        entries = 0
+        if self.writable((mapping - 0x200, 1)) and self.writable((mapping, 0)):
+            while self.writable((mapping, entries + 1)):
+                entries += 1
+        return entries
 
     def stays_on(self, comm: int) -> bool:
         """Whether a PDO is on at power-on, by its communication object, and cannot be let off."""

@@ -2,7 +2,9 @@
 
 import io
 import struct
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,6 +14,7 @@ from legbench.drives.protocol.objects import Access, Key, ObjectEntry
 from legbench.drives.setup.eds import BAUD_RATES
 from legbench.drives.sheet.clean import clean_text
 from legbench.drives.sheet.data_sheet import DataSheet, profile_default
+from legbench.drives.sheet.plausible import BASES, are_limits, mapped_keys, without_node
 from legbench.drives.sheet.text import LARGEST_EDS, Sections, decode, number, split, words
 from legbench.errors import ConfigError
 from legbench.reading import UnreadableError, read_file
@@ -55,50 +58,90 @@ def sheet_of(content: bytes, name: str) -> DataSheet:
     variables = list(_variables(clean_text(sections)))
     if not variables:
         raise UnreadableError("describes no object; is it a data sheet?")
-    objects: dict[Key, ObjectEntry] = {}
-    given: set[Key] = set()
+    node_id = number(_commissioning(sections).get("nodeid"))
+    found = _Found()
+    mapped = mapped_keys(((one.index, one.subindex), _typed(one)[1]) for one in variables)
     for variable in variables:
+        found.add(variable, node_id, mapped)
+    sections.remarks += [f"{count} {what}" for what, count in sorted(found.guessed.items())]
+    return _described(sections, name, found)
+
+
+@dataclass(slots=True)
+class _Found:
+    """Objects as they are found, one after the other."""
+
+    objects: dict[Key, ObjectEntry] = field(default_factory=dict)
+    given: set[Key] = field(default_factory=set)
+    relative: set[Key] = field(default_factory=set)
+    limits: dict[Key, tuple[int, int]] = field(default_factory=dict)
+    guessed: Counter[str] = field(default_factory=Counter)
+
+    def add(self, variable: "ODVariable", node_id: int | None, mapped: Collection[Key]) -> None:
+        """Add an object, of a configured device with a node id; some are mapped at power-on."""
         key = (variable.index, variable.subindex)
         kind, default = _typed(variable)
         if key in NEVER_ZERO and default == 0:
             default = None
-        objects[key] = ObjectEntry(
+        if variable.relative:
+            self.relative.add(key)
+        else:
+            default = self._less_the_node(key, default, node_id)
+        self._limit(key, kind, variable, default)
+        self.objects[key] = ObjectEntry(
             *key,
             variable.name,
             kind,
             ACCESS.get(variable.access_type, Access.RW),
             _profile(key, kind, variable.data_type or 0) if default is None else default,
-            variable.pdo_mappable,
+            variable.pdo_mappable or key in mapped,
         )
         if default is not None:
-            given.add(key)
-    return _described(sections, name, objects, frozenset(given), variables)
+            self.given.add(key)
+
+    def _less_the_node(self, key: Key, default: Value | None, node_id: int | None) -> Value | None:
+        """Default of an identifier that is told without $NODEID, less the node id."""
+        if key not in BASES:
+            return default
+        if default is None:
+            self.relative.add(key)
+            return None
+        own = without_node(key, default, node_id) if isinstance(default, int) else None
+        if own is None:
+            return default
+        self.relative.add(key)
+        self.guessed["identifiers count from the node id, though they do not say so"] += 1
+        return own
+
+    def _limit(
+        self, key: Key, kind: DataType, variable: "ODVariable", default: Value | None
+    ) -> None:
+        low, high = variable.min, variable.max
+        if low is None or high is None or low >= high:
+            return
+        if are_limits(key, kind, (low, high), default if isinstance(default, int) else None):
+            self.limits[key] = low, high
+        else:
+            self.guessed["objects have limits that cannot be meant; they were left out"] += 1
 
 
-def _described(
-    sections: Sections,
-    name: str,
-    objects: dict[Key, ObjectEntry],
-    given: frozenset[Key],
-    variables: "list[ODVariable]",
-) -> DataSheet:
-    device = sections.others.get("deviceinfo", {})
+def _commissioning(sections: Sections) -> dict[str, str]:
     # The first spelling is that of CiA 306.
-    commissioning = sections.others.get("devicecomissioning") or sections.others.get(
+    return sections.others.get("devicecomissioning") or sections.others.get(
         "devicecommissioning", {}
     )
-    node_id = number(commissioning.get("nodeid"))
-    limits = {
-        (one.index, one.subindex): (one.min, one.max)
-        for one in variables
-        if one.min is not None and one.max is not None and one.min < one.max
-    }
+
+
+def _described(sections: Sections, name: str, found: _Found) -> DataSheet:
+    device = sections.others.get("deviceinfo", {})
+    node_id = number(_commissioning(sections).get("nodeid"))
+    objects, given = found.objects, frozenset(found.given)
     return DataSheet(
         name=name,
         objects=objects,
         given=given,
-        relative=frozenset((one.index, one.subindex) for one in variables if one.relative),
-        limits=limits,
+        relative=frozenset(found.relative),
+        limits=found.limits,
         vendor=_identity(device, "vendornumber", objects, given, 1),
         product=_identity(device, "productnumber", objects, given, 2),
         revision=_identity(device, "revisionnumber", objects, given, 3),

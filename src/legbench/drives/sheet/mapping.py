@@ -1,6 +1,6 @@
 """Choice of process data that a drive can carry, by free and by fixed mappings; pure."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations
 
 from legbench.drives.errors import CodecError
@@ -15,6 +15,8 @@ MOST_TRIED = 8
 """Number of PDOs among which a choice is made."""
 MOST_USED = 3
 """Largest number of PDOs that carry the process data of one drive each way."""
+MOST_TOLD = 4
+"""Number of PDOs of which a refusal speaks."""
 HARMLESS = {0x6060, 0x6071, 0x60B0, 0x60B1, 0x60B2, 0x60FF}
 """Objects that a fixed command frame may carry besides: 0, or the mode, changes nothing there."""
 
@@ -32,25 +34,48 @@ def choose(
     numbers = [
         number
         for number in sheet.pdos(commands=commands)[:MOST_TRIED]
-        if _is_usable(sheet, number, commands=commands)
+        if _obstacle(sheet, number, commands=commands) is None
     ]
-    free = [number for number in numbers if _is_free(sheet, number, commands=commands)]
+    rooms = {number: sheet.room(number, commands=commands) for number in numbers}
     fixed = {
         number: entries
         for number in numbers
-        if number not in free
+        if not rooms[number]
         and (entries := _fixed(sheet, number, needed, commands=commands)) is not None
     }
-    usable = [number for number in numbers if number in free or number in fixed]
+    usable = [number for number in numbers if rooms[number] or number in fixed]
     for size in range(1, MOST_USED + 1):
         for subset in combinations(usable, size):
-            chosen = _packed(needed, subset, fixed)
+            chosen = _packed(needed, subset, fixed, rooms)
             if chosen is not None:
                 return tuple(
                     _pdo(sheet, number, entries, commands=commands)
                     for number, entries in sorted(chosen.items())
                 )
     return None
+
+
+def obstacles(sheet: DataSheet, *, commands: bool) -> tuple[str, ...]:
+    """Return why each PDO cannot be chosen freely, a few words each; empty for none at all."""
+    return tuple(
+        f"{'RPDO' if commands else 'TPDO'}{number}: "
+        + (_obstacle(sheet, number, commands=commands) or _carries(sheet, number, commands))
+        for number in sheet.pdos(commands=commands)[:MOST_TOLD]
+    )
+
+
+def _carries(sheet: DataSheet, number: int, commands: bool) -> str:
+    room = sheet.room(number, commands=commands)
+    if room:
+        return f"room for {room} objects"
+    words = sheet.mapped(number, commands=commands)
+    return f"fixed to {', '.join(name_of_word(word) for word in words) or 'nothing'}"
+
+
+def name_of_word(word: int) -> str:
+    """Name of a mapping entry in messages, without its length."""
+    index, sub, _ = split_word(word)
+    return f"{index:04X}h:{sub:02X}"
 
 
 def _pdo(
@@ -61,25 +86,22 @@ def _pdo(
     return PdoConfig(number=number, objects=entries, deadline_ms=deadline_ms)
 
 
-def _is_usable(sheet: DataSheet, number: int, *, commands: bool) -> bool:
-    """Whether identifier and transmission type of a PDO are what they have to be, or can be."""
+def _obstacle(sheet: DataSheet, number: int, *, commands: bool) -> str | None:
+    """Return why identifier or transmission type of a PDO cannot be what they have to be."""
     base, comm = (RPDO_BASES, 0x1400) if commands else (TPDO_BASES, 0x1800)
     comm += number - 1
     if number > len(base):
-        return False
-    if not sheet.writable((comm, 1)):
-        cob = sheet.default((comm, 1), 0)
-        own = (comm, 1) in sheet.relative and cob is not None
-        if not own or (cob or 0) & ~COB_NO_REMOTE != base[number - 1]:
-            return False
+        return "has no identifier by the standard"
+    cob = sheet.default((comm, 1), 0)
+    if not sheet.writable((comm, 1)) and cob is not None:
+        own = (comm, 1) in sheet.relative
+        if not own or cob & ~COB_NO_REMOTE != base[number - 1]:
+            return f"{comm:04X}h:01 is fixed to {cob:08X}h{' and the node id' if own else ''}"
     kind = sheet.default((comm, 2), 0)
     if sheet.writable((comm, 2)) or kind is None:
-        return True
-    return kind <= LAST_SYNCHRONOUS if commands else kind == EVERY_SYNC
-
-
-def _is_free(sheet: DataSheet, number: int, *, commands: bool) -> bool:
-    return sheet.mappable(number, 2, commands=commands)
+        return None
+    fits = kind <= LAST_SYNCHRONOUS if commands else kind == EVERY_SYNC
+    return None if fits else f"{comm:04X}h:02 is fixed to {kind}, it does not follow every SYNC"
 
 
 def _fixed(
@@ -105,7 +127,10 @@ def _fixed(
 
 
 def _packed(
-    needed: Sequence[Mapped], subset: Sequence[int], fixed: dict[int, tuple[Mapped, ...]]
+    needed: Sequence[Mapped],
+    subset: Sequence[int],
+    fixed: Mapping[int, tuple[Mapped, ...]],
+    rooms: Mapping[int, int],
 ) -> dict[int, tuple[Mapped, ...]] | None:
     """Put what is needed into some PDOs, all of which are used; none if it does not fit."""
     chosen = {number: fixed[number] for number in subset if number in fixed}
@@ -116,7 +141,7 @@ def _packed(
     for number in subset:
         if number in fixed:
             continue
-        taken = _fill(rest)
+        taken = _fill(rest, rooms[number])
         if not taken:
             return None
         chosen[number] = taken
@@ -124,10 +149,10 @@ def _packed(
     return None if rest else chosen
 
 
-def _fill(entries: Iterable[Mapped]) -> tuple[Mapped, ...]:
-    """Take objects in order as long as they fit a frame."""
+def _fill(entries: Iterable[Mapped], room: int) -> tuple[Mapped, ...]:
+    """Take objects in order as long as they fit a frame and its mapping."""
     taken: list[Mapped] = []
     for entry in entries:
-        if sum(one.bits for one in taken) + entry.bits <= 8 * MAX_BYTES:
+        if len(taken) < room and sum(one.bits for one in (*taken, entry)) <= 8 * MAX_BYTES:
             taken.append(entry)
     return tuple(taken)

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
-from legbench.drives.protocol.datatypes import FORMATS, range_of, size_of
+from legbench.drives.protocol.datatypes import FORMATS, DataType, range_of, resized, size_of
 from legbench.drives.protocol.frame import COB_INVALID, COB_MASK
 from legbench.drives.protocol.objects import PDO_COUNT, Access, Key
 from legbench.drives.protocol.sdo import Abort
@@ -48,7 +48,7 @@ def _written(
         known = any(index == parameter.index for index, _ in sheet.objects)
         return (Abort.NO_SUB_INDEX if known else Abort.NO_OBJECT), None
     there = sheet.default(key, node.node_id)
-    if size_of(entry.kind) != size_of(parameter.kind) or entry.kind not in FORMATS:
+    if not _fits(entry.kind, parameter):
         return Abort.TYPE_LENGTH, None
     if entry.access in (Access.RO, Access.CONST):
         return Abort.READ_ONLY, parameter.value if there is None else there
@@ -60,6 +60,16 @@ def _written(
         if low <= value <= high:
             return None, value
     return (Abort.TOO_HIGH if parameter.value > high else Abort.TOO_LOW), there
+
+
+def _fits(kind: DataType, parameter: Parameter) -> bool:
+    """Whether an object takes a value, in a length of its own where it has another one."""
+    size = size_of(kind)
+    own = None if size is None or kind not in FORMATS else resized(parameter.kind, size)
+    if own is None:
+        return False
+    low, high = range_of(own)
+    return size == size_of(parameter.kind) or low <= parameter.value <= high
 
 
 def _is_mapping(parameter: Parameter) -> bool:

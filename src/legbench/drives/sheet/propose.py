@@ -12,14 +12,17 @@ from legbench.drives.setup.config import (
     TARGET_POSITION,
     PdoConfig,
 )
+from legbench.drives.sheet.assess import unfit
 from legbench.drives.sheet.candidates import link_candidates, temperature_candidates
 from legbench.drives.sheet.data_sheet import DataSheet
-from legbench.drives.sheet.mapping import choose
+from legbench.drives.sheet.mapping import choose, obstacles
 from legbench.errors import ConfigError
 
 ONE_ENCODER = "none"
 """Word that stands for no second encoder, where an object is asked for."""
 TORQUE = (0x6077, 0)
+LEAST = 2
+"""Fewest objects that a drive takes, and answers, in every cycle."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,28 +58,50 @@ def propose(sheet: DataSheet, eds: str, link: Mapped | str | None = None) -> Pro
     Raises:
         ConfigError: the drive cannot carry the process data of a leg; the message names the object.
     """
-    links = link_candidates(sheet)
-    shown = link if isinstance(link, Mapped) else None
-    if link is None and links:
-        shown = links[0]
-    if shown is not None and not sheet.has(shown.key):
-        raise ConfigError(f"{sheet.name}: {shown} is missing; name another object with --link")
+    links, torque = link_candidates(sheet), _torque(sheet)
+    if isinstance(link, Mapped):
+        if not sheet.has(link.key):
+            raise ConfigError(f"{sheet.name}: {link} is missing; name another object with --link")
+        seconds: tuple[Mapped | None, ...] = (link,)
+    else:
+        # A drive that cannot send a second position is one with one encoder.
+        seconds = (*(links if link is None else ()), *((torque,) if torque else ()), None)
     motor, target = _typed(sheet, POSITION_ACTUAL), _typed(sheet, TARGET_POSITION)
-    second = shown or _torque(sheet)
-    answers = (STATUSWORD, motor) if second is None else (STATUSWORD, motor, second)
+    if motor.bits == target.bits:
+        # The same bits on the wire; a sheet that tells two signs is wrong in one.
+        motor = Mapped(*motor.key, target.kind)
+    rpdos = _carried(sheet, (CONTROLWORD, target), commands=True)
+    second, tpdos = _answers(sheet, (STATUSWORD, motor), seconds)
     temperatures = temperature_candidates(sheet)
     return Proposal(
         sheet=sheet,
         eds=eds,
-        rpdos=_carried(sheet, (CONTROLWORD, target), commands=True),
-        tpdos=_carried(sheet, answers, commands=False),
+        rpdos=rpdos,
+        tpdos=tpdos,
         motor=motor,
         target=target,
-        link=shown,
+        link=None if second == torque else second,
         links=links,
-        torque=_torque(sheet) if shown is None else None,
+        torque=None if second != torque else torque,
         temperature=temperatures[0] if temperatures else None,
     )
+
+
+def _answers(
+    sheet: DataSheet, always: tuple[Mapped, ...], seconds: Sequence[Mapped | None]
+) -> tuple[Mapped | None, tuple[PdoConfig, ...]]:
+    """Return the first second object that can be sent with the others, and the TPDOs for it.
+
+    Raises:
+        ConfigError: none can.
+    """
+    for second in seconds:
+        needed = always if second is None else (*always, second)
+        chosen = choose(sheet, needed, commands=False)
+        if chosen is not None:
+            return second, chosen
+    last = seconds[-1]
+    return last, _carried(sheet, always if last is None else (*always, last), commands=False)
 
 
 def _typed(sheet: DataSheet, usual: Mapped) -> Mapped:
@@ -99,10 +124,13 @@ def _carried(
     chosen = choose(sheet, needed, commands=commands)
     if chosen is not None:
         return chosen
-    numbers, words = sheet.pdos(commands=commands), "RPDOs" if commands else "TPDOs"
+    reasons = unfit(sheet)
+    if reasons:
+        raise ConfigError(f"{sheet.name}: {reasons[0]}")
+    words = "RPDO" if commands else "TPDO"
+    told = "; ".join(obstacles(sheet, commands=commands)) or f"it has no {words}"
+    fewer = f"--link {ONE_ENCODER} needs fewer, or " if len(needed) > LEAST else ""
     raise ConfigError(
-        f"{sheet.name}: its {len(numbers)} {words} cannot carry "
-        f"{', '.join(map(str, needed))} at every SYNC: they are fixed otherwise, or too few; name "
-        f"another link object with --link, or --link {ONE_ENCODER}, or map them with the maker's "
-        "tool"
+        f"{sheet.name}: its {words}s cannot carry {', '.join(map(str, needed))} at every SYNC "
+        f"({told}); {fewer}map them with the maker's tool and take its DCF, or take another drive"
     )

@@ -36,19 +36,27 @@ class Sections:
 
 
 def decode(content: bytes) -> str:
-    """Return the text of a data sheet: UTF-8 or UTF-16 with a mark, UTF-8, else Latin-1.
+    """Return the text of a data sheet: UTF-16 or UTF-8, with a mark or without, else Latin-1.
 
     Raises:
-        UnreadableError: it is no text.
+        UnreadableError: it is no text, or XML.
     """
     try:
         if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
-            return content.decode("utf-16")
-        text = content.decode("utf-8-sig")
+            text = content.decode("utf-16")
+        elif b"\0" in content[:2]:
+            text = content.decode("utf-16-be" if content[:1] == b"\0" else "utf-16-le")
+        else:
+            text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
         text = content.decode("latin-1")
     if "\0" in text:
         raise UnreadableError("is no text: it holds zero bytes; is it a data sheet?")
+    if text.lstrip().startswith("<"):
+        raise UnreadableError(
+            "is XML, as XDD, XDC and ESI files are; ask the maker for the EDS of the drive's CAN "
+            "version"
+        )
     return text
 
 
