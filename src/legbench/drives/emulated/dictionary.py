@@ -55,8 +55,9 @@ def dictionary_of(
 ) -> Dictionary:
     """Return the objects of one node: those of a data sheet, else those of the usual drive.
 
-    A drive that lacks 60C2h interpolates over the period of SYNC [us], and one whose mode cannot be
-    chosen (6060h) has cyclic synchronous position mode alone.
+    A drive that lacks 60C2h, or has it fixed to what nobody tells, interpolates over the period of
+    SYNC [us], and one whose mode cannot be chosen (6060h) has cyclic synchronous position mode
+    alone.
     """
     own = dict(_identity(node))
     if sheet is None:
@@ -66,6 +67,13 @@ def dictionary_of(
         )
     if not sheet.has(MODE):
         own[MODE_DISPLAY] = CYCLIC
+    value, exponent = interpolation_time(period_us)
+    own_way = {CYCLE: value, CYCLE_INDEX: exponent, MODE: CYCLIC, MODE_DISPLAY: CYCLIC}
+    own |= {
+        key: own_way[key]
+        for key in (CYCLE, CYCLE_INDEX)
+        if sheet.has(key) and not sheet.writable(key) and key not in sheet.given
+    }
     for key in sheet.relative:
         entry = sheet.objects[key]
         own.setdefault(key, _number(entry) + node.node_id)
@@ -76,8 +84,6 @@ def dictionary_of(
     )
     shown = {entry.key for entry in entries if isinstance(entry.default, int)}
     hidden = {key: _number(entry) for key, entry in OBJECTS.items() if key not in shown}
-    value, exponent = interpolation_time(period_us)
-    own_way = {CYCLE: value, CYCLE_INDEX: exponent, MODE: CYCLIC, MODE_DISPLAY: CYCLIC}
     hidden |= {key: own_way[key] for key in own_way if key not in shown}
     warmth = node.temperature_object
     return Dictionary(

@@ -19,7 +19,7 @@ from legbench.drives.protocol.cia402 import POWERED, Mode, decode_state
 from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.emcy import MEANINGS
 from legbench.drives.protocol.nmt import NmtCommand, nmt_frame
-from legbench.drives.protocol.sdo import ABSENT
+from legbench.drives.protocol.sdo import ABSENT, Abort
 from legbench.drives.setup.config import BusConfig, Identity, NodeConfig
 from legbench.drives.setup.configuration import configuration
 from legbench.drives.setup.outcome import ObjectOutcome
@@ -205,7 +205,13 @@ class BringUp:
         sdo, target = self.sdo(node), node.target_object
         actual = self.position(node)
         sdo.put(target.index, target.sub, target.kind, actual)
-        if sdo.get_int(target.index, target.sub, target.kind) != actual:
+        try:
+            there = sdo.get_int(target.index, target.sub, target.kind)
+        except SdoAbortError as error:
+            if error.code != Abort.WRITE_ONLY:
+                raise
+            there = actual  # It was taken, and nobody can say more.
+        if there != actual:
             raise DriveError(
                 f"node {node.node_id} ('{node.name}') does not take a target position by SDO"
             )

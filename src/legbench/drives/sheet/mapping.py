@@ -42,12 +42,15 @@ def choose(
         for number in numbers
         if not rooms[number]
         and (entries := _fixed(sheet, number, needed, commands=commands)) is not None
+        and any(entry in needed for entry in entries)
     }
     usable = [number for number in numbers if rooms[number] or number in fixed]
     for size in range(1, MOST_USED + 1):
         for subset in combinations(usable, size):
             chosen = _packed(needed, subset, fixed, rooms)
             if chosen is not None:
+                if not commands:
+                    chosen |= _always_on(sheet, numbers, needed, chosen)
                 return tuple(
                     _pdo(sheet, number, entries, commands=commands)
                     for number, entries in sorted(chosen.items())
@@ -97,6 +100,8 @@ def _obstacle(sheet: DataSheet, number: int, *, commands: bool) -> str | None:
         own = (comm, 1) in sheet.relative
         if not own or cob & ~COB_NO_REMOTE != base[number - 1]:
             return f"{comm:04X}h:01 is fixed to {cob:08X}h{' and the node id' if own else ''}"
+    if not sheet.has((comm, 2)):
+        return f"{comm:04X}h:02 is missing, the transmission type"
     kind = sheet.default((comm, 2), 0)
     if sheet.writable((comm, 2)) or kind is None:
         return None
@@ -122,8 +127,28 @@ def _fixed(
         if entry.bits != bits or (commands and not (entry in needed or index in HARMLESS)):
             return None
         entries.append(entry)
-    carries = any(entry in needed for entry in entries)
-    return tuple(entries) if carries else None
+    return tuple(entries)
+
+
+def _always_on(
+    sheet: DataSheet,
+    numbers: Iterable[int],
+    needed: Sequence[Mapped],
+    chosen: Mapping[int, tuple[Mapped, ...]],
+) -> dict[int, tuple[Mapped, ...]]:
+    """Return the other TPDOs that cannot be switched off, and what they are fixed to.
+
+    They are sent in any case, so the bus file has to name them; one that repeats what is needed
+    would leave open which of the two counts.
+    """
+    return {
+        number: entries
+        for number in numbers
+        if number not in chosen
+        and sheet.stays_on(0x1800 + number - 1)
+        and (entries := _fixed(sheet, number, needed, commands=False))
+        and not any(entry in needed for entry in entries)
+    }
 
 
 def _packed(
