@@ -17,6 +17,7 @@ from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.errors import DriveError
 from legbench.drives.master.session import Session
 from legbench.drives.protocol.datatypes import DataType
+from legbench.drives.protocol.objects import Key
 from legbench.drives.protocol.pdo import Mapped
 from legbench.drives.setup.bus_file import load_bus
 from legbench.drives.setup.config import (
@@ -119,8 +120,35 @@ QUIRKS: dict[str, Callable[[Sheet], object]] = {
         },
         "rw",
     ),
+    "numbers longer than the profile's": lambda it: _sized(
+        it,
+        {
+            DataType.INTEGER16: ((0x6060, 0), (0x6061, 0), (0x60C2, 2)),
+            DataType.UNSIGNED16: ((0x60C2, 1), (0x607E, 0), (0x1029, 1), (0x1400, 2)),
+            U32: ((0x1017, 0), (0x1400, 5), (0x1018, 1)),
+            I32: ((0x60B2, 0), (0x605A, 0)),
+        },
+    ),
+    "numbers shorter than the profile's": lambda it: _sized(
+        it,
+        {
+            DataType.INTEGER8: ((0x605A, 0), (0x6007, 0), (0x60B0, 0)),
+            DataType.UNSIGNED16: ((0x1006, 0), (0x6065, 0), (0x1018, 2)),
+        },
+    ),
+    "signs that are wrong": lambda it: _sized(
+        it, {U8: ((0x6060, 0), (0x6061, 0)), DataType.UNSIGNED16: ((0x605E, 0), (0x6007, 0))}
+    ),
     "fixed times": lambda it: it.fixed({(0x1017, 0): "30", (0x1006, 0): "0"}),
 }
+
+
+def _sized(it: Sheet, kinds: dict[DataType, tuple[Key, ...]]) -> Sheet:
+    """Objects of other types."""
+    for kind, keys in kinds.items():
+        for key in keys:
+            it.entries[key].kind = int(kind)
+    return it
 
 
 def _pdo(it: Sheet, number: int) -> Sheet:

@@ -40,6 +40,8 @@ SPELLINGS: dict[str, Callable[[str], bytes]] = {
     "CR alone": lambda text: text.replace("\n", "\r").encode(),
     "UTF-8 with a mark": lambda text: text.encode("utf-8-sig"),
     "UTF-16": lambda text: text.encode("utf-16"),
+    "UTF-16 without a mark": lambda text: text.encode("utf-16-le"),
+    "UTF-16, high bytes first": lambda text: text.encode("utf-16-be"),
     "Latin-1": lambda text: text.replace("Fremdwerk", "Fremdw\xe4rme").encode("latin-1"),
     "cases turned round": lambda text: lowered(text).encode(),
     "Sub": lambda text: text.replace("sub", "Sub").encode(),
@@ -202,6 +204,7 @@ def test_numbers_may_be_added_to_the_node_id() -> None:
     [
         (b"", "has no section such as"),
         (b"\x7fELF\0\0\0", "is no text"),
+        (b"\xef\xbb\xbf <?xml version='1.0'?>\n<x>[1]</x>", "is XML, as XDD, .*ask the maker for"),
         (b"[FileInfo]\nFileName=x\n", "describes no object"),
         (b"[1000]\nParameterName=x\n", "describes no object"),
         (b"[1000]\nDataType=7\n" * (MOST_SECTIONS + 1), "sections, the limit"),

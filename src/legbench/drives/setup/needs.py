@@ -24,6 +24,8 @@ SLOWEST = 2
 """Factor by which a drive may stretch a time that it rounds; a watch waits for three periods."""
 ROUNDED = 1.1
 """Factor by which a drive may weaken a limit that it rounds."""
+BY_THE_MAKER = "set it with the maker's tool, and store it"
+"""Way out where a drive keeps a value that is another than the one of this table."""
 NEAR_COUNTS = 16
 """Furthest that a drive may move a position that it rounds [counts]."""
 
@@ -57,7 +59,7 @@ class NeedRow:
     what is wanted. A value that is there has to agree all the same."""
     agrees: Agrees = _same
     way: str = ""
-    """Way out where the drive holds another value and keeps it."""
+    """Way out where the drive keeps another value; by default `BY_THE_MAKER`."""
     fallbacks: Mapping[int, tuple[int, ...]] = field(default_factory=dict)
     """Wanted value -> values to try in turn where the drive refuses it."""
 
@@ -127,12 +129,8 @@ def _brakes(wanted: int, there: int) -> bool:
 
 
 _REQUIRED, _PROTECTION, _OPTIONAL = Need.REQUIRED, Need.PROTECTION, Need.OPTIONAL
-_TOOL = "set it with the maker's tool, and store it"
 _OFFSET = NeedRow(
-    need=_REQUIRED,
-    purpose="an offset of every target, which must be 0",
-    may_lack=True,
-    way=_TOOL,
+    need=_REQUIRED, purpose="an offset of every target, which must be 0", may_lack=True
 )
 _RAMP = NeedRow(
     need=_PROTECTION,
@@ -152,7 +150,7 @@ _CYCLE = NeedRow(
     instead="the time that its maker has set; it must be that of SYNC",
     may_lack=True,
     way="give that time as period_us (a shorter period carries fewer objects: learn --link none), "
-    f"or {_TOOL}",
+    f"or {BY_THE_MAKER}",
 )
 _LIMP = "the drive's own choice, which may be no torque at all; no stop from here asks for it"
 TABLE: Mapping[Key, NeedRow] = {
@@ -161,7 +159,6 @@ TABLE: Mapping[Key, NeedRow] = {
         purpose="SYNC from the master, with identifier 80h",
         may_lack=True,
         agrees=_sync,
-        way=_TOOL,
     ),
     (0x1006, 0): NeedRow(
         need=_PROTECTION,
@@ -198,7 +195,6 @@ TABLE: Mapping[Key, NeedRow] = {
         instead="the standard's default, 2",
         may_lack=True,
         agrees=_brakes,
-        way=_TOOL,
         fallbacks={2: (6,), 1: (5,)},
     ),
     (0x605B, 0): NeedRow(need=_OPTIONAL, purpose="braking at shutdown", instead=_LIMP),
@@ -222,7 +218,7 @@ TABLE: Mapping[Key, NeedRow] = {
         purpose="the choice of cyclic synchronous position mode",
         instead="the mode that it is in, by 6061h",
         may_lack=True,
-        way=f"{_TOOL}, or take another drive",
+        way=f"{BY_THE_MAKER}, or take another drive",
     ),
     (0x6065, 0): NeedRow(
         need=_PROTECTION,
@@ -243,12 +239,7 @@ TABLE: Mapping[Key, NeedRow] = {
     ),
     (0x607D, 1): _SOFT,
     (0x607D, 2): _SOFT,
-    (0x607E, 0): NeedRow(
-        need=_REQUIRED,
-        purpose="the polarity, which must be 0, as the signs of the bus file turn the motor",
-        may_lack=True,
-        way=_TOOL,
-    ),
+    (0x607E, 0): NeedRow(need=_REQUIRED, purpose="the polarity, which must be 0", may_lack=True),
     (0x6084, 0): _RAMP,
     (0x6085, 0): _RAMP,
     (0x60B0, 0): _OFFSET,

@@ -6,7 +6,7 @@ from fractions import Fraction
 
 from legbench.drives.protocol.objects import Key, name_of
 from legbench.drives.protocol.sdo import ABSENT, LENGTHS, MEANINGS, Abort
-from legbench.drives.setup.needs import Need, NeedRow, row_of
+from legbench.drives.setup.needs import BY_THE_MAKER, TABLE, Need, NeedRow, row_of
 from legbench.drives.setup.parameters import PDO_OBJECTS, Parameter
 
 MISSING = (Abort.NO_OBJECT, Abort.NO_SUB_INDEX)
@@ -77,7 +77,7 @@ class ObjectOutcome:
         """Reason for which the drive cannot be used, and the way out."""
         if self.row.need is Need.PROTECTION:
             return f"{self.row.purpose}: give a value and a type that the drive takes"
-        way = self.row.way
+        way = self.row.way or (BY_THE_MAKER if self.parameter.key in TABLE else "")
         if self.parameter.index in PDO_OBJECTS:
             way = "map its objects into the PDOs that the drive has, in the way that it has them"
         return f"it is required: {self.row.purpose}{': ' if way else ''}{way}"

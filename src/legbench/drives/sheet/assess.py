@@ -234,7 +234,8 @@ def _object_problems(sheet: DataSheet, entry: Mapped) -> Iterator[str]:
     elif known.kind is entry.kind or (entry.index in CYCLIC and _as_long(known.kind, entry)):
         return
     elif entry.index in CYCLIC and known.kind not in FORMATS:
-        yield f"{name_of(*entry.key)} is of type {short_name(known.kind)}, no whole number; another drive"
+        kind = short_name(known.kind)
+        yield f"{name_of(*entry.key)} is of type {kind}, no whole number; another drive"
     else:
         yield (
             f"{name_of(*entry.key)} is of type {short_name(known.kind)}, the bus file says "

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import takewhile
 
 from legbench.drives.protocol.datatypes import FORMATS, DataType, range_of, resized, size_of
 from legbench.drives.protocol.frame import COB_INVALID, COB_MASK
@@ -83,10 +84,12 @@ def _fitting(sheet: DataSheet, parameter: Parameter, index: int) -> Parameter:
 
 
 def _beyond(sheet: DataSheet, node: NodeConfig, known: set[int]) -> Iterator[Parameter]:
-    """Yield the PDOs beyond the fourth that are on at power-on, as they are switched off."""
-    for indices, commands in ((RPDOS, True), (TPDOS, False)):
-        for number in sheet.pdos(commands=commands)[PDO_COUNT:]:
-            index = indices[number - 1]
+    """Yield the PDOs beyond the fourth that are on at power-on, as they are switched off.
+
+    They are looked for in a row, and the first that is missing ends the search.
+    """
+    for indices in (RPDOS, TPDOS):
+        for index in takewhile(lambda each: sheet.has((each, 1)), indices[PDO_COUNT:]):
             cob = sheet.default((index, 1), node.node_id) or 0
             if index not in known and not cob & COB_INVALID:
                 kind = sheet.objects[index, 1].kind

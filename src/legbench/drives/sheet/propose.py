@@ -62,6 +62,10 @@ def propose(sheet: DataSheet, eds: str, link: Mapped | str | None = None) -> Pro
     if isinstance(link, Mapped):
         if not sheet.has(link.key):
             raise ConfigError(f"{sheet.name}: {link} is missing; name another object with --link")
+        if link.key == POSITION_ACTUAL.key:
+            raise ConfigError(
+                f"{sheet.name}: {link} is the motor's own position; name another object with --link"
+            )
         seconds: tuple[Mapped | None, ...] = (link,)
     else:
         # A drive that cannot send a second position is one with one encoder.

@@ -1,0 +1,263 @@
+"""Data sheets as makers write them: what is left out or cannot be meant costs no drive."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from eds_texts import Sheet, stranger
+from test_data_sheet_judging import bus_of, learned_by, really
+
+from legbench.commissioning.learn import learn
+from legbench.drives.emulated.build import emulate
+from legbench.drives.emulated.bus import LockstepBus
+from legbench.drives.errors import DriveError, SdoAbortError
+from legbench.drives.master.session import Session
+from legbench.drives.protocol.datatypes import DataType
+from legbench.drives.protocol.objects import Key
+from legbench.drives.protocol.pdo import Mapped
+from legbench.drives.protocol.sdo import Abort
+from legbench.drives.sheet.data_sheet import DataSheet
+from legbench.drives.sheet.load import sheet_of
+from legbench.drives.sheet.propose import propose
+from legbench.errors import ConfigError
+
+RPDO, TPDO = ("0x60400010", "0x607A0020"), ("0x60410010", "0x60640020")
+
+
+def read(text: str) -> DataSheet:
+    return sheet_of(text.encode(), "it.eds")
+
+
+def mapped(sheet: Sheet, mapping: int, words: tuple[str, ...], access: str = "rw") -> None:
+    """Map objects into a PDO at power-on."""
+    sheet.entries[mapping, 0].default = str(len(words))
+    for sub in range(9):
+        sheet.entries[mapping, sub].access = access
+    for sub, word in enumerate(words, 1):
+        sheet.entries[mapping, sub].default = word
+
+
+def test_identifiers_without_the_node_id_count_from_it() -> None:
+    # CiA 301, 7.3.5: 200h is RPDO1 of no node; 300h is none of RPDO3.
+    cases: dict[Key, tuple[str, int, bool]] = {
+        (0x1014, 0): ("0x80", 0x85, True),
+        (0x1400, 1): ("0x200", 0x205, True),
+        (0x1401, 1): ("0x301", 0x301, False),
+        (0x1402, 1): ("0x300", 0x300, False),
+        (0x1403, 1): ("$NODEID+0x501", 0x506, True),
+        (0x1801, 1): ("0xC0000280", 0xC0000285, True),
+    }
+    for access in ("rw", "const"):
+        it = stranger().fixed({key: told for key, (told, _, _) in cases.items()}, access)
+        sheet = read(it.text())
+        for key, (_, own, relative) in cases.items():
+            assert sheet.default(key, 5) == own
+            assert (key in sheet.relative) is relative
+        told = "3 identifiers count from the node id, though they do not say so"
+        assert sheet.remarks == (told,)
+    # Two drives whose data sheet tells no identifier do not share that of SYNC.
+    it.entries[0x1014, 0].default = None
+    assert (0x1014, 0) in read(it.text()).relative
+
+
+def test_a_configured_device_holds_what_was_configured() -> None:
+    head = "[DeviceComissioning]\nNodeID=5\n\n"
+    text = stranger().text()
+    for default, configured, other in (
+        ("DefaultValue=$NODEID+0x80000200", "ParameterValue=0x205", 0x202),
+        ("DefaultValue=0x80000200", "ParameterValue=$NODEID+0x280", 0x282),
+        ("DefaultValue=$NODEID+0x80000200", "ParameterValue=", 0x80000202),
+        ("DefaultValue=$NODEID+0x80000200", "ParameterValue=0x307", 0x307),
+    ):
+        own = text.replace("DefaultValue=$NODEID+0x80000200", f"{default}\n{configured}")
+        assert own != text
+        assert read(head + own).default((0x1400, 1), 2) == other
+
+
+def test_limits_that_cannot_be_meant_are_none() -> None:
+    cases: dict[Key, tuple[str, tuple[str, str], tuple[int, int] | None]] = {
+        (0x60C2, 2): ("-3", ("-128", "63"), (-128, 63)),
+        (0x6061, 0): ("-3", ("0x80", "0x3F"), (-128, 63)),
+        (0x6098, 0): ("-3", ("0", "100"), None),
+        (0x6060, 0): ("0", ("0", "0xFFFFFFFF"), None),
+        (0x1017, 0): ("5000", ("0", "1000"), None),
+        (0x1029, 1): ("0", ("-1", "2"), None),
+        # Often 0 says that nothing is set.
+        (0x6085, 0): ("0", ("1", "65500"), (1, 65500)),
+        # An identifier is switched off by bit 31.
+        (0x1400, 1): ("$NODEID+0x200", ("0x181", "0x57F"), None),
+        (0x1401, 1): ("$NODEID+0x300", ("0", "0x80000000"), None),
+        (0x1402, 1): ("$NODEID+0x400", ("0", "0xFFFFFFFF"), (0, 0xFFFFFFFF)),
+        # These are none to begin with.
+        (0x6072, 0): ("5", ("0", "0"), None),
+    }
+    sheet = stranger()
+    for key, (default, limits, _) in cases.items():
+        sheet.entries[key].default, sheet.entries[key].limits = default, limits
+    found = read(sheet.text())
+    assert {key: found.limits.get(key) for key in cases} == {
+        key: kept for key, (_, _, kept) in cases.items()
+    }
+    assert found.remarks == ("6 objects have limits that cannot be meant; they were left out",)
+
+
+def test_a_record_without_its_sub_index_0_has_got_one() -> None:
+    text = stranger().text()
+    bare = re.sub(r"\[(1018|1400|1600|1A00|60C2)sub0\]\n[^\[]*", "", text)
+    sheet, whole = read(bare), read(text)
+    assert set(sheet.objects) == set(whole.objects)
+    for number, commands in ((1, True), (1, False)):
+        assert sheet.room(number, commands=commands) == whole.room(number, commands=commands)
+    assert sheet.mapped(1, commands=True) == whole.mapped(1, commands=True)
+    assert sheet.default((0x1018, 0), 0) == 4
+    assert "5 objects without their sub-index 0 have got one" in sheet.remarks
+
+
+def test_an_object_can_be_mapped_unless_its_sheet_denies_it() -> None:
+    mute = read(stranger().text().replace("PDOMapping=1\n", ""))
+    assert mute.objects[0x607A, 0].mappable
+    assert not mute.objects[0x607D, 1].mappable
+    denied = stranger()
+    denied.entries[0x607A, 0].mappable = False
+    assert not read(denied.text()).objects[0x607A, 0].mappable
+    # It stands in a mapping, so it can be mapped.
+    mapped(denied, 0x1602, RPDO)
+    assert read(denied.text()).objects[0x607A, 0].mappable
+
+
+def two_entries(it: Sheet) -> None:
+    it.without(
+        0x60E4, *((mapping, sub) for mapping in range(0x1A00, 0x1A04) for sub in range(3, 9))
+    )
+
+
+def no_second(it: Sheet) -> None:
+    mapped(it, 0x1A00, TPDO, "ro")
+    it.without(0x1801, 0x1802, 0x1803, 0x1A01, 0x1A02, 0x1A03)
+
+
+def always_on(it: Sheet) -> None:
+    mapped(it, 0x1A01, ("0x606C0020",), "ro")
+    it.fixed({(0x1801, 1): "$NODEID+0x280"})
+
+
+@pytest.mark.parametrize(
+    ("change", "tpdos"),
+    [
+        (two_entries, [(1, 2), (2, 1)]),
+        (no_second, [(1, 2)]),
+        (always_on, [(1, 2), (2, 1), (3, 1)]),
+    ],
+)
+def test_process_data_are_packed_as_the_drive_can_carry_them(
+    change: Callable[[Sheet], None], tpdos: list[tuple[int, int]], tmp_path: Path
+) -> None:
+    sheet = stranger()
+    change(sheet)
+    bus = learned_by(tmp_path, sheet)
+    assert [(pdo.number, len(pdo.objects)) for pdo in bus.nodes[0].tpdos] == tpdos
+
+
+def test_a_second_position_that_is_asked_for_is_sent_or_refused() -> None:
+    sheet = stranger()
+    no_second(sheet)
+    asked = Mapped(0x60E4, 1, DataType.INTEGER32)
+    with pytest.raises(
+        ConfigError, match=r"60E4h:01 at .*TPDO1: fixed to 6041h:00, 6064h:00\); --link none"
+    ):
+        propose(read(sheet.text()), "it.eds", asked)
+    with pytest.raises(ConfigError, match="6064h:00 is the motor's own position"):
+        propose(read(stranger().text()), "it.eds", Mapped(0x6064, 0, DataType.INTEGER32))
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({(0x1400 + n, 2): "255" for n in range(4)}, r"RPDO1: 1400h:02 is fixed to 255, it does"),
+        ({(0x1400 + n, 1): "0x80000000" for n in range(4)}, "RPDO2: 1401h:01 is fixed to 80000000"),
+        ({(0x1600 + n, 0): "0" for n in range(4)}, r"RPDO4: fixed to nothing\); map them with the"),
+    ],
+)
+def test_a_refusal_says_what_every_pdo_is_fixed_to(changes: dict[Key, str], words: str) -> None:
+    sheet = stranger().fixed(changes)
+    with pytest.raises(ConfigError, match=r"^it\.eds: its RPDOs cannot carry 6040h") as caught:
+        propose(read(sheet.text()), "it.eds")
+    assert re.search(words, str(caught.value))
+    assert "another drive" in str(caught.value)
+
+
+def test_a_refusal_says_how_many_objects_a_pdo_has_room_for() -> None:
+    sheet = stranger().without(0x1401, 0x1402, 0x1403).fixed({(0x1600, 2): "0"})
+    with pytest.raises(ConfigError, match=r"\(RPDO1: room for 1 objects\); map them"):
+        propose(read(sheet.text()), "it.eds")
+
+
+def test_what_is_no_drive_is_refused_as_that(tmp_path: Path) -> None:
+    box = stranger()
+    box.without(*(index for index, _ in list(box.entries) if index >= 0x6000 or index < 0x1000))
+    for sheet, words in (
+        (box, r"^'motor1', 'motor2': 6040h, 6041h, 6061h, 6064h, 607Ah are missing: it is no CiA"),
+        (stranger().fixed({(0x1000, 0): "0x191"}), "1000h:00 is 00000191h: .*another drive$"),
+        (stranger().without(0x6061), "6061h:00 .*: another drive, or a complete data sheet$"),
+    ):
+        (tmp_path / "it.eds").write_text(sheet.text(), encoding="utf-8")
+        problems = learn(tmp_path / "it.eds", tmp_path / "leg.toml").problems
+        assert re.search(words, problems[0])
+        # One line a reason, however many drives there are.
+        assert sum(problems[0][20:] in problem for problem in problems) == 1
+    with pytest.raises(ConfigError, match="are missing: it is no CiA 402 drive"):
+        propose(read(box.without(*range(0x1400, 0x1404)).text()), "it.eds")
+
+
+def test_a_number_is_written_and_read_in_the_length_that_the_drive_has(tmp_path: Path) -> None:
+    sheet = stranger()
+    kinds = {(0x6085, 0): DataType.UNSIGNED16, (0x60B0, 0): DataType.INTEGER8}
+    kinds |= {(0x6060, 0): DataType.INTEGER32, (0x60B2, 0): DataType.INTEGER64}
+    for key, kind in kinds.items():
+        sheet.entries[key].kind = int(kind)
+    (tmp_path / "it.eds").write_text(sheet.text(), encoding="utf-8")
+    bus = bus_of(tmp_path / "it.eds")
+    with Session(LockstepBus("it", network=emulate(bus)), bus) as session:
+        sdo = session.bring_up().sdo(bus.nodes[0])
+        for index, kind, value, content in (
+            (0x6085, DataType.UNSIGNED32, 65_535, "ffff"),
+            (0x60B0, DataType.INTEGER32, -5, "fb"),
+            (0x60B0, DataType.INTEGER32, 127, "7f"),
+            (0x6060, DataType.INTEGER8, 8, "08000000"),
+            (0x60B2, DataType.INTEGER16, -300, "d4feffffffffffff"),
+        ):
+            sdo.put(index, 0, kind, value)
+            assert sdo.read(index, 0).hex() == content
+            assert sdo.get_int(index, 0, kind) == value
+        for index, kind, value in (
+            (0x6085, DataType.UNSIGNED32, 65_536),
+            (0x60B0, DataType.INTEGER32, 128),
+            (0x60B0, DataType.REAL32, 1),
+        ):
+            with pytest.raises(SdoAbortError) as caught:
+                sdo.put(index, 0, kind, value)
+            assert caught.value.code == Abort.TOO_LONG
+        # What is beyond the type is no padding.
+        sdo.put(0x60B2, 0, DataType.INTEGER64, 70_000)
+        with pytest.raises(DriveError, match="8 bytes are no INTEGER16"):
+            sdo.get_int(0x60B2, 0, DataType.INTEGER16)
+
+
+def test_a_value_that_is_fixed_and_not_told_is_as_wanted(tmp_path: Path) -> None:
+    sheet = stranger()
+    for sub in (1, 2):
+        sheet.entries[0x60C2, sub].access, sheet.entries[0x60C2, sub].default = "ro", None
+    (tmp_path / "it.eds").write_text(sheet.text(), encoding="utf-8")
+    assert all(one.passes for one in really(bus_of(tmp_path / "it.eds")))
+
+
+def test_a_target_that_cannot_be_read_is_taken_at_its_word(tmp_path: Path) -> None:
+    sheet = stranger()
+    sheet.entries[0x607A, 0].access = "wo"
+    (tmp_path / "it.eds").write_text(sheet.text(), encoding="utf-8")
+    bus = bus_of(tmp_path / "it.eds")
+    network = emulate(bus)
+    with Session(LockstepBus("it", network=network), bus) as session:
+        up = session.bring_up()
+        assert up.preload(bus.nodes[0]) == up.position(bus.nodes[0])
