@@ -80,7 +80,10 @@ def test_check_is_an_object_and_refuses_in_lines(call: Call, folder: Path) -> No
     bench = ROOT / "hardware" / "leg.toml"
     done = call("drives", "check", "--eds", folder / "it.eds", "--bus", bench)
     assert done.status == 1
-    assert "legbench: 'motor1': 2064h:00 Link position, low 16 bits [counts] is missing" in done.err
+    assert (
+        "legbench: 'motor1', 'motor2': 2064h:00 Link position, low 16 bits [counts] is missing"
+        in done.err
+    )
     done = call("drives", "check", "--bus", bench)
     assert done.status == 2
     assert "'motor1' names no data sheet; give --eds, or eds = \"FILE\" in the file" in done.err
@@ -128,7 +131,10 @@ def test_emulate_wears_a_sheet_and_says_what_the_bus_file_asks_in_vain(
     bench = ROOT / "hardware" / "leg.toml"
     done = call("drives", "emulate", "--eds", folder / "it.eds", "--bus", bench, *where)
     assert done.status == 0
-    assert "legbench: 'motor1': 2064h:00 Link position, low 16 bits [counts] is missing" in done.err
+    assert (
+        "legbench: 'motor1', 'motor2': 2064h:00 Link position, low 16 bits [counts] is missing"
+        in done.err
+    )
     done = call("drives", "emulate", "--eds", folder / "no.eds", "--bus", bench, *where)
     assert done.status == 2
     assert "no.eds: no such file" in done.err
