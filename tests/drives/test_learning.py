@@ -142,7 +142,7 @@ def test_only_a_drive_with_a_data_sheet_is_judged_by_one(monkeypatch: pytest.Mon
     sheet = Path("it.eds")
     nodes = (SimpleNamespace(name="a", eds=None), SimpleNamespace(name="b", eds=sheet))
     bus: Any = SimpleNamespace(nodes=nodes)
-    problems = SimpleNamespace(problems=("unfit", "too slow"))
+    problems = SimpleNamespace(node="b", problems=("unfit", "too slow"))
     monkeypatch.setattr(learn, "load_sheet", lambda path: f"sheet of {path}")
     monkeypatch.setattr(learn, "assess", lambda _sheet, _bus, _node: problems)
     monkeypatch.setattr(learn, "predict", lambda found, _bus, node: (found, node.name))

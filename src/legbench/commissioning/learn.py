@@ -1,7 +1,7 @@
 """Learning a drive from its data sheet, and holding a bus file against it; no drive is asked."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -172,12 +172,18 @@ def problems_of(config: BusConfig) -> tuple[str, ...]:
         MissingExtraError: canopen is not installed.
     """
     known = {path: load_sheet(path) for path in {node.eds for node in config.nodes} if path}
-    return tuple(
-        f"'{node.name}': {problem}"
-        for node in config.nodes
-        if node.eds is not None
-        for problem in assess(known[node.eds], config, node).problems
+    return _together(
+        assess(known[node.eds], config, node) for node in config.nodes if node.eds is not None
     )
+
+
+def _together(assessments: Iterable[Assessment]) -> tuple[str, ...]:
+    """Return the problems of all drives, each once, with the names of the nodes that have it."""
+    told: dict[str, list[str]] = {}
+    for one in assessments:
+        for problem in one.problems:
+            told.setdefault(problem, []).append(f"'{one.node}'")
+    return tuple(f"{', '.join(names)}: {problem}" for problem, names in told.items())
 
 
 def _parsed(text: str, folder: Path) -> BusConfig:
@@ -190,11 +196,7 @@ def _parsed(text: str, folder: Path) -> BusConfig:
 
 def _judged(config: BusConfig, sheets: Mapping[str, DataSheet], text: str) -> Learned:
     assessments = tuple(assess(sheets[node.name], config, node) for node in config.nodes)
-    told: dict[str, list[str]] = {}
-    for one in assessments:
-        for problem in one.problems:
-            told.setdefault(problem, []).append(f"'{one.node}'")
-    problems = [f"{', '.join(names)}: {problem}" for problem, names in told.items()]
+    problems = list(_together(assessments))
     if not problems:
         try:
             check_taken(config, {one.node: one.outcomes for one in assessments})

@@ -66,15 +66,11 @@ class SdoPort:
 
     def get(self, index: int, sub: int, kind: DataType) -> Value:
         """Value of an object; raises as `read` does, and DriveError for another type."""
-        transfer = self._upload(index, sub)
-        try:
-            return transfer.value(kind)
-        except CodecError as error:
-            raise DriveError(f"node {self.node_id}, {name_of(index, sub)}: {error}") from None
+        return self._decoded(self._upload(index, sub).value, index, sub, kind)
 
     def get_int(self, index: int, sub: int, kind: DataType) -> int:
-        """Value of a numeric object; raises as `get` does."""
-        value = self.get(index, sub, kind)
+        """Value of a whole number, in the drive's own length; raises as `get` does."""
+        value = self._decoded(self._upload(index, sub).widened, index, sub, kind)
         if not isinstance(value, int):
             raise DriveError(f"node {self.node_id}, {name_of(index, sub)} is no number")
         return value
@@ -122,6 +118,14 @@ class SdoPort:
         except SdoAbortError:
             return None
         return None if length == size_of(kind) else resized(kind, length)
+
+    def _decoded(
+        self, decode: Callable[[DataType], Value], index: int, sub: int, kind: DataType
+    ) -> Value:
+        try:
+            return decode(kind)
+        except CodecError as error:
+            raise DriveError(f"node {self.node_id}, {name_of(index, sub)}: {error}") from None
 
     def _upload(self, index: int, sub: int) -> Upload:
         return self._transfer(lambda: Upload(index, sub), index, sub)

@@ -85,12 +85,11 @@ class Upload(_Transfer):
         return bytes(self._got)
 
     def value(self, kind: DataType) -> Value:
-        """The object's value, from an answer of another length or without a size, too.
+        """The object's value, from a longer answer or one without a size, too.
 
-        Some drives have whole numbers in a shorter or a longer type than the standard, and some
-        answer for short ones with all four bytes of the frame. A shorter number is widened. What
-        is beyond the type is left out where no size is told; where one is, it must repeat the sign,
-        or be zero.
+        Some drives have whole numbers in a longer type than the standard, and some answer for short
+        ones with all four bytes of the frame. What is beyond the type is left out where no size is
+        told; where one is, it must repeat the sign, or be zero.
 
         Raises:
             CodecError: the bytes are none of this type.
@@ -98,17 +97,27 @@ class Upload(_Transfer):
         content, size = self.result, size_of(kind)
         if size is None or kind not in FORMATS or len(content) not in WIDTHS:
             return unpack(kind, content)
-        narrow = resized(kind, len(content))
-        if len(content) < size and narrow is not None:
-            return unpack(narrow, content)
         value = unpack(kind, content[:size])
-        beyond = len(content) - size
+        beyond = max(0, len(content) - size)
         padding = {bytes(beyond)}
         if isinstance(value, int) and value < 0:
             padding.add(b"\xff" * beyond)
         if self._sized and content[size:] not in padding:
             return unpack(kind, content)
         return value
+
+    def widened(self, kind: DataType) -> Value:
+        """The object's value, from an answer of another length: a shorter number is widened.
+
+        It is taken to have the sign of the type that is asked for, which the bus cannot tell; a
+        number that protects something is therefore read by `value`.
+
+        Raises:
+            CodecError: the bytes are none of this type.
+        """
+        length, size = len(self.result), size_of(kind)
+        narrow = resized(kind, length) if size is not None and length < size else None
+        return self.value(kind if narrow is None else narrow)
 
     def feed(self, data: bytes) -> Progress:
         """Take a reply.
