@@ -167,6 +167,9 @@ def test_a_second_position_that_is_asked_for_is_sent_or_refused() -> None:
         ConfigError, match=r"60E4h:01 at .*TPDO1: fixed to 6041h:00, 6064h:00\); --link none"
     ):
         propose(read(sheet.text()), "it.eds", asked)
+    short = stranger().add((0x607A, 0), DataType.INTEGER16, "rw")
+    with pytest.raises(ConfigError, match=r"6064h:00 has 32 bits, 607Ah:00 has 16: both need"):
+        propose(read(short.text()), "it.eds")
     with pytest.raises(ConfigError, match="6064h:00 is the motor's own position"):
         propose(read(stranger().text()), "it.eds", Mapped(0x6064, 0, DataType.INTEGER32))
 
@@ -246,8 +249,8 @@ def test_a_number_is_written_and_read_in_the_length_that_the_drive_has(tmp_path:
 
 def test_a_value_that_is_fixed_and_not_told_is_as_wanted(tmp_path: Path) -> None:
     sheet = stranger()
-    for sub in (1, 2):
-        sheet.entries[0x60C2, sub].access, sheet.entries[0x60C2, sub].default = "ro", None
+    for key in ((0x60C2, 1), (0x60C2, 2), (0x1400, 2), (0x1017, 0), (0x605A, 0)):
+        sheet.entries[key].access, sheet.entries[key].default = "ro", None
     (tmp_path / "it.eds").write_text(sheet.text(), encoding="utf-8")
     assert all(one.passes for one in really(bus_of(tmp_path / "it.eds")))
 

@@ -96,7 +96,15 @@ def _dictionaries(bus: BusConfig) -> list[Dictionary]:
     """Return the objects of every drive; a data sheet is read once."""
     paths = {node.eds for node in bus.nodes}
     sheets = {path: None if path is None else load_sheet(path) for path in paths}
-    return [dictionary_of(node, sheets[node.eds], bus.period_us) for node in bus.nodes]
+    return [
+        dictionary_of(
+            node,
+            sheets[node.eds],
+            bus.period_us,
+            {parameter.key: parameter.value for parameter in configuration(bus, node)},
+        )
+        for node in bus.nodes
+    ]
 
 
 def emulate_channels(

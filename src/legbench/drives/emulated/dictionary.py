@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
 from legbench.drives.protocol.cia402 import Mode
 from legbench.drives.protocol.datatypes import FORMATS, DataType, pack, size_of
@@ -51,13 +52,16 @@ class Dictionary:
 
 
 def dictionary_of(
-    node: NodeConfig, sheet: DataSheet | None = None, period_us: int = 1000
+    node: NodeConfig,
+    sheet: DataSheet | None = None,
+    period_us: int = 1000,
+    wanted: Mapping[Key, int] = MappingProxyType({}),
 ) -> Dictionary:
     """Return the objects of one node: those of a data sheet, else those of the usual drive.
 
-    A drive that lacks 60C2h, or has it fixed to what nobody tells, interpolates over the period of
-    SYNC [us], and one whose mode cannot be chosen (6060h) has cyclic synchronous position mode
-    alone.
+    A drive that lacks 60C2h interpolates over the period of SYNC [us], and one whose mode cannot be
+    chosen (6060h) has cyclic synchronous position mode alone. An object that is fixed to what its
+    data sheet does not tell holds what the bus file wants of it.
     """
     own = dict(_identity(node))
     if sheet is None:
@@ -67,11 +71,9 @@ def dictionary_of(
         )
     if not sheet.has(MODE):
         own[MODE_DISPLAY] = CYCLIC
-    value, exponent = interpolation_time(period_us)
-    own_way = {CYCLE: value, CYCLE_INDEX: exponent, MODE: CYCLIC, MODE_DISPLAY: CYCLIC}
     own |= {
-        key: own_way[key]
-        for key in (CYCLE, CYCLE_INDEX)
+        key: value
+        for key, value in wanted.items()
         if sheet.has(key) and not sheet.writable(key) and key not in sheet.given
     }
     for key in sheet.relative:
@@ -84,6 +86,8 @@ def dictionary_of(
     )
     shown = {entry.key for entry in entries if isinstance(entry.default, int)}
     hidden = {key: _number(entry) for key, entry in OBJECTS.items() if key not in shown}
+    value, exponent = interpolation_time(period_us)
+    own_way = {CYCLE: value, CYCLE_INDEX: exponent, MODE: CYCLIC, MODE_DISPLAY: CYCLIC}
     hidden |= {key: own_way[key] for key in own_way if key not in shown}
     warmth = node.temperature_object
     return Dictionary(

@@ -223,7 +223,10 @@ def _pdo_problems(sheet: DataSheet, pdo: PdoConfig, *, commands: bool) -> Iterat
         for entry in pdo.objects:
             known = sheet.objects.get(entry.key)
             if known is not None and known.access in (Access.RO, Access.CONST):
-                yield f"{name_of(*entry.key)} is read-only; a command frame cannot carry it"
+                yield (
+                    f"{name_of(*entry.key)} is read-only; a command frame cannot carry it: another "
+                    "drive, or a data sheet that is right"
+                )
 
 
 def _object_problems(sheet: DataSheet, entry: Mapped) -> Iterator[str]:

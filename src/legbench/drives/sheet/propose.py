@@ -71,9 +71,13 @@ def propose(sheet: DataSheet, eds: str, link: Mapped | str | None = None) -> Pro
         # A drive that cannot send a second position is one with one encoder.
         seconds = (*(links if link is None else ()), *((torque,) if torque else ()), None)
     motor, target = _typed(sheet, POSITION_ACTUAL), _typed(sheet, TARGET_POSITION)
-    if motor.bits == target.bits:
-        # The same bits on the wire; a sheet that tells two signs is wrong in one.
-        motor = Mapped(*motor.key, target.kind)
+    if motor.bits != target.bits:
+        raise ConfigError(
+            f"{sheet.name}: {motor} has {motor.bits} bits, {target} has {target.bits}: both need "
+            "the same length; another drive, or a data sheet that is right"
+        )
+    # The same bits on the wire; a sheet that tells two signs is wrong in one.
+    motor = Mapped(*motor.key, target.kind)
     rpdos = _carried(sheet, (CONTROLWORD, target), commands=True)
     second, tpdos = _answers(sheet, (STATUSWORD, motor), seconds)
     temperatures = temperature_candidates(sheet)
