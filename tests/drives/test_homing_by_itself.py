@@ -12,6 +12,7 @@ from legbench.commissioning import home as home_module
 from legbench.commissioning.home import home
 from legbench.drives.errors import DriveError
 from legbench.drives.protocol.frame import Frame
+from legbench.drives.protocol.sdo import Abort, abort_error
 from legbench.errors import ConfigError
 
 COUNTS_PER_RAD = (1 << 20) / (2.0 * math.pi)
@@ -64,6 +65,15 @@ def test_a_search_is_at_most_as_fast_as_1_rad_a_second(sub: int) -> None:
         speeds = [1000, 1000]
         speeds[sub - 1] = counts
         assert (refusal(17, *speeds) is not None) is refused
+
+
+def test_a_drive_that_does_not_tell_its_speeds_is_homed_by_its_makers_tool() -> None:
+    class Mute(Speeds):
+        def get_int(self, index: int, sub: int, _kind: object) -> int:
+            raise abort_error(Abort.NO_OBJECT, index, sub)
+
+    with pytest.raises(DriveError, match=r"how fast .*6099h:01.*home it with its maker's tool$"):
+        home_module._check_speed(cast(Any, Mute(0, 0)), node(1), 17)
 
 
 class Looks:

@@ -101,6 +101,13 @@ def test_either_drive_that_would_go_on_without_its_master_is_named(place: int) -
     words = rf"drive '{nodes[place].name}' would not stand within 100 ms .*: it has no means"
     with pytest.raises(ConfigError, match=words):
         check_master_watch(bus)
+    # A deadline helps where commands are sent.
+    for commands, ways in (
+        (True, "RPDO a deadline_ms, lower"),
+        (False, "with 6007h; lower master"),
+    ):
+        with pytest.raises(ConfigError, match=ways):
+            check_master_watch(bus, commands=commands)
     check_master_watch(replace(bus, waive=("master watch",)))
     check_master_watch(config())
     # One that is not known to hold anything is not looked at.

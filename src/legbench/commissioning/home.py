@@ -154,7 +154,13 @@ def _check_speed(sdo: SdoPort, node: NodeConfig, method: int) -> None:
     """Refuse a search that is too fast, or that would never come anywhere (6099h)."""
     subs = {1: "a switch or stop", 2: "zero"}
     for sub, what in subs.items():
-        speed = sdo.get_int(0x6099, sub, U32) / abs(node.motor.counts_per_rad)
+        try:
+            speed = sdo.get_int(0x6099, sub, U32) / abs(node.motor.counts_per_rad)
+        except SdoAbortError as error:
+            raise DriveError(
+                f"drive '{node.name}' does not tell how fast it searches {what}: {error}; home it "
+                "with its maker's tool"
+            ) from error
         # The maker's own methods need not use the second speed, an index pulse not the first.
         needed = sub == 1 if method in MAKERS else sub == 2 or method not in INDEX_ONLY
         way = f'give "6099:{sub:02X} u32" [counts/s] in its parameters'
