@@ -172,7 +172,8 @@ class Budget:
             _print_budget(config, entries, load)
             for name, found in means.items():
                 texts = [f"{one.stop_ms:.0f} ms by {one.name}" for one in found]
-                print(f"without master, {name} stands after {' or '.join(texts) or 'no time'}")
+                stands = f"stands after {' or '.join(texts)}" if texts else "is not known to stop"
+                print(f"without master, {name} {stands}")
         check_budget(config)
         check_together(config, limits, stops=joint_ranges(bench.leg()))
         return 0

@@ -11,7 +11,7 @@ from legbench.drives.setup.config import BusConfig, NodeConfig, PdoConfig
 from legbench.drives.setup.master_watch import Means, means_of
 from legbench.drives.setup.needs import MAPPINGS, Need
 from legbench.drives.setup.outcome import ObjectOutcome, held_by
-from legbench.drives.setup.taken import not_given
+from legbench.drives.setup.taken import RAMPS, not_given
 from legbench.drives.sheet.data_sheet import DataSheet
 from legbench.drives.sheet.predict import predict
 
@@ -77,7 +77,8 @@ def assess(
     """
     outcomes = predict(sheet, bus, node)
     written = [entry for entry in outcomes if not _is_mapping(entry)]
-    unused = tuple(_unused(sheet, {entry.parameter.key for entry in outcomes}))
+    given = {entry.parameter.key for entry in outcomes}
+    unused = tuple(_unused(sheet, given))
     lost = [entry.line for entry in outcomes if entry.passes and entry.line is not None]
     reads = [finding for finding in _reads(sheet) if finding.state is State.LACKS]
     return Assessment(
@@ -88,6 +89,7 @@ def assess(
             *_reads(sheet),
             *map(_finding, written),
             *unused,
+            *_replaced(sheet, given),
         ),
         problems=tuple(_problems(sheet, node, outcomes)),
         unprotected=(*lost, *(f"{one.object}: {one.remark}" for one in (*reads, *unused))),
@@ -116,7 +118,9 @@ def _finding(entry: ObjectOutcome) -> Finding:
 
 
 def _nothing_lost(entry: ObjectOutcome) -> str:
-    return "may be missing, nothing is lost" if entry.missing and entry.passes else ""
+    if entry.code is None or not entry.passes:
+        return ""
+    return "where it is missing nothing is lost" if entry.missing else "as it is wanted"
 
 
 def _unused(sheet: DataSheet, written: set[Key]) -> Iterator[Finding]:
@@ -129,6 +133,18 @@ def _unused(sheet: DataSheet, written: set[Key]) -> Iterator[Finding]:
             need=row.need.value,
             state=State.HAS if has else State.LACKS,
             remark=f"{why}; {row.loss}",
+        )
+
+
+def _replaced(sheet: DataSheet, written: set[Key]) -> Iterator[Finding]:
+    """Yield the usual ramp of a quick stop, for which the bus file gives the other one."""
+    usual, other = RAMPS
+    if other in written and not sheet.has(usual):
+        yield Finding(
+            object=name_of(*usual),
+            need=Need.PROTECTION.value,
+            state=State.LACKS,
+            remark=f"the drive has no such object; instead: {name_of(*other)}, by 605Ah = 1",
         )
 
 
