@@ -11,6 +11,8 @@ from legbench.errors import ConfigError
 COMMANDS = '"6040:00 u16", "607A:00 i32"'
 WINDOW = '"6066:00 u16" = 10 '
 SOFT = "soft_limits = [-1.2, 1.0]"
+FIELDS = ("node_id", "identity", "side", "rpdos", "tpdos")
+"""Names of a node that a bus file has other keys for."""
 CASES = [
     (WINDOW, '"6066:00 u16" = 100000 ', '"6066:00 u16"', "100000, but its type UNSIGNED16 holds 0"),
     (WINDOW, '"6066:00 u16" = 1.5 ', "6066:00 u16", "1.5; it must be a whole number"),
@@ -34,6 +36,8 @@ CASES = [
     (SOFT, f"rpdo = [{{cob_id=0x601,number=1,objects=[{COMMANDS}]}}]", "rpdo: cob_id 601h", "SDO"),
     (SOFT, f"rpdo = [{{cob_id=0x6E0,number=1,objects=[{COMMANDS}]}}]", "cob_id 6E0h", "reserved"),
     ("bits = 16", "bits = 17", "link: bits", "8, 16, 32, 64"),
+    (SOFT, "soft_limit = 3", "keys: soft_limit;", "it knows name, id, vendor, product, serial, mo"),
+    *((SOFT, f"{name} = [1]", f"keys: {name};", "rpdo, tpdo") for name in FIELDS),
 ]
 
 
@@ -59,6 +63,13 @@ def test_a_node_without_a_name_is_told_by_its_place(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     path.write_text(BUS.read_text(encoding="utf-8").replace('name = "motor2"', ""), "utf-8")
     with pytest.raises(ConfigError, match=r"mine\.toml: node 2 of the file: name must be given"):
+        load_bus(path)
+
+
+def test_nodes_are_tables_of_the_file_and_no_key_of_the_bus(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(f"nodes = 3\n{BUS.read_text(encoding='utf-8')}", encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"mine\.toml: bus has unknown keys: nodes; it knows node, "):
         load_bus(path)
 
 
