@@ -69,7 +69,7 @@ def test_a_node_without_a_name_is_told_by_its_place(tmp_path: Path) -> None:
 def test_nodes_are_tables_of_the_file_and_no_key_of_the_bus(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     path.write_text(f"nodes = 3\n{BUS.read_text(encoding='utf-8')}", encoding="utf-8")
-    with pytest.raises(ConfigError, match=r"mine\.toml: bus has unknown keys: nodes; it knows node, "):
+    with pytest.raises(ConfigError, match="unknown keys: nodes; it knows node, eds, "):
         load_bus(path)
 
 

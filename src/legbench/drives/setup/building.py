@@ -75,7 +75,8 @@ def check_keys(kind: Callable[..., object], where: str, given: Mapping[str, Any]
     Raises:
         ConfigError: a key is unknown; the message names all that are known.
     """
-    _refuse_unknown(where, given, [key for name in _fields(kind) for key in KEYS.get(name, (name,))])
+    known = [key for name in _fields(kind) for key in KEYS.get(name, (name,))]
+    _refuse_unknown(where, given, known)
 
 
 def _fields(kind: Callable[..., object]) -> "dict[str, Field[Any]]":
