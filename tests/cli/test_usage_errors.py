@@ -14,7 +14,7 @@ from legbench.cli import main
         ("design --evaluations abc", "Error parsing --evaluations"),
         ("drives frob", "Unrecognized options: frob; see legbench drives --help"),
         ("drives jitter --speed 1", "; see legbench drives jitter --help"),
-        ("drives zero", "Missing from legbench drives zero: --posture FLOAT FLOAT Angles q1 and q2"),
+        ("drives zero", "Missing from legbench drives zero: --posture FLOAT FLOAT Angles"),
         ("drives zero", "(required); see legbench drives zero --help"),
         ("run jump --setup nowhere", "invalid choice 'nowhere' for argument '--setup'"),
         ("frob", "no command 'frob'; there are run, "),

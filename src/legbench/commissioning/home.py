@@ -259,8 +259,8 @@ class _Master(DriveLeader):
             if word & StatusBit.FOLLOWS_COMMAND and word & StatusBit.TARGET_REACHED:
                 return
         raise DriveError(
-            f"homing of '{name}' has not ended within {timeout:g} s; raise --timeout, or the speeds "
-            "of a search (6099h) in its parameters"
+            f"homing of '{name}' has not ended within {timeout:g} s; raise --timeout, or the "
+            "speeds of a search (6099h) in its parameters"
         )
 
     def close(self) -> None:
