@@ -20,6 +20,8 @@ CASES = [
     (WINDOW, '"1010:01 u32" = 0x65766173 ', '"1010:01 u32"', "legbench drives store"),
     (WINDOW, '"1014:00 u32" = 0x80 ', '"1014:00 u32"', "moves a service"),
     (WINDOW, '"1200:01 u32" = 0x601 ', '"1200:01 u32"', "moves a service"),
+    (WINDOW, '"1016:01 u32" = 0 ', '"1016:01 u32"', "is written by itself"),
+    (WINDOW, '"1016:02 u32" = 0x7E0064 ', '"1016:02 u32"', "watches another node: give 0"),
     ("counts_per_rev = 65536", "counts_per_rev = 0", "motor: counts_per_rev", "positive"),
     ("counts_per_rev = 65536", 'counts_per_rev = "x"', "motor: counts_per_rev", "of type int"),
     ("gear = 6.0", "gear = -6.0", "motor: gear", "the sign is 'sign'"),
@@ -57,6 +59,13 @@ def test_file_node_and_key_are_named(
     assert key in said
     assert words in said
     assert "\n" not in said
+
+
+def test_a_drive_that_watches_another_node_by_itself_is_told_not_to(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    text = BUS.read_text(encoding="utf-8").replace(WINDOW, '"1016:02 u32" = 0 ', 1)
+    path.write_text(text, encoding="utf-8")
+    assert load_bus(path).nodes[0].parameters[1].key == (0x1016, 2)
 
 
 def test_a_node_without_a_name_is_told_by_its_place(tmp_path: Path) -> None:
