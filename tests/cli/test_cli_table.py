@@ -54,11 +54,11 @@ def test_an_energy_residual_is_explained(
     assert f"energy residual   {said}\n" in capsys.readouterr().out
 
 
-def test_emergencies_that_ended_nothing_are_told_once_each() -> None:
+def test_emergencies_that_warn_are_told_once_each() -> None:
     code, other = "EMCY FF01h vendor error of node 1", "EMCY 5112h supply low of node 2"
-    heard = {"name": "bus", "emergencies": [code, other, code, code]}
+    heard = {"name": "bus", "emergencies": [], "warnings": [code, other, code, code]}
     assert warned([{"name": "rest"}, heard]) == f"{code} (3 times), {other}"
-    assert not warned([{"name": "bus", "emergencies": []}])
+    assert not warned([{"name": "bus", "emergencies": [code], "warnings": []}])
     assert not warned([{"name": "end"}])
 
 

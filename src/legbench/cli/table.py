@@ -53,8 +53,8 @@ def limited(summary: Summary) -> str:
 
 
 def warned(events: Sequence[Mapping[str, Any]]) -> str:
-    """Say which emergencies drives sent during a run, each once; empty if there were none."""
-    heard = [text for event in events for text in event.get("emergencies", ())]
+    """Say which warnings of the bus file drives sent in a run, each once; empty without any."""
+    heard = [text for event in events for text in event.get("warnings", ())]
     return ", ".join(
         text if count == 1 else f"{text} ({count} times)" for text, count in Counter(heard).items()
     )
