@@ -80,8 +80,8 @@ def test_learn_says_of_each_object_whether_it_is_there_fixed_or_missing(
     while others[0].startswith("    "):
         has += f" {others.pop(0).strip()}"
     assert {"6040h:00", "6064h:00", "6084h:00", "1400h:05"} <= set(has.split(", "))
-    assert "required   fixed 1005h:00 COB-ID SYNC: as it is wanted" in others
-    assert "required   lacks 607Eh:00 Polarity: where it is missing nothing is lost" in others
+    assert "if present fixed 1005h:00 COB-ID SYNC: as it is wanted" in others
+    assert "if present lacks 607Eh:00 Polarity: where it is missing nothing is lost" in others
     assert (
         "protection lacks 6085h:00 Quick stop deceleration [counts/s2]: the drive has no such "
         "object; instead: 6084h:00 Profile deceleration [counts/s2], by 605Ah = 1" in others

@@ -27,6 +27,8 @@ READ = {
     (0x603F, 0): "the reason of a fault, but for what an emergency message says",
 }
 """Objects that are read, and what is not known without them."""
+IF_PRESENT = "if present"
+"""Need of an object that may be missing, but has to agree where it is there."""
 NEEDED_READS = ((0x1000, 0), (0x1018, 1))
 
 
@@ -111,7 +113,7 @@ def _finding(entry: ObjectOutcome) -> Finding:
     state = State.LACKS if entry.missing else State.HAS if entry.code is None else State.FIXED
     return Finding(
         object=entry.name,
-        need=entry.row.need.value,
+        need=IF_PRESENT if entry.row.may_lack else entry.row.need.value,
         state=state,
         remark=(entry.line or "").removeprefix(f"{entry.name}: ") or _nothing_lost(entry),
     )
