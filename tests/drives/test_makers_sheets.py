@@ -17,6 +17,7 @@ from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.objects import Key
 from legbench.drives.protocol.pdo import Mapped
 from legbench.drives.protocol.sdo import Abort
+from legbench.drives.sheet.bus_text import bus_text
 from legbench.drives.sheet.data_sheet import DataSheet
 from legbench.drives.sheet.load import sheet_of
 from legbench.drives.sheet.propose import propose
@@ -194,6 +195,23 @@ def test_a_refusal_says_how_many_objects_a_pdo_has_room_for() -> None:
     sheet = stranger().without(0x1401, 0x1402, 0x1403).fixed({(0x1600, 2): "0"})
     with pytest.raises(ConfigError, match=r"\(RPDO1: room for 1 objects\); map them"):
         propose(read(sheet.text()), "it.eds")
+
+
+def test_limits_of_the_drive_itself_are_proposed_where_it_takes_them() -> None:
+    for kind, limits, proposed in (
+        (DataType.INTEGER32, None, True),
+        (DataType.INTEGER32, ("-75100", "75100"), True),
+        (DataType.INTEGER32, ("-75000", "75100"), False),
+        (DataType.INTEGER32, ("-75100", "75000"), False),
+        (DataType.INTEGER16, None, False),
+        (DataType.UNSIGNED32, None, False),
+    ):
+        sheet = stranger()
+        for sub in (1, 2):
+            sheet.entries[0x607D, sub].kind = int(kind)
+            sheet.entries[0x607D, sub].limits = limits
+        text = bus_text(propose(read(sheet.text()), "it.eds"), (1,))
+        assert ("soft_limits = " in text) is proposed
 
 
 def test_what_is_no_drive_is_refused_as_that(tmp_path: Path) -> None:

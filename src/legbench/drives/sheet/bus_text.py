@@ -4,7 +4,7 @@ import json
 import math
 from collections.abc import Iterator, Sequence
 
-from legbench.drives.protocol.datatypes import FORMATS, DataType, range_of
+from legbench.drives.protocol.datatypes import FORMATS, range_of
 from legbench.drives.protocol.objects import Key
 from legbench.drives.protocol.pdo import Mapped
 from legbench.drives.setup.bus_file import format_object
@@ -18,6 +18,8 @@ MARK = "MEASURE"
 """Word in the comment of every line whose value is a guess."""
 COUNTS_PER_REV, GEAR = 65536, 6.0
 """Encoder and gear of the emulated leg, which stand until somebody has measured [counts], [-]."""
+PER_RAD = COUNTS_PER_REV * GEAR / (2.0 * math.pi)
+"""Counts of that encoder for one radian of the motor [counts/rad]."""
 TORQUE_SCALE = 0.01
 """Torque at the joint of one count of the emulated drive's torque [N m]."""
 WINDOW_RAD, TORQUE_PERMILLE, RAMP = 0.4, 800, 20_000.0
@@ -101,13 +103,13 @@ def _node(proposal: Proposal, place: int, node_id: int) -> Iterator[str]:
 
 
 def _limits_itself(proposal: Proposal) -> bool:
-    """Whether the drive takes limits of its range on both sides of 0, in 32 bits or more."""
-    least, most = range_of(DataType.INTEGER32)
-    return range_of(proposal.motor.kind)[0] < 0 and all(
-        _holds(proposal.sheet, (0x607D, sub), most)
-        and range_of(proposal.sheet.objects[0x607D, sub].kind)[0] <= least
-        for sub in (1, 2)
-    )
+    """Whether the drive takes limits of its range on both sides of 0, as far as these go."""
+    sheet, keys = proposal.sheet, ((0x607D, 1), (0x607D, 2))
+    if range_of(proposal.motor.kind)[0] == 0 or not all(_holds(sheet, key, 0) for key in keys):
+        return False
+    ends = [end * PER_RAD for limits in SOFT_LIMITS for end in limits]
+    taken = [sheet.limits.get(key, range_of(sheet.objects[key].kind)) for key in keys]
+    return all(low <= min(ends) and max(ends) <= high for low, high in taken)
 
 
 def _objects(proposal: Proposal) -> Iterator[str]:
@@ -148,13 +150,12 @@ def _axes(proposal: Proposal, place: int) -> Iterator[str]:
 
 
 def _parameters(sheet: DataSheet) -> Iterator[str]:
-    per_rad = COUNTS_PER_REV * GEAR / (2.0 * math.pi)
-    ramp = next((key for key in RAMPS if _holds(sheet, key, LEAST_RAMP * per_rad)), None)
+    ramp = next((key for key in RAMPS if _holds(sheet, key, LEAST_RAMP * PER_RAD)), None)
     wanted: list[tuple[Key | None, float, str]] = [
-        ((0x6065, 0), WINDOW_RAD * per_rad, f"following error window [counts]: {WINDOW_RAD} rad"),
+        ((0x6065, 0), WINDOW_RAD * PER_RAD, f"following error window [counts]: {WINDOW_RAD} rad"),
         ((0x6066, 0), 10, "for so long [ms]"),
         ((0x6072, 0), TORQUE_PERMILLE, "max torque [permille of rated]"),
-        (ramp, RAMP * per_rad, f"quick stop: {RAMP:g} rad/s2, in the drive's own unit"),
+        (ramp, RAMP * PER_RAD, f"quick stop: {RAMP:g} rad/s2, in the drive's own unit"),
     ]
     lines = [
         f'"{format_object(_named(sheet, key))}" = {_within(sheet, key, value)}  # {MARK}: {words}'
