@@ -214,6 +214,17 @@ def test_limits_of_the_drive_itself_are_proposed_where_it_takes_them() -> None:
         assert ("soft_limits = " in text) is proposed
 
 
+def test_limits_of_a_mapping_and_of_a_transmission_type_are_kept(tmp_path: Path) -> None:
+    sheet = stranger()
+    for place in range(4):
+        sheet.entries[0x1600 + place, 0].limits = ("0", "1")
+    sheet.entries[0x1401, 2].limits, sheet.entries[0x1402, 2].limits = ("254", "255"), ("0", "240")
+    assert [pdo.number for pdo in learned_by(tmp_path, sheet).nodes[0].rpdos] == [1, 3]
+    sheet.fixed({(0x1400, 2): "255"})
+    with pytest.raises(ConfigError, match="RPDO2: 1401h:02 is fixed to 255, it does not follow"):
+        propose(read(sheet.without(0x1403).text()), "it.eds")
+
+
 def test_what_is_no_drive_is_refused_as_that(tmp_path: Path) -> None:
     box = stranger()
     box.without(*(index for index, _ in list(box.entries) if index >= 0x6000 or index < 0x1000))

@@ -75,11 +75,12 @@ class DataSheet:
         It has to be switched off for that, by its COB-ID (CiA 301, 7.5.2.36).
         """
         mapping = (0x1600 if commands else 0x1A00) + number - 1
+        if not (self.writable((mapping - 0x200, 1)) and self.writable((mapping, 0))):
+            return 0
         entries = 0
-        if self.writable((mapping - 0x200, 1)) and self.writable((mapping, 0)):
-            while self.writable((mapping, entries + 1)):
-                entries += 1
-        return entries
+        while self.writable((mapping, entries + 1)):
+            entries += 1
+        return min(entries, self.limits.get((mapping, 0), (0, entries))[1])
 
     def stays_on(self, comm: int) -> bool:
         """Whether a PDO is on at power-on, by its communication object, and cannot be let off."""

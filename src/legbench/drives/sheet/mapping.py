@@ -103,7 +103,8 @@ def _obstacle(sheet: DataSheet, number: int, *, commands: bool) -> str | None:
     if not sheet.has((comm, 2)):
         return f"{comm:04X}h:02 is missing, the transmission type"
     kind = sheet.default((comm, 2), 0)
-    if sheet.writable((comm, 2)) or kind is None:
+    low, high = sheet.limits.get((comm, 2), (EVERY_SYNC, EVERY_SYNC))
+    if kind is None or (sheet.writable((comm, 2)) and low <= EVERY_SYNC <= high):
         return None
     fits = kind <= LAST_SYNCHRONOUS if commands else kind == EVERY_SYNC
     return None if fits else f"{comm:04X}h:02 is fixed to {kind}, it does not follow every SYNC"
