@@ -214,6 +214,21 @@ def test_limits_of_the_drive_itself_are_proposed_where_it_takes_them() -> None:
         assert ("soft_limits = " in text) is proposed
 
 
+def test_space_in_a_fixed_command_is_sent_as_zeros(tmp_path: Path) -> None:
+    sheet = stranger()
+    # CiA 301: dummy entries are named as the index of their type, here UNSIGNED16.
+    mapped(sheet, 0x1600, ("0x60400010", "0x00060010", "0x607A0020"), "ro")
+    sheet.without(0x1401, 0x1402, 0x1403)
+    bus = learned_by(tmp_path, sheet)
+    (pdo,) = bus.nodes[0].rpdos
+    assert [entry.index for entry in pdo.objects] == [0x6040, 0x0006, 0x607A]
+    assert all(one.passes for one in really(bus))
+    for word in ("0x00060020", "0x00060110", "0x00080020", "0x30000010"):
+        mapped(sheet, 0x1600, ("0x60400010", word, "0x607A0020"), "ro")
+        with pytest.raises(ConfigError, match="RPDOs cannot carry"):
+            propose(read(sheet.text()), "it.eds")
+
+
 def test_limits_of_a_mapping_and_of_a_transmission_type_are_kept(tmp_path: Path) -> None:
     sheet = stranger()
     for place in range(4):

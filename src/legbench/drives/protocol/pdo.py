@@ -9,6 +9,8 @@ from legbench.drives.errors import CodecError
 from legbench.drives.protocol.datatypes import FORMATS, DataType, range_of, size_of
 
 MAX_BYTES = 8
+DUMMIES = range(0x0001, 0x0008)
+"""Objects that stand for space in a command frame, named as their type (CiA 301, table 44)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ from enum import Enum
 
 from legbench.drives.protocol.datatypes import FORMATS, SHORT_NAMES, DataType, size_of
 from legbench.drives.protocol.objects import Access, Key, name_of
-from legbench.drives.protocol.pdo import Mapped
+from legbench.drives.protocol.pdo import DUMMIES, Mapped
 from legbench.drives.setup.config import BusConfig, NodeConfig, PdoConfig
 from legbench.drives.setup.master_watch import Means, means_of
 from legbench.drives.setup.needs import MAPPINGS, Need
@@ -250,7 +250,7 @@ def _pdo_problems(sheet: DataSheet, pdo: PdoConfig, *, commands: bool) -> Iterat
 def _object_problems(sheet: DataSheet, entry: Mapped) -> Iterator[str]:
     known = sheet.objects.get(entry.key)
     if known is None:
-        if entry.index not in CYCLIC:
+        if entry.index not in CYCLIC and entry.index not in DUMMIES:
             yield f"{name_of(*entry.key)} is missing; name another object in the bus file"
     elif known.kind is entry.kind or (entry.index in CYCLIC and _as_long(known.kind, entry)):
         return

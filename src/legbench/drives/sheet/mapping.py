@@ -4,8 +4,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations
 
 from legbench.drives.errors import CodecError
+from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.frame import COB_NO_REMOTE, RPDO_BASES, TPDO_BASES
-from legbench.drives.protocol.pdo import MAX_BYTES, Mapped, split_word
+from legbench.drives.protocol.pdo import DUMMIES, MAX_BYTES, Mapped, split_word
 from legbench.drives.setup.config import PdoConfig
 from legbench.drives.setup.configuration import EVERY_SYNC
 from legbench.drives.setup.needs import LAST_SYNCHRONOUS
@@ -118,17 +119,26 @@ def _fixed(
     wanted = {entry.key: entry for entry in needed}
     for word in sheet.mapped(number, commands=commands):
         index, sub, bits = split_word(word)
-        known = sheet.objects.get((index, sub))
-        if known is None:
+        kind = _kind_of(sheet, index, sub)
+        if kind is None:
             return None
         try:
-            entry = wanted.get(known.key) or Mapped(index, sub, known.kind)
+            entry = wanted.get((index, sub)) or Mapped(index, sub, kind)
         except CodecError:
             return None
-        if entry.bits != bits or (commands and not (entry in needed or index in HARMLESS)):
+        harmless = index in HARMLESS or index in DUMMIES
+        if entry.bits != bits or (commands and not (entry in needed or harmless)):
             return None
         entries.append(entry)
     return tuple(entries)
+
+
+def _kind_of(sheet: DataSheet, index: int, sub: int) -> DataType | None:
+    """Type of an object that is mapped; none where the drive has no such object."""
+    if index in DUMMIES:
+        return None if sub else DataType(index)
+    known = sheet.objects.get((index, sub))
+    return None if known is None else known.kind
 
 
 def _always_on(
