@@ -297,8 +297,19 @@ def test_a_ramp_in_a_unit_of_the_makers_own_is_no_ramp(tmp_path: Path) -> None:
     given = {entry.index for entry in bus.nodes[0].parameters}
     assert 0x6084 in given
     assert 0x6085 not in given
-    sheet.entries[0x6084, 0].limits = ("0", "60000")
+    # Without 605Ah, or where it stays, a quick stop brakes on 6085h (CiA 402-2).
+    bare = sheet.without(0x605A).text()
+    (tmp_path / "it.eds").write_text(bare, encoding="utf-8")
+    assert "does not brake on 6084h:00" in check(tmp_path / "leg.toml").problems[0]
     (tmp_path / "leg.toml").unlink()
+    assert learned_by(tmp_path, sheet).waive == ("quick-stop ramp",)
+    (tmp_path / "leg.toml").unlink()
+    for option, waived in (("6", True), ("5", False)):
+        sheet.add((0x605A, 0), DataType.INTEGER16, default=option)
+        assert (learned_by(tmp_path, sheet).waive == ("quick-stop ramp",)) is waived
+        (tmp_path / "leg.toml").unlink()
+    sheet.add((0x605A, 0), DataType.INTEGER16, "rw", default="2")
+    sheet.entries[0x6084, 0].limits = ("0", "60000")
     assert learned_by(tmp_path, sheet).waive == ("quick-stop ramp",)
 
 

@@ -42,8 +42,8 @@ def identify(
         device = sdo.get_int(0x1000, 0, U32)
         if device & 0xFFFF != PROFILE_402:
             raise DriveError(
-                f"node {node.node_id} ('{node.name}') is no CiA 402 drive: its device type is "
-                f"{device:08X}h"
+                f"node {node.node_id} ('{node.name}') is no CiA 402 drive: its device type, "
+                f"1000h, is {device:08X}h and does not end with 0192h; take another drive"
             )
         found[node.node_id] = read_identity(sdo)
     for node in nodes:
@@ -53,7 +53,8 @@ def identify(
         # A drive that does not tell its modes is asked for this one, and has to show it (6061h).
         if modes is not None and not modes & CSP_BIT:
             raise DriveError(
-                f"node {node.node_id} ('{node.name}') knows no cyclic synchronous position mode"
+                f"node {node.node_id} ('{node.name}') knows no cyclic synchronous position mode: "
+                f"6502h is {modes:#x}; take another drive, or a firmware that has it"
             )
 
 

@@ -18,6 +18,8 @@ Outcomes = Mapping[str, Sequence[ObjectOutcome]]
 HEARTBEAT = (0x1017, 0)
 RAMPS = ((0x6085, 0), (0x6084, 0))
 """Ramps of a quick stop, of which a drive needs one."""
+QUICK_STOP_OPTION = (0x605A, 0)
+"""Choice between the ramps; without it a quick stop brakes on 6085h (CiA 402-2)."""
 FIRST_DEADLINE = (0x1400, 5)
 SOFT_LIMITS_HIGH = (0x607D, 2)
 """Second half of a range, of which the first is told."""
@@ -48,6 +50,12 @@ def check_taken(
     for node in config.nodes:
         ramp = quick_stop_ramp(node)
         for entry in outcomes.get(node.name, ()):
+            if ramp == RAMPS[1] and entry.parameter.key == QUICK_STOP_OPTION and entry.missing:
+                raise DriveError(
+                    f"drive '{node.name}' does not brake on {name_of(*ramp)}: without 605Ah its "
+                    'quick stop uses 6085h; give "6085:00 u32" instead of "6084:00 u32" in the bus '
+                    f'file, or waive = ["{QUICK_STOP_RAMP}"]'
+                )
             if entry.parameter.key == ramp and not entry.agrees:
                 raise DriveError(
                     f"drive '{node.name}' does not take its quick-stop ramp, {entry.name}: "

@@ -9,7 +9,7 @@ from legbench.drives.protocol.objects import Key
 from legbench.drives.protocol.pdo import Mapped
 from legbench.drives.setup.bus_file import format_object
 from legbench.drives.setup.config import POSITION_ACTUAL, TARGET_POSITION
-from legbench.drives.setup.taken import RAMPS
+from legbench.drives.setup.taken import QUICK_STOP_OPTION, RAMPS
 from legbench.drives.sheet.data_sheet import DataSheet
 from legbench.drives.sheet.propose import Proposal
 from legbench.limits.upper_ends import MASTER_WATCH, QUICK_STOP_RAMP, SPRING_WATCH
@@ -150,7 +150,8 @@ def _axes(proposal: Proposal, place: int) -> Iterator[str]:
 
 
 def _parameters(sheet: DataSheet) -> Iterator[str]:
-    ramp = next((key for key in RAMPS if _holds(sheet, key, LEAST_RAMP * PER_RAD)), None)
+    ramps = RAMPS if _brakes_on_either(sheet) else RAMPS[:1]
+    ramp = next((key for key in ramps if _holds(sheet, key, LEAST_RAMP * PER_RAD)), None)
     wanted: list[tuple[Key | None, float, str]] = [
         ((0x6065, 0), WINDOW_RAD * PER_RAD, f"following error window [counts]: {WINDOW_RAD} rad"),
         ((0x6066, 0), 10, "for so long [ms]"),
@@ -166,6 +167,11 @@ def _parameters(sheet: DataSheet) -> Iterator[str]:
         yield ""
         yield "[node.parameters]"
         yield from lines
+
+
+def _brakes_on_either(sheet: DataSheet) -> bool:
+    """Whether a quick stop brakes on 6084h where that is wanted: by 605Ah = 1, or 5."""
+    return sheet.writable(QUICK_STOP_OPTION) or sheet.default(QUICK_STOP_OPTION, 0) in (1, 5)
 
 
 def _holds(sheet: DataSheet, key: Key, least: float) -> bool:
