@@ -58,6 +58,12 @@ SPELLINGS: dict[str, Callable[[str], bytes]] = {
     "sections turned round": lambda text: (
         "\n[".join(reversed(("\n" + text).split("\n[")[1:])).join(("[", "\n")).encode()
     ),
+    "comments behind": lambda text: re.sub(
+        r"(?m)^((DataType|AccessType|DefaultValue)=[r0-9$].*)$", r"\1 // that # it ; is", text
+    ).encode(),
+    "access in words": lambda text: (
+        text.replace("Type=ro", "Type=Read Only").replace("Type=rw", "Type=R/W").encode()
+    ),
     "parents left out": lambda text: text.replace("ObjectType=0x9\n", "").encode(),
 }
 

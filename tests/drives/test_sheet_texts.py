@@ -123,7 +123,7 @@ def test_every_object_has_the_lines_of_the_standard_and_what_is_left_out_is_coun
     assert found.remarks == [
         "1 objects have a default that is no value; it was left out",
         "2 objects without a data type were left out",
-        "1 objects without a known access type count as readable and writable",
+        "1 objects without a known access type have the profile's, else can be written",
         "1 objects without their sub-index 0 have got one",
     ]
 

@@ -4,12 +4,13 @@ The library that reads data sheets takes that spelling alone, and stops at the f
 there. What is left out here, or guessed, is remarked.
 """
 
+import re
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 
 from legbench.drives.protocol.objects import OBJECTS, Key
 from legbench.drives.setup.needs import MAPPINGS
-from legbench.drives.sheet.text import Section, Sections, node_number, number, words
+from legbench.drives.sheet.text import Section, Sections, bare, node_number, number, words
 from legbench.reading import UnreadableError
 
 RECORD = 0x9
@@ -21,6 +22,9 @@ TEXTS = (0x09, 0x0A, 0x0B, 0x0F)
 """Types whose default is a text or bytes: visible and octet string, Unicode, domain."""
 REALS = (0x08, 0x11)
 ACCESS = ("ro", "wo", "rw", "rwr", "rww", "const")
+ALIASES = {"r": "ro", "readonly": "ro", "w": "wo", "writeonly": "wo", "readwrite": "rw"}
+ALIASES["constant"] = "const"
+"""Access types in the words of makers, without what is no letter."""
 MOST_SUBS = 254
 MOST_OBJECTS = 16_384
 """Largest number of objects, those of compact arrays included."""
@@ -108,10 +112,10 @@ def _variable(
     if kind is None:
         remarks["without a data type were left out"] += 1
         return
-    access = words(section, "accesstype").lower()
-    if access not in ACCESS:
-        remarks["without a known access type count as readable and writable"] += 1
-        access = "rw"
+    access = _access(words(section, "accesstype"))
+    if access is None:
+        remarks["without a known access type have the profile's, else can be written"] += 1
+        access = OBJECTS[key].access.value if key in OBJECTS else "rw"
     yield f"[{where}]"
     yield f"ParameterName={words(section, 'parametername') or 'object'}"
     yield "ObjectType=0x7"
@@ -135,6 +139,13 @@ def _variable(
             yield f"{word}={limit}"
 
 
+def _access(text: str) -> str | None:
+    """Return an access type in the spelling of CiA 306; none if it is none."""
+    letters = re.sub(r"[^a-z]", "", bare(text).lower())
+    access = ALIASES.get(letters, letters)
+    return access if access in ACCESS else None
+
+
 def _type(section: Section, found: Sections) -> int | None:
     """Return the number of a basic data type; a maker's own one is looked up where it is defined.
 
@@ -151,7 +162,7 @@ def _value(kind: int, text: str) -> str | None:
         return text.partition(";")[0].strip()
     if kind in REALS:
         try:
-            return repr(float(text.partition(";")[0]))
+            return repr(float(bare(text)))
         except ValueError:
             return None
     found = node_number(text)

@@ -20,6 +20,7 @@ _LIST = re.compile(r"(?:0x)?([0-9a-f]{1,4})\s*(name|value|denotation)", re.IGNOR
 _HEADER = re.compile(r"\[\s*([^\]]*?)\s*\]")
 _NUMBER = re.compile(r"([+-]?)(0x[0-9a-f]+|[0-9a-f]+h|[0-9]+)", re.IGNORECASE)
 _LONGEST_NUMBER = 40
+_COMMENT = re.compile(r";|#|//")
 
 
 @dataclass(slots=True)
@@ -107,13 +108,18 @@ def _place(found: Sections, name: str) -> tuple[Section, bool]:
     return found.others.setdefault(name.lower(), {}), False
 
 
+def bare(text: str) -> str:
+    """Return a value without a comment after it."""
+    return _COMMENT.split(text, maxsplit=1)[0].strip()
+
+
 def number(text: str | None) -> int | None:
     """Return a number as data sheets write it, hexadecimal in any case; none if it is none.
 
     Decimal numbers may have leading zeros, hexadecimal ones may end with an h. A comment after it
     is passed over.
     """
-    word = (text or "").partition(";")[0].strip().strip('"')
+    word = bare(text or "").strip('"')
     found = _NUMBER.fullmatch(word) if len(word) <= _LONGEST_NUMBER else None
     if found is None:
         return None
@@ -125,7 +131,7 @@ def number(text: str | None) -> int | None:
 
 def node_number(text: str | None) -> tuple[int, bool] | None:
     """Return a number that may be added to $NODEID, and whether it is; none if it is none."""
-    word = re.sub(r"\s", "", (text or "").partition(";")[0]).upper()
+    word = re.sub(r"\s", "", bare(text or "")).upper()
     if "$NODEID" not in word:
         plain = number(word)
         return None if plain is None else (plain, False)
