@@ -259,6 +259,7 @@ def test_what_is_no_drive_is_refused_as_that(tmp_path: Path) -> None:
     for sheet, words in (
         (box, r"^'motor1', 'motor2': 6040h, 6041h, 6061h, 6064h, 607Ah are missing: it is no CiA"),
         (stranger().fixed({(0x1000, 0): "0x191"}), "1000h:00 is 00000191h: .*another drive$"),
+        (stranger().fixed({(0x6064, 0): "0"}, "wo"), "6064h:00 .* cannot be read; .*another drive"),
         (stranger().without(0x6061), "6061h:00 .*: another drive, or a complete data sheet$"),
     ):
         (tmp_path / "it.eds").write_text(sheet.text(), encoding="utf-8")
@@ -312,12 +313,14 @@ def test_a_value_that_is_fixed_and_not_told_is_as_wanted(tmp_path: Path) -> None
     assert all(one.passes for one in really(bus_of(tmp_path / "it.eds")))
 
 
-def test_a_target_that_cannot_be_read_is_taken_at_its_word(tmp_path: Path) -> None:
+def test_what_can_only_be_written_is_taken_at_its_word(tmp_path: Path) -> None:
     sheet = stranger()
-    sheet.entries[0x607A, 0].access = "wo"
-    (tmp_path / "it.eds").write_text(sheet.text(), encoding="utf-8")
-    bus = bus_of(tmp_path / "it.eds")
+    for key in ((0x607A, 0), (0x607D, 1), (0x607D, 2)):
+        sheet.entries[key].access = "wo"
+    bus = learned_by(tmp_path, sheet)
     network = emulate(bus)
     with Session(LockstepBus("it", network=network), bus) as session:
         up = session.bring_up()
         assert up.preload(bus.nodes[0]) == up.position(bus.nodes[0])
+        assert bus.nodes[0].soft_limits_counts is not None
+        assert up.soft_limits(bus.nodes[0]) == bus.nodes[0].soft_limits_counts

@@ -228,6 +228,8 @@ class BringUp:
         try:
             low, high = sdo.get_int(0x607D, 1, I32), sdo.get_int(0x607D, 2, I32)
         except SdoAbortError as error:
+            if error.code == Abort.WRITE_ONLY:
+                return node.soft_limits_counts
             if error.code in ABSENT:
                 return None
             raise

@@ -19,6 +19,8 @@ PROFILE_402, CSP_BIT = 0x0192, 1 << 7
 """Device profile in the low word of 1000h, and the bit of the cyclic mode in 6502h (CiA 402-2)."""
 CYCLIC = (0x6040, 0x6041, 0x6061, 0x6064, 0x607A)
 """Objects of every cycle, and the display of the mode."""
+SHOWN = (0x6041, 0x6061, 0x6064)
+"""Those of them that are read."""
 READ = {
     (0x1000, 0): "the device type",
     (0x1018, 1): "the vendor",
@@ -200,6 +202,12 @@ def unfit(sheet: DataSheet) -> tuple[str, ...]:
         f"{name_of(*key)} is missing; no drive runs without it: another drive, or a complete data "
         "sheet"
         for key in (*lacking, *(key for key in NEEDED_READS if not sheet.has(key)))
+    ]
+    told += [
+        f"{name_of(*key)} cannot be read; no drive runs without it: another drive, or a data sheet "
+        "that is right"
+        for key in (*((index, 0) for index in SHOWN), *NEEDED_READS)
+        if sheet.has(key) and sheet.objects[key].access is Access.WO
     ]
     if modes is not None and not modes & CSP_BIT:
         told.insert(
