@@ -370,6 +370,7 @@ def test_types_of_the_bus_file_follow_the_sheet(tmp_path: Path) -> None:
     assert problem.endswith('write "60E4:01 u32"')
     # A value is written in the drive's own length, if it fits.
     sheet.entries[0x6065, 0].kind = DataType.UNSIGNED16
+    sheet.entries[0x6065, 0].default = "0"
     (tmp_path / "it.eds").write_text(sheet.text(), encoding="utf-8")
     out.write_text(text, encoding="utf-8")
     assert not check(out).problems

@@ -116,6 +116,36 @@ def test_limits_that_cannot_be_meant_are_none() -> None:
     assert found.remarks == ("6 objects have limits that cannot be meant; they were left out",)
 
 
+def test_types_that_cannot_be_meant_are_the_profiles() -> None:
+    i8, u8, u16, u32 = 0x02, 0x05, 0x06, 0x07
+    cases: dict[Key, tuple[int, str, int, int]] = {
+        # The other sign, by the same bits.
+        (0x60C2, 2): (u8, "0xFD", i8, -3),
+        (0x6060, 0): (u8, "-1", i8, -1),
+        (0x6041, 0): (0x03, "-1", u16, 0xFFFF),
+        # Too short for what it holds.
+        (0x1000, 0): (u16, "0x00420192", u32, 0x0042_0192),
+        (0x1018, 1): (u8, "0x5A65726F", u32, 0x5A65_726F),
+        (0x1400, 1): (u16, "$NODEID+0x200", u32, 0x200),
+        (0x1016, 1): (u16, "0", u32, 0),
+        (0x1A01, 2): (u8, "0", u32, 0),
+        # Another length may be meant, and positions may have either sign.
+        (0x6061, 0): (u16, "8", u16, 8),
+        (0x6064, 0): (u32, "-1", u32, 0xFFFF_FFFF),
+        (0x607D, 1): (u32, "5", u32, 5),
+        # Neither holds it.
+        (0x1017, 0): (u8, "0x10000", u8, 0),
+    }
+    sheet = stranger()
+    for key, (kind, default, _, _) in cases.items():
+        sheet.entries[key].kind, sheet.entries[key].default = kind, default
+    found = read(sheet.text())
+    for key, (_, _, kind, default) in cases.items():
+        assert (found.objects[key].kind, found.objects[key].default) == (kind, default)
+        assert (key in found.given) is (key != (0x1017, 0))
+    assert found.remarks == ("8 objects have the profile's type instead of their own",)
+
+
 def test_a_record_without_its_sub_index_0_has_got_one() -> None:
     text = stranger().text()
     bare = re.sub(r"\[(1018|1400|1600|1A00|60C2)sub0\]\n[^\[]*", "", text)

@@ -7,7 +7,13 @@ from enum import Enum
 from legbench.drives.protocol.datatypes import FORMATS, SHORT_NAMES, DataType, size_of
 from legbench.drives.protocol.objects import Access, Key, name_of
 from legbench.drives.protocol.pdo import DUMMIES, Mapped
-from legbench.drives.setup.config import BusConfig, NodeConfig, PdoConfig
+from legbench.drives.setup.config import (
+    CONTROLWORD,
+    STATUSWORD,
+    BusConfig,
+    NodeConfig,
+    PdoConfig,
+)
 from legbench.drives.setup.master_watch import Means, means_of
 from legbench.drives.setup.needs import MAPPINGS, Need
 from legbench.drives.setup.outcome import ObjectOutcome, held_by
@@ -21,6 +27,8 @@ CYCLIC = (0x6040, 0x6041, 0x6061, 0x6064, 0x607A)
 """Objects of every cycle, and the display of the mode."""
 SHOWN = (0x6041, 0x6061, 0x6064)
 """Those of them that are read."""
+WRONG = "another drive, or a data sheet that is right"
+"""Way out where a data sheet says what no drive can be."""
 READ = {
     (0x1000, 0): "the device type",
     (0x1018, 1): "the vendor",
@@ -204,8 +212,7 @@ def unfit(sheet: DataSheet) -> tuple[str, ...]:
         for key in (*lacking, *(key for key in NEEDED_READS if not sheet.has(key)))
     ]
     told += [
-        f"{name_of(*key)} cannot be read; no drive runs without it: another drive, or a data sheet "
-        "that is right"
+        f"{name_of(*key)} cannot be read; no drive runs without it: {WRONG}"
         for key in (*((index, 0) for index in SHOWN), *NEEDED_READS)
         if sheet.has(key) and sheet.objects[key].access is Access.WO
     ]
@@ -250,8 +257,7 @@ def _pdo_problems(sheet: DataSheet, pdo: PdoConfig, *, commands: bool) -> Iterat
             known = sheet.objects.get(entry.key)
             if known is not None and known.access in (Access.RO, Access.CONST):
                 yield (
-                    f"{name_of(*entry.key)} is read-only; a command frame cannot carry it: another "
-                    "drive, or a data sheet that is right"
+                    f"{name_of(*entry.key)} is read-only; a command frame cannot carry it: {WRONG}"
                 )
 
 
@@ -262,9 +268,12 @@ def _object_problems(sheet: DataSheet, entry: Mapped) -> Iterator[str]:
             yield f"{name_of(*entry.key)} is missing; name another object in the bus file"
     elif known.kind is entry.kind or (entry.index in CYCLIC and _as_long(known.kind, entry)):
         return
+    elif entry in (CONTROLWORD, STATUSWORD):
+        kind = short_name(known.kind)
+        yield f"{name_of(*entry.key)} is of type {kind}, not u16; {WRONG}"
     elif entry.index in CYCLIC and known.kind not in FORMATS:
         kind = short_name(known.kind)
-        yield f"{name_of(*entry.key)} is of type {kind}, no whole number; another drive"
+        yield f"{name_of(*entry.key)} is of type {kind}, no whole number; {WRONG}"
     else:
         yield (
             f"{name_of(*entry.key)} is of type {short_name(known.kind)}, the bus file says "

@@ -14,7 +14,14 @@ from legbench.drives.protocol.objects import Access, Key, ObjectEntry
 from legbench.drives.setup.eds import BAUD_RATES
 from legbench.drives.sheet.clean import clean_text
 from legbench.drives.sheet.data_sheet import DataSheet, profile_default
-from legbench.drives.sheet.plausible import BASES, are_limits, mapped_keys, without_node
+from legbench.drives.sheet.plausible import (
+    BASES,
+    are_limits,
+    in_type,
+    mapped_keys,
+    meant_type,
+    without_node,
+)
 from legbench.drives.sheet.text import LARGEST_EDS, Sections, decode, number, split, words
 from legbench.errors import ConfigError
 from legbench.reading import UnreadableError, read_file
@@ -81,6 +88,8 @@ class _Found:
         """Add an object, of a configured device with a node id; some are mapped at power-on."""
         key = (variable.index, variable.subindex)
         kind, default = _typed(variable)
+        if kind != variable.data_type and kind in FORMATS:
+            self.guessed["objects have the profile's type instead of their own"] += 1
         if key in NEVER_ZERO and default == 0:
             default = None
         if variable.relative:
@@ -194,7 +203,7 @@ def _typed(variable: "ODVariable") -> tuple[DataType, Value | None]:
 
     A type that is no whole number and no text is taken for bytes of its length.
     """
-    default = variable.default if variable.value is None else variable.value
+    default = variable.default
     if variable.data_type not in KINDS:
         return DataType.OCTET_STRING, _bytes(variable.data_type or 0, default)
     kind = DataType(variable.data_type)
@@ -206,12 +215,9 @@ def _typed(variable: "ODVariable") -> tuple[DataType, Value | None]:
         return kind, default if isinstance(default, bytes) else None
     if kind is DataType.REAL32:
         return kind, float(default) if isinstance(default, int | float) else None
-    if not isinstance(default, int):
-        return kind, None
-    low, high = range_of(kind)
-    if low < 0 and high < default <= 2 * high + 1:
-        default -= 2 * high + 2
-    return kind, default if low <= default <= high else None
+    number_of = default if isinstance(default, int) else None
+    kind = meant_type((variable.index, variable.subindex), kind, number_of)
+    return kind, None if number_of is None else in_type(kind, number_of)
 
 
 def _bytes(number_of: int, default: object) -> bytes | None:

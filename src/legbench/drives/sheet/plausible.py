@@ -2,12 +2,16 @@
 
 from collections.abc import Iterable, Mapping
 
-from legbench.drives.protocol.datatypes import FORMATS, DataType, range_of
+from legbench.drives.protocol.datatypes import FORMATS, DataType, range_of, size_of
 from legbench.drives.protocol.frame import COB_INVALID, COB_MASK, RPDO_BASES, TPDO_BASES
-from legbench.drives.protocol.objects import Key
+from legbench.drives.protocol.objects import OBJECTS, Key
 from legbench.drives.protocol.pdo import split_word
 from legbench.drives.setup.needs import MAPPINGS, RPDOS, TPDOS
 
+POSITIONS = (0x6064, 0x607A, 0x607D, 0x60E4)
+"""Positions and their limits, which count from 0 on some drives and from both sides on others."""
+NAMING = (0x1016, *MAPPINGS[0], *MAPPINGS[1])
+"""Objects that name a node or another object, in 32 bits."""
 BASES: Mapping[Key, int] = {
     (0x1014, 0): 0x80,
     **{(0x1400 + place, 1): base for place, base in enumerate(RPDO_BASES)},
@@ -51,6 +55,33 @@ def are_limits(key: Key, kind: DataType, limits: tuple[int, int], default: int |
 
 def _is_identifier(key: Key) -> bool:
     return key in BASES or (key[1] == 1 and (key[0] in RPDOS or key[0] in TPDOS))
+
+
+def meant_type(key: Key, kind: DataType, default: int | None) -> DataType:
+    """Return the type of a whole number: that of the profile where its own cannot be meant.
+
+    Makers mix up the signs of types, which are the same bits on the bus, and tell types that cannot
+    hold the object's own default, or what it is there to name. Positions may have either sign, and
+    are left as they are.
+    """
+    known = OBJECTS.get(key)
+    if known is None or known.kind not in FORMATS or kind not in FORMATS or key[0] in POSITIONS:
+        return kind
+    too_short = default is not None and in_type(kind, default) is None
+    if too_short and in_type(known.kind, default or 0) is None:
+        return kind
+    length, usual = size_of(kind) or 0, size_of(known.kind) or 0
+    cannot_name = length < usual and (key in BASES or key[0] in NAMING)
+    return known.kind if too_short or cannot_name or length == usual else kind
+
+
+def in_type(kind: DataType, value: int) -> int | None:
+    """Return a value in a whole number's type, by its bits; none where it has more of them."""
+    low, high = range_of(kind)
+    span = high - low + 1
+    if not -(span >> 1) <= value < span:
+        return None
+    return (value - low) % span + low
 
 
 def mapped_keys(values: Iterable[tuple[Key, object]]) -> frozenset[Key]:
