@@ -204,7 +204,7 @@ def test_whatever_breaks_a_cycle_the_drives_are_stopped(
         it.link.start()
         it.run(5)
 
-        def broken() -> None:
+        def broken(now_ns: int) -> None:
             raise kind
 
         it.link._supervisor.states = broken

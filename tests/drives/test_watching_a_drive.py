@@ -1,10 +1,11 @@
 """What a master knows of a drive beside the cycle: losses, heartbeats, emergencies, temperature."""
 
 import math
+import random
 from dataclasses import replace
 
 import pytest
-from drives_rig import MS, config, node
+from drives_rig import MS, config, node, rpdos
 
 from legbench.drives.master.axis_link import AxisLink
 from legbench.drives.master.temperature import TemperaturePoll
@@ -135,6 +136,47 @@ def test_cycles_without_data_add_up_until_two_in_a_row_have_theirs() -> None:
         else:
             text = f"{WHO} sent no process data for {missed} cycles, the limit is {LOST}"
             assert found == ("process data lost", text)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_drive_is_looked_at_whenever_a_look_finds_something(seed: int) -> None:
+    dice, made, found = random.Random(seed), watch(), 0
+    for at_ms in range(300):
+        now_ns = at_ms * MS
+        event = dice.choices(
+            ("cycle", "lost", "beat", "state", "emergency", "arm", "silent"),
+            (60, 6, 6, 1, 1, 8, 1),
+        )[0]
+        match event:
+            case "cycle" | "lost":
+                made.cycle(complete=event == "cycle")
+            case "beat" | "state":
+                byte = 5 if event == "beat" else dice.choice((0, 4, 5, 0x7F))
+                made.take_heartbeat(bytes((byte,)), now_ns)
+            case "emergency":
+                made.take_emergency(dice.choice((b"\x10\x23", b"\x00\x00")) + bytes(6))
+            case "arm":
+                made.arm(now_ns)
+            case _:
+                made.expects_heartbeat = not made.expects_heartbeat
+        found += made.trouble(now_ns, 1) is not None
+        if now_ns <= made.well_until_ns:
+            assert made.trouble(now_ns, 1) is None
+        else:
+            # It is looked at for a reason, even where one loss is not yet too many.
+            assert made.trouble(now_ns, 1) is not None
+    assert 30 < found < 270
+
+
+def test_a_drive_in_order_is_looked_at_when_its_heartbeat_is_overdue_and_not_before() -> None:
+    made = watch(5 * MS)
+    assert made.well_until_ns == 35 * MS
+    made.take_heartbeat(b"\x05", 12 * MS)
+    assert made.well_until_ns == 42 * MS
+    made.expects_heartbeat = False
+    assert made.trouble(made.well_until_ns, 1) is None
+    # A century.
+    assert made.well_until_ns > 3_000_000_000 * 1_000_000_000
 
 
 def test_arming_forgets_all_that_was_before() -> None:
@@ -292,7 +334,7 @@ def test_a_target_is_kept_unwrapped_and_sent_wrapped() -> None:
         assert axis.target_counts == counts
         assert axis.target_pos == HERE.to_rad(counts)
         data = b"\x0f\x00" + wrap(counts).to_bytes(4, "little", signed=True)
-        assert axis.frames(0x0F) == [(0x202, data)]
+        assert rpdos(axis, 0x0F) == [(0x202, data)]
     axis.feed(0x182, motor_frame(0x37, 4321))
     axis.feed(0x382, link_frame(0))
     axis.aim_at_actual()
@@ -319,7 +361,7 @@ def test_commands_in_other_layouts_say_the_same_with_the_mode_8() -> None:
         )
         axis = AxisLink(replace(node(0), rpdos=pdos))
         axis.target_counts = -70_000
-        assert axis.frames(0x1F) == [
+        assert rpdos(axis, 0x1F) == [
             (0x101 + 0x100 * number, b"".join(parts[entry] for entry in objects))
             for number, objects in enumerate(layout, 1)
         ]

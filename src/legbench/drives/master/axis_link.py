@@ -103,6 +103,7 @@ class AxisLink:
         self.rpdo_sizes = {cob_id: layout.size for cob_id, layout in self._rpdos}
         self.rpdo_ids = tuple(self.rpdo_sizes)
         self._plain = self._plain_layout()
+        self._write_plain = self._rpdos[0][1].pack_into
         self._known = False
 
     def _plain_layout(self) -> bool:
@@ -132,22 +133,19 @@ class AxisLink:
             values = values_of(data)
         except struct.error:
             return False
-        if self._pick is not None:
-            self._missing, self.fresh = 0, True
-            self._digest(self._pick(values))
-            return True
-        shown = self._shown
-        for slot, place in wanted:
-            shown[slot] = values[place]
-        self._missing &= ~bit
-        if not self._missing:
-            self.fresh = True
-            self._digest(shown)
-        return True
-
-    def _digest(self, shown: Sequence[int]) -> None:
-        """Take all that a drive has shown in a cycle, in the order of the slots."""
-        self.statusword, motor, link, torque = shown
+        pick = self._pick
+        if pick is not None:
+            self._missing = 0
+            self.statusword, motor, link, torque = pick(values)
+        else:
+            shown = self._shown
+            for slot, place in wanted:
+                shown[slot] = values[place]
+            self._missing &= ~bit
+            if self._missing:
+                return True
+            self.statusword, motor, link, torque = shown
+        self.fresh = True
         if not self._known:
             self._find(motor)
         # As `AxisUnits.nearest` and `to_rad`, without their calls, four times a cycle.
@@ -160,6 +158,7 @@ class AxisLink:
             self.link_pos = (counts - self._link_zero) / self._link_scale
         if self._tells_torque:
             self.torque = self._torque_scale * torque
+        return True
 
     def _find(self, motor: int) -> None:
         """Unwrap for the first time: the link lies within half a turn of its motor.
@@ -203,18 +202,16 @@ class AxisLink:
         if self.sent_counts is not None:
             self.target_counts = self.sent_counts
 
-    def frames(self, controlword: int) -> list[tuple[int, bytes]]:
-        """RPDOs of this cycle: COB-ID and data."""
-        self.sent_counts = self.target_counts
+    def write(self, controlword: int, rpdos: Sequence[bytearray]) -> None:
+        """Write the data of this cycle's RPDOs, in the order of `rpdo_ids`."""
+        self.sent_counts = counts = self.target_counts
         # As `AxisUnits.show`, without its calls.
         lowest = self._lowest
-        target = lowest + (self.target_counts - lowest) % self._modulus
+        target = lowest + (counts - lowest) % self._modulus
         if self._plain:
-            cob_id, layout = self._rpdos[0]
-            return [(cob_id, layout.bytes_of(controlword, target))]
+            self._write_plain(rpdos[0], 0, controlword, target)
+            return
         known = {CONTROLWORD.key: controlword, self.node.target_object.key: target}
         known[0x6060, 0] = 8
-        return [
-            (cob_id, layout.pack([known.get(entry.key, 0) for entry in layout.entries]))
-            for cob_id, layout in self._rpdos
-        ]
+        for data, (_, layout) in zip(rpdos, self._rpdos, strict=True):
+            data[:] = layout.pack([known.get(entry.key, 0) for entry in layout.entries])

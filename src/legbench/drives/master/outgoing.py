@@ -36,12 +36,12 @@ class Outgoing:
         self._beat = port.message(beat.cob_id, beat.data)
         self._beat_ns = 1_000_000 * config.master_heartbeat_ms
         self._beat_due_ns = 0
-        self._commands = {
-            cob_id: port.message(cob_id, bytes(size))
+        self._commands = [
+            [port.message(cob_id, bytes(size)) for cob_id, size in axis.rpdo_sizes.items()]
             for axis in axes
-            for cob_id, size in axis.rpdo_sizes.items()
-        }
-        """COB-ID -> message of its true length, whose bytes are replaced in every cycle."""
+        ]
+        """Messages of each drive's RPDOs, whose bytes are replaced in every cycle."""
+        self._data = [[message.data for message in messages] for messages in self._commands]
 
     def begin(self, due_ns: int) -> None:
         """Place the next heartbeat one interval after a tick of the grid [ns]."""
@@ -61,14 +61,18 @@ class Outgoing:
 
         A frame that is refused keeps no other drive from its own. A drive without a controlword
         gets no frame.
+
+        Raises:
+            ValueError: not one controlword, or none, for each drive.
         """
-        sent, messages, put = True, self._commands, self._port.put
-        for axis, controlword in zip(self._axes, controlwords, strict=True):
+        if len(controlwords) != len(self._axes):
+            raise ValueError(f"{len(controlwords)} controlwords for {len(self._axes)} drives")
+        sent, put = True, self._port.put
+        for place, controlword in enumerate(controlwords):
             if controlword is None:
                 continue
-            for cob_id, data in axis.frames(controlword):
-                message = messages[cob_id]
-                message.data[:] = data
+            self._axes[place].write(controlword, self._data[place])
+            for message in self._commands[place]:
                 try:
                     put(message)
                 except BusError as error:
