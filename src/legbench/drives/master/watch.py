@@ -1,5 +1,6 @@
 """Watch of a drive besides its process data: heartbeat, emergencies, losses; pure."""
 
+import math
 from typing import final
 
 from legbench.drives.protocol.emcy import MEANINGS, Emergency, decode_emcy
@@ -8,8 +9,6 @@ from legbench.drives.setup.config import BusConfig, NodeConfig
 
 NOT_OPERATIONAL = (NmtState.PRE_OPERATIONAL, NmtState.STOPPED)
 """NMT states in which a drive sends no process data."""
-FOREVER_NS = 1 << 63
-"""Time that never comes [ns]."""
 HEARTBEATS = 3
 """Number of heartbeat periods without a heartbeat after which a drive is lost."""
 
@@ -88,11 +87,11 @@ class NodeWatch:
         """Judge what has come from the drive, once a message instead of once a cycle."""
         stands = self.state in NOT_OPERATIONAL
         if stands or self._rebooted or self.emergency is not None or self.missed > 0:
-            self.well_until_ns = -1
+            self.well_until_ns: float = -1
         else:
             beat = self._beat
             late_ns = beat.last_ns + beat.timeout_ns
-            self.well_until_ns = late_ns if self._expects_heartbeat else FOREVER_NS
+            self.well_until_ns = late_ns if self._expects_heartbeat else math.inf
 
     def cycle(self, *, complete: bool) -> None:
         """Count a cycle that has ended with or without its process data."""
