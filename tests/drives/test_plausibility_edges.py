@@ -286,11 +286,27 @@ def test_the_bounds_themselves_are_allowed() -> None:
         assert see_links(watch, (0.0, 0.0), (0.0, 0.0), (0.0, 0.0)) is None
         told = see_links(watch, (turn, -turn), (0.0, 0.0), (0.0, 0.0))
         assert (told is not None) is found
+    near = replace(BOUNDS, following_error=0.03125)
+    for off, found in ((0.03125, False), (math.nextafter(0.03125, 1.0), True)):
+        for side in (-1.0, 1.0):
+            motor = MotorWatch(near)
+            see_motor(motor, 1, side * off, 0.0)
+            assert (motor.suspicion is not None) is found
     for band, found in ((0.002, True), (math.nextafter(0.002, 1.0), False)):
         it, seen = Links(), []
         for cycle in range(20):
             seen.append(it.see((band if cycle == 10 else 0.0, 0.0012 * cycle), (0.0, 0.0)))
         assert (seen[-1] is not None) is found
+
+
+def test_a_leg_hides_a_drift_once_it_may_sway_by_more_than_a_tenth() -> None:
+    for sway, hides in ((0.1, False), (math.nextafter(0.1, 1.0), True)):
+        watch = LinkWatch(replace(BOUNDS, sway=sway))
+        assert (watch.stands, watch.hides_drift) == (False, False)
+        watch.expect(REST)
+        assert watch.hides_drift is hides
+        watch.start()
+        assert (watch.stands, watch.hides_drift) == (False, False)
 
 
 def test_a_motor_that_was_never_started_is_taken_to_stand_at_zero() -> None:

@@ -348,6 +348,7 @@ def test_commands_in_other_layouts_say_the_same_with_the_mode_8() -> None:
         ((CONTROLWORD, TARGET_POSITION, MODE),),
         ((CONTROLWORD, MODE), (TARGET_POSITION, other)),
         ((CONTROLWORD,), (TARGET_POSITION,)),
+        ((CONTROLWORD, TARGET_POSITION), (MODE,)),
     )
     parts = {
         CONTROLWORD: b"\x1f\x00",
@@ -365,6 +366,9 @@ def test_commands_in_other_layouts_say_the_same_with_the_mode_8() -> None:
             (0x101 + 0x100 * number, b"".join(parts[entry] for entry in objects))
             for number, objects in enumerate(layout, 1)
         ]
+        if len(layout) > 1:
+            with pytest.raises(ValueError, match="zip"):
+                axis.write(0x1F, [bytearray(2)])
 
 
 def test_a_state_in_words_is_unknown_where_no_pattern_fits() -> None:

@@ -143,7 +143,7 @@ class LinkWatch:
         self._heard = True
         self._sway_age = 0
         self._sway_rest = self._led_rest = self._led = self._swayed = self._widening = 0.0
-        self._limit = self._bounds.sway
+        self._limit = 0.0
         self._young = deque([0.0] * self._delay, maxlen=self._delay)
         self._window = deque[tuple[float, float, float, float]](maxlen=self._standing_cycles)
         self._place = (math.nan, math.nan)
