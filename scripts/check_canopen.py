@@ -22,9 +22,8 @@ RESULT = re.compile(r"^(PASSED|FAILED|ERROR) (\S+::\S+)", re.MULTILINE)
 TRIES = 5
 """Number of further tries of a test that fails."""
 PATIENCE_S = 600.0
-RACES = {
-    "test_time_producer": "two threads of the test read one bus, and either may get the frame",
-}
+BESIDE = "two threads of the test read one bus, and either may get the frame"
+RACES = {"test_time_producer": BESIDE, "test_scanner_search_limit": BESIDE}
 """Test -> why it may fail on any bus on which a frame takes time."""
 
 

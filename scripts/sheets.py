@@ -41,10 +41,11 @@ FOREVER = 1 << 40
 
 
 def run(bus: Path, controller: str, *, interrupt: bool = False) -> str:
-    """Run three seconds of a controller; how it ended."""
+    """Run three seconds of a controller, or an hour up to ^C; how it ended."""
     runs = bus.parent / f"{controller}-{interrupt}"
     command = [sys.executable, "-m", "legbench", "run", controller, "--plant", "can", "--bus"]
-    command += [str(bus), "--interface", "legbench", "--duration", "3", "--out", str(runs)]
+    command += [str(bus), "--interface", "legbench", "--out", str(runs)]
+    command += ["--duration", "3600" if interrupt else "3"]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
     if interrupt:
         _await_rows(runs, process)

@@ -355,6 +355,18 @@ def test_budget_is_the_worst_case_and_refuses_too_much(
     assert "114 % of 500000 bit/s at worst, the limit is 80 %" in done.err
 
 
+def test_a_budget_of_two_channels_says_which_frame_is_on_which(
+    capfd: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    two = changed(tmp_path, ('name = "motor2"', 'channel = "can1"\nname = "motor2"'))
+    done = called(capfd, "drives", "budget", "--bus", two)
+    ends = {line.split(" ")[0]: line.partition(" % ")[2] for line in done.out.splitlines()[:10]}
+    assert (ends["RPDO1"], ends["SYNC"]) == ("of can1", "of can1")
+    assert sum(line.endswith(" % of can0") for line in done.out.splitlines()) == 5
+    frames = json.loads(called(capfd, "drives", "budget", "--json", "--bus", two).out)["frames"]
+    assert [frame["channel"] for frame in frames] == ["can0"] * 5 + ["can1"] * 5
+
+
 def test_monitor_sends_nothing_and_ends_by_itself(drives: Drives) -> None:
     done = drives("monitor", "--seconds", "0.1", "--every", "0.05")
     assert done.status == 0

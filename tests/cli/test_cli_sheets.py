@@ -65,6 +65,32 @@ def test_learn_says_what_a_drive_lacks_and_writes_a_file_that_fits(
     assert done.status == 0, done.err
 
 
+def test_learn_says_of_each_object_whether_it_is_there_fixed_or_missing(
+    call: Call, folder: Path
+) -> None:
+    sections = (folder / "it.eds").read_text(encoding="utf-8").split("\n[")
+    lacking = ("6007", "6085", "607E")
+    text = "\n[".join(one for one in sections if not one.startswith(lacking))
+    head, sync, rest = text.partition("[1005]")
+    fixed = rest.replace("AccessType=rw", "AccessType=const", 1)
+    (folder / "it.eds").write_text(head + sync + fixed, encoding="utf-8")
+    done = learnt(call, folder)
+    assert done.status == 0, done.err
+    has, *others = done.out.partition("  has ")[2].split("\n  ")
+    while others[0].startswith("    "):
+        has += f" {others.pop(0).strip()}"
+    assert {"6040h:00", "6064h:00", "6084h:00", "1400h:05"} <= set(has.split(", "))
+    assert "if present fixed 1005h:00 COB-ID SYNC: as it is wanted" in others
+    assert "if present lacks 607Eh:00 Polarity: where it is missing nothing is lost" in others
+    assert (
+        "protection lacks 6085h:00 Quick stop deceleration [counts/s2]: the drive has no such "
+        "object; instead: 6084h:00 Profile deceleration [counts/s2], by 605Ah = 1" in others
+    )
+    assert others[-1] == "without master no reaction of it is known\n"
+    done = call("drives", "budget", "--bus", folder / "my.toml")
+    assert "without master, motor1 is not known to stop\n" in done.out
+
+
 def test_check_is_an_object_and_refuses_in_lines(call: Call, folder: Path) -> None:
     learnt(call, folder)
     done = call("drives", "check", "--json", "--bus", folder / "my.toml")

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from legbench.cli import output
-from legbench.cli.table import print_summary
+from legbench.cli.table import print_summary, warned
 from legbench.control import JumpConfig
 from legbench.design import load_design
 from legbench.experiment import Experiment
@@ -52,6 +52,14 @@ def test_an_energy_residual_is_explained(
 ) -> None:
     print_summary(replace(summary, energy_residual=residual, numerics=numerics))
     assert f"energy residual   {said}\n" in capsys.readouterr().out
+
+
+def test_emergencies_that_warn_are_told_once_each() -> None:
+    code, other = "EMCY FF01h vendor error of node 1", "EMCY 5112h supply low of node 2"
+    heard = {"name": "bus", "emergencies": [], "warnings": [code, other, code, code]}
+    assert warned([{"name": "rest"}, heard]) == f"{code} (3 times), {other}"
+    assert not warned([{"name": "bus", "emergencies": [code], "warnings": []}])
+    assert not warned([{"name": "end"}])
 
 
 def test_the_time_left_follows_the_pace_since_the_first_report(

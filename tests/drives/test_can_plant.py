@@ -14,10 +14,12 @@ from legbench.drives.emulated.faults import NodeFault, NodeFaultKind
 from legbench.drives.master.link import LinkState
 from legbench.drives.protocol.cia402 import DriveState
 from legbench.drives.setup.bus_file import load_bus, load_limits
+from legbench.drives.setup.quirks import Quirks
 from legbench.errors import ConfigError, PlantFault
 from legbench.experiment import record, start_of
 from legbench.loop import run
 from legbench.mjcf import Linkage, LinkageKind
+from legbench.plant.can_events import bus_events
 from legbench.plant.landing import End
 from legbench.plant.limited import LimitedPlant
 from legbench.plant.sim import SimPlant
@@ -52,6 +54,21 @@ def test_the_leg_does_not_move_until_it_is_told_to() -> None:
         assert np.max(np.abs(seen.joint_vel)) < 0.05
         assert seen.truth is None
         assert seen.time == 0.0
+
+
+def test_warnings_of_the_bus_file_are_told_beside_all_emergencies() -> None:
+    chosen, bench = experiment(PositionJumpConfig()), load_bus(BUS)
+    first, second = bench.nodes
+    bus = replace(bench, nodes=(replace(first, quirks=Quirks(warnings=(0xFF01,))), second))
+    start = start_of(chosen).motor_pos
+    behaviours = [
+        Behaviour(start_pos=float(pos), warnings=codes)
+        for pos, codes in zip(start, ((0xFF01,), ()), strict=True)
+    ]
+    with stage(chosen, config=bus, behaviours=behaviours, lands=False) as it:
+        it.plant.reset()
+        told = bus_events(it.plant)["bus"]
+    assert told["emergencies"] == told["warnings"] == ["EMCY FF01h vendor error of node 1"]
 
 
 @pytest.mark.long

@@ -86,7 +86,7 @@ def test_a_bus_file_becomes_a_bus(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("bitrate = 1_000_000", "bitrat = 1", "bus has unknown keys: bitrat; it knows nodes"),
+        ("bitrate = 1_000_000", "bitrat = 1", "bus has unknown keys: bitrat; it knows node, eds"),
         ("bitrate = 1_000_000", "bitrate = '1M'", "bus: bitrate is '1M'; it must be of type int"),
         ("id = 1", "id = 200", "node 'hip' has id 200; it must be 1 to 127"),
         ("id = 1", "id = 2", "node ids 2, 2 and master 126 must differ"),

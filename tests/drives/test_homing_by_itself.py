@@ -99,7 +99,10 @@ def test_a_homing_has_ended_once_it_is_attained_and_its_target_reached() -> None
     both = ENABLED | REACHED | ATTAINED
     assert ended(ENABLED, ENABLED | REACHED, ENABLED | ATTAINED, both, ENABLED) == (None, 1)
     told, _ = ended(ENABLED | REACHED)
-    assert told == "homing of 'hip' has not ended within 0.1 s; raise --timeout"
+    assert told == (
+        "homing of 'hip' has not ended within 0.1 s; raise --timeout, or the speeds of a search "
+        "(6099h) in its parameters"
+    )
     assert ended(ENABLED | ATTAINED)[0] == told
 
 

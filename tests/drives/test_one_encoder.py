@@ -111,6 +111,17 @@ def test_a_link_encoder_beside_another_one_is_refused() -> None:
         replace(load_bus(BUS).nodes[0], side=Side.LINK)
 
 
+@pytest.mark.parametrize("side", list(Side))
+def test_units_that_do_not_fit_are_those_of_the_encoder_that_is_there(
+    side: Side, tmp_path: Path
+) -> None:
+    text = "\n".join(x for x in bus_text(side).splitlines() if not x.startswith("bits"))
+    text = text.replace("offset_counts = 0", "offset_counts = 0\nbits = 16")
+    (tmp_path / "leg.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(ConfigError, match=f"'motor1': {side} bits is 16, but 6064h:00 has 32"):
+        load_bus(tmp_path / "leg.toml")
+
+
 # --- limits ----------------------------------------------------------------------------------
 
 

@@ -140,7 +140,7 @@ def test_a_protection_that_is_not_there_is_told_with_what_takes_its_place() -> N
     # What has to be refused is a problem, and no mere loss.
     assert not [line for line in required.unprotected if line.startswith("6060h:00")]
     may_lack = table(assessed(drive((0x60B0, 0))))["60B0h:00"]
-    assert may_lack == ("required", "lacks", "may be missing, nothing is lost")
+    assert may_lack == ("if present", "lacks", "where it is missing nothing is lost")
 
 
 @pytest.mark.parametrize(

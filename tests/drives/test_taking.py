@@ -195,13 +195,18 @@ def test_no_drive_stores_its_history_its_signatures_or_what_it_is_told_to_do() -
 
 # --- what is waived --------------------------------------------------------------------------
 
+ENDLESS = (
+    "or without end where they lack what stops them (1016h or 140xh:05, both with 6007h), which "
+    "`legbench drives check` tells by their data sheet"
+)
+
 
 def test_every_waiver_says_what_it_costs() -> None:
     costs = {
         "quick-stop ramp": "a drive may run on beyond the springs before a quick stop has ended",
         "spring watch": "the springs of drives with one encoder may be wound beyond their limit",
         "drive heartbeat": "drives tell that they live every 20 ms",
-        "master watch": "drives may go on for 21 ms when their master is gone",
+        "master watch": f"drives may go on for 21 ms when their master is gone, {ENDLESS}",
     }
     for names in (tuple(costs), tuple(reversed(costs)), ("spring watch",), ()):
         bus = config(waive=names)

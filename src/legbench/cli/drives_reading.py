@@ -150,7 +150,7 @@ class Budget:
         config = bench.config().at(bench.bitrate)
         limits = limits_for(bench.limits or bench.bus.parent / LIMITS_NAME, bench.leg())
         means = known_means(config, speed=limits.command_speed)
-        entries = [entry for one in config.channels for entry in schedule(config, one)]
+        entries = [(one, entry) for one in config.channels for entry in schedule(config, one)]
         load = max(bus_load(config, one) for one in config.channels)
         if bench.json:
             print_json(
@@ -158,7 +158,7 @@ class Budget:
                     "bitrate": config.bitrate,
                     "load": load,
                     "limit": MAX_LOAD,
-                    "frames": [asdict(entry) for entry in entries],
+                    "frames": [asdict(entry) | {"channel": one} for one, entry in entries],
                     "exchanges": [asdict(one) for one in exchanges(config)],
                     "deadline_us": config.deadline_us,
                     "period_us": config.period_us,
@@ -172,7 +172,8 @@ class Budget:
             _print_budget(config, entries, load)
             for name, found in means.items():
                 texts = [f"{one.stop_ms:.0f} ms by {one.name}" for one in found]
-                print(f"without master, {name} stands after {' or '.join(texts) or 'no time'}")
+                stands = f"stands after {' or '.join(texts)}" if texts else "is not known to stop"
+                print(f"without master, {name} {stands}")
         check_budget(config)
         check_together(config, limits, stops=joint_ranges(bench.leg()))
         return 0
@@ -183,14 +184,18 @@ def _told(number: int | None, form: str = "d") -> str:
     return "not told" if number is None else format(number, form)
 
 
-def _print_budget(config: BusConfig, entries: "Sequence[LoadEntry]", load: float) -> None:
-    """Print what every frame takes of its wire, and when the last ones come."""
+def _print_budget(
+    config: BusConfig, entries: "Sequence[tuple[str | None, LoadEntry]]", load: float
+) -> None:
+    """Print what every frame takes of its wire, one of several by name, and when the last come."""
     from legbench.drives.setup.exchange import exchanges
     from legbench.drives.setup.wire import MAX_LOAD
 
-    for entry in entries:
-        share = entry.bits * entry.rate / config.bitrate
-        print(f"{entry.what:<24} {entry.bits:4d} bits  {entry.rate:7.1f} /s  {100 * share:5.1f} %")
+    several = len(config.channels) > 1
+    for channel, entry in entries:
+        share = 100 * entry.bits * entry.rate / config.bitrate
+        of = f" of {channel}" if several else ""
+        print(f"{entry.what:<24} {entry.bits:4d} bits  {entry.rate:7.1f} /s  {share:5.1f} %{of}")
     print(
         f"{'worst load':<24} {100 * load:.1f} % of {config.bitrate} bit/s, the limit is "
         f"{100 * MAX_LOAD:.0f} %"

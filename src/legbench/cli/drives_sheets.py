@@ -3,6 +3,7 @@
 from collections import Counter
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 from tyro.conf import Positional, UseAppendAction
@@ -90,12 +91,14 @@ def _print(learned: "Learned", *, as_json: bool, out: Path | None) -> None:
             print(f"  {remark}")
         counts = Counter(finding.state.value for finding in one.findings)
         print("  " + ", ".join(f"{state} {count}" for state, count in sorted(counts.items())))
+        print(_listed("has", one.findings))
         for finding in one.findings:
             if finding.state.value != "has" or finding.remark:
                 remark = f": {finding.remark}" if finding.remark else ""
                 print(f"  {finding.need:<10} {finding.state.value:<5} {finding.object}{remark}")
         times = [f"{means.time_ms:.0f} ms by {means.name}" for means in one.means]
-        print(f"  without master it reacts after {' or '.join(times) or 'no time that is known'}")
+        reacts = f"it reacts after {' or '.join(times)}" if times else "no reaction of it is known"
+        print(f"  without master {reacts}")
     if out is not None and not learned.problems:
         note(f"wrote {out}")
         if not (out.parent / LIMITS_NAME).exists():
@@ -107,6 +110,12 @@ def _print(learned: "Learned", *, as_json: bool, out: Path | None) -> None:
             f"{len(learned.to_measure)} lines of the bus file are still to be measured; each says "
             "MEASURE"
         )
+
+
+def _listed(state: str, findings: "tuple[Finding, ...]") -> str:
+    """Objects in a state, without their names, in lines as long as a page is wide."""
+    known = [one.object.split(" ")[0] for one in findings if one.state.value == state]
+    return fill(", ".join(known), 100, initial_indent=f"  {state} ", subsequent_indent="      ")
 
 
 def _as_json(learned: "Learned", out: Path | None) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 import io
 import os
+import re
 from contextlib import redirect_stderr
 from typing import TypeVar, Union
 
@@ -60,7 +61,9 @@ def parse(
             )
     except SystemExit as end:
         if end.code == WRONG_USAGE:
-            wrong_usage(command, _in_a_line(told.getvalue()))
+            said = _in_a_line(told.getvalue())
+            deeper = re.search(rf"legbench ({re.escape(command)} [\w-]+)", said)
+            wrong_usage(deeper[1] if deeper else command, said)
         raise
 
 

@@ -115,7 +115,7 @@ def main(arguments: list[str]) -> int:
 
 def _report(finished: "Finished", *, as_json: bool) -> int:
     """Print how a run has ended and its figures; returns the exit status."""
-    from legbench.cli.table import limited, print_summary
+    from legbench.cli.table import limited, print_summary, warned
     from legbench.metrics import summarise
     from legbench.metrics.soundness import Soundness
     from legbench.recording.reader import load
@@ -125,7 +125,10 @@ def _report(finished: "Finished", *, as_json: bool) -> int:
         return 130
     if finished.outcome.message is not None:
         note(f"legbench: {finished.outcome.message}")
-    summary = summarise(load(finished.path))
+    recording = load(finished.path)
+    summary = summarise(recording)
+    if warnings := warned(recording.events):
+        note(f"legbench: drives sent what the bus file lists as warnings: {warnings}")
     if summary.limited_cycles:
         note(
             f"legbench: the limits changed the command in {limited(summary)}: the leg ran "

@@ -1,6 +1,9 @@
 """Tables of figures of runs, for people."""
 
 import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from legbench.metrics import Comparison, Summary
 from legbench.metrics.rating_text import rated_lines
@@ -47,6 +50,14 @@ def limited(summary: Summary) -> str:
     """Say in how many cycles, and by how much, the limits changed the command."""
     worst = ", ".join(f"{value:.3g}" for value in summary.limited_max)
     return f"{summary.limited_cycles} cycles, by up to {worst} rad (motor 1, 2)"
+
+
+def warned(events: Sequence[Mapping[str, Any]]) -> str:
+    """Say which warnings of the bus file drives sent in a run, each once; empty without any."""
+    heard = [text for event in events for text in event.get("warnings", ())]
+    return ", ".join(
+        text if count == 1 else f"{text} ({count} times)" for text, count in Counter(heard).items()
+    )
 
 
 def print_comparison(comparison: Comparison) -> None:

@@ -258,7 +258,10 @@ class _Master(DriveLeader):
                 raise DriveError(f"homing of '{name}' failed with statusword {word:04X}h")
             if word & StatusBit.FOLLOWS_COMMAND and word & StatusBit.TARGET_REACHED:
                 return
-        raise DriveError(f"homing of '{name}' has not ended within {timeout:g} s; raise --timeout")
+        raise DriveError(
+            f"homing of '{name}' has not ended within {timeout:g} s; raise --timeout, or the "
+            "speeds of a search (6099h) in its parameters"
+        )
 
     def close(self) -> None:
         """Quick stop, no voltage for a drive that takes too long, pre-operational; once.

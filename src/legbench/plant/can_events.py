@@ -37,6 +37,12 @@ def _frames(plant: CanPlant) -> dict[str, Any]:
         "error_frames": cycle.error_frames,
         "lost_cycles": [watch.lost_total for watch in cycle.watches],
         "emergencies": [str(text) for watch in cycle.watches for text in watch.history],
+        "warnings": [
+            str(text)
+            for node, watch in zip(plant.session.config.nodes, cycle.watches, strict=True)
+            for text in watch.history
+            if text.code in node.quirks.warnings
+        ],
         "state": link.state.name.lower(),
         "began": plant.began,
     }

@@ -1,8 +1,8 @@
 """Frozen values from the tables of a file: keys and types are checked, errors name their place."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, Field, fields
 from typing import Any, TypeVar
 
 from legbench.drives.setup.config import NOT_IN_FILES
@@ -14,6 +14,15 @@ _PLAIN_TYPES: dict[str, tuple[type, ...]] = {
     "float": (int, float),
     "bool": (bool,),
 }
+KEYS: Mapping[str, tuple[str, ...]] = {
+    "nodes": ("node", "eds"),
+    "node_id": ("id",),
+    "identity": ("vendor", "product", "serial"),
+    "side": (),
+    "rpdos": ("rpdo",),
+    "tpdos": ("tpdo",),
+}
+"""Keys of a file from which a field of another name is made."""
 LARGEST = 1e18
 """Bound that the magnitude of every number of a file stays below."""
 
@@ -36,16 +45,8 @@ def build(
     converted: tuple[str, ...] = (),
 ) -> Built:
     """A dataclass from keys: unknown and missing ones are named, plain types checked."""
-    known = {
-        field.name: field
-        for field in fields(kind)  # pyrefly: ignore[bad-argument-type]
-        if field.init and NOT_IN_FILES not in field.metadata
-    }
-    unknown = sorted(set(given) - set(known))
-    if unknown:
-        raise ConfigError(
-            f"{where} has unknown keys: {', '.join(unknown)}; it knows {', '.join(known)}"
-        )
+    known = _fields(kind)
+    _refuse_unknown(where, given, known)
     for name, value in given.items():
         if name in converted:
             continue
@@ -59,13 +60,39 @@ def build(
         if name not in converted and isinstance(value, int | float)
     }
     lacking = [
-        "id" if name == "node_id" else name
+        ", ".join(KEYS.get(name, (name,)))
         for name, field in known.items()
         if name not in given and field.default is MISSING
     ]
     if lacking:
         raise ConfigError(f"{where}: {', '.join(lacking)} must be given")
     return kind(**(dict(given) | plain))
+
+
+def check_keys(kind: Callable[..., object], where: str, given: Mapping[str, Any]) -> None:
+    """Refuse a table with keys that files do not have, fields of other names included.
+
+    Raises:
+        ConfigError: a key is unknown; the message names all that are known.
+    """
+    known = [key for name in _fields(kind) for key in KEYS.get(name, (name,))]
+    _refuse_unknown(where, given, known)
+
+
+def _fields(kind: Callable[..., object]) -> "dict[str, Field[Any]]":
+    return {
+        field.name: field
+        for field in fields(kind)  # pyrefly: ignore[bad-argument-type]
+        if field.init and NOT_IN_FILES not in field.metadata
+    }
+
+
+def _refuse_unknown(where: str, given: Iterable[str], known: Collection[str]) -> None:
+    unknown = sorted(set(given) - set(known))
+    if unknown:
+        raise ConfigError(
+            f"{where} has unknown keys: {', '.join(unknown)}; it knows {', '.join(known)}"
+        )
 
 
 def finite(where: str, name: str, value: float) -> float:

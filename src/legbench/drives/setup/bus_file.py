@@ -10,7 +10,7 @@ from legbench.drives.errors import CodecError
 from legbench.drives.protocol.datatypes import SHORT_NAMES
 from legbench.drives.protocol.objects import name_of
 from legbench.drives.protocol.pdo import Mapped
-from legbench.drives.setup.building import Built, at, build, finite
+from legbench.drives.setup.building import Built, at, build, check_keys, finite
 from legbench.drives.setup.config import BusConfig, Identity, NodeConfig, Parameter
 from legbench.drives.setup.configuration import interpolation_time
 from legbench.drives.setup.encoders import Side
@@ -98,6 +98,7 @@ def limits_from_mapping(content: Mapping[str, Any]) -> SafetyLimits:
 
 def bus_from_mapping(content: Mapping[str, Any], folder: Path = Path()) -> BusConfig:
     """A bus from the tables of a file in `folder`; raises ConfigError."""
+    check_keys(BusConfig, "bus", content)
     given = dict(content)
     tables = _list("node", given.pop("node", []))
     # A data sheet of the bus is that of every node which names none.
@@ -128,6 +129,7 @@ def _node(given: dict[str, Any], place: int, folder: Path) -> NodeConfig:
 
 
 def _node_of(given: dict[str, Any], where: str, folder: Path) -> NodeConfig:
+    check_keys(NodeConfig, where, given)
     identity = {key: given.pop(key) for key in _IDENTITY if key in given}
     given["identity"] = build(Identity, where, identity)
     _encoders(where, given)

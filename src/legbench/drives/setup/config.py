@@ -119,7 +119,7 @@ class NodeConfig:
     def _check_encoders(self) -> None:
         check_sides(self.name, self.side, self.link)
         for entry in (self.motor_object, self.target_object):
-            check_encoder(self.name, "motor", self.motor, entry)
+            check_encoder(self.name, self.side, self.motor, entry)
         if self.link is not None:
             check_encoder(self.name, "link", self.link, self.link_object)
         if self.torque_object is not None:

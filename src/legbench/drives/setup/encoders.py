@@ -41,7 +41,7 @@ def check_encoder(name: str, axis: str, units: AxisUnits, entry: Mapped) -> None
 
     Args:
         name: name of the drive.
-        axis: `motor` or `link`.
+        axis: side of the encoder, `motor` or `link`.
         units: units of the position.
         entry: its object.
 

@@ -26,7 +26,8 @@ class Parameter:
         return f'{name_of(*self.key)} ("{self.index:04X}:{self.sub:02X} {short}")'
 
 
-OWN_OBJECTS = (0x1005, 0x1006, 0x1016, 0x1017, 0x1029, 0x6007, 0x6040, 0x605A, 0x6060)
+CONSUMERS = 0x1016
+OWN_OBJECTS = (0x1005, 0x1006, CONSUMERS, 0x1017, 0x1029, 0x6007, 0x6040, 0x605A, 0x6060)
 OWN_OBJECTS += (0x607A, 0x60B0, 0x60C2)
 """Written from the rest of the bus file; a parameter would undo it."""
 PDO_OBJECTS = range(0x1400, 0x1C00)
@@ -45,7 +46,10 @@ def check_parameter(name: str, parameter: Parameter) -> None:
     if not low <= parameter.value <= high:
         held = f"holds {low} to {high}" if low <= high else "is no number"
         what = f"is {parameter.value}, but its type {parameter.kind.name} {held}: correct one"
-    if index in OWN_OBJECTS or index in PDO_OBJECTS:
+    if index == CONSUMERS and parameter.sub > 1:
+        # A drive may watch other nodes from its maker on, of which none is on this bus.
+        what = "watches another node: give 0, which ends that" if parameter.value else what
+    elif index in OWN_OBJECTS or index in PDO_OBJECTS:
         what = "is written by itself, from the rest of the bus file: leave it out"
     elif index in MEMORY_OBJECTS:
         what = "would wear out the drive's memory at every start: run `legbench drives store` once"

@@ -40,4 +40,8 @@ def _of_bus(name: str, config: BusConfig | None) -> str:
     latest = stop_ms(config)
     if math.isinf(latest):
         return "a drive does not stop when its master is gone"
-    return f"drives may go on for {latest:.0f} ms when their master is gone"
+    return (
+        f"drives may go on for {latest:.0f} ms when their master is gone, or without end where "
+        "they lack what stops them (1016h or 140xh:05, both with 6007h), which `legbench drives "
+        "check` tells by their data sheet"
+    )

@@ -11,7 +11,7 @@ from legbench.drives.setup.config import BusConfig, NodeConfig, PdoConfig
 from legbench.drives.setup.master_watch import Means, means_of
 from legbench.drives.setup.needs import MAPPINGS, Need
 from legbench.drives.setup.outcome import ObjectOutcome, held_by
-from legbench.drives.setup.taken import not_given
+from legbench.drives.setup.taken import RAMPS, not_given
 from legbench.drives.sheet.data_sheet import DataSheet
 from legbench.drives.sheet.predict import predict
 
@@ -27,6 +27,8 @@ READ = {
     (0x603F, 0): "the reason of a fault, but for what an emergency message says",
 }
 """Objects that are read, and what is not known without them."""
+IF_PRESENT = "if present"
+"""Need of an object that may be missing, but has to agree where it is there."""
 NEEDED_READS = ((0x1000, 0), (0x1018, 1))
 
 
@@ -77,7 +79,8 @@ def assess(
     """
     outcomes = predict(sheet, bus, node)
     written = [entry for entry in outcomes if not _is_mapping(entry)]
-    unused = tuple(_unused(sheet, {entry.parameter.key for entry in outcomes}))
+    given = {entry.parameter.key for entry in outcomes}
+    unused = tuple(_unused(sheet, given))
     lost = [entry.line for entry in outcomes if entry.passes and entry.line is not None]
     reads = [finding for finding in _reads(sheet) if finding.state is State.LACKS]
     return Assessment(
@@ -88,6 +91,7 @@ def assess(
             *_reads(sheet),
             *map(_finding, written),
             *unused,
+            *_replaced(sheet, given),
         ),
         problems=tuple(_problems(sheet, node, outcomes)),
         unprotected=(*lost, *(f"{one.object}: {one.remark}" for one in (*reads, *unused))),
@@ -109,14 +113,16 @@ def _finding(entry: ObjectOutcome) -> Finding:
     state = State.LACKS if entry.missing else State.HAS if entry.code is None else State.FIXED
     return Finding(
         object=entry.name,
-        need=entry.row.need.value,
+        need=IF_PRESENT if entry.row.may_lack else entry.row.need.value,
         state=state,
         remark=(entry.line or "").removeprefix(f"{entry.name}: ") or _nothing_lost(entry),
     )
 
 
 def _nothing_lost(entry: ObjectOutcome) -> str:
-    return "may be missing, nothing is lost" if entry.missing and entry.passes else ""
+    if entry.code is None or not entry.passes:
+        return ""
+    return "where it is missing nothing is lost" if entry.missing else "as it is wanted"
 
 
 def _unused(sheet: DataSheet, written: set[Key]) -> Iterator[Finding]:
@@ -129,6 +135,18 @@ def _unused(sheet: DataSheet, written: set[Key]) -> Iterator[Finding]:
             need=row.need.value,
             state=State.HAS if has else State.LACKS,
             remark=f"{why}; {row.loss}",
+        )
+
+
+def _replaced(sheet: DataSheet, written: set[Key]) -> Iterator[Finding]:
+    """Yield the usual ramp of a quick stop, for which the bus file gives the other one."""
+    usual, other = RAMPS
+    if other in written and not sheet.has(usual):
+        yield Finding(
+            object=name_of(*usual),
+            need=Need.PROTECTION.value,
+            state=State.LACKS,
+            remark=f"the drive has no such object; instead: {name_of(*other)}, by 605Ah = 1",
         )
 
 
