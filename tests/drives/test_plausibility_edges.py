@@ -309,6 +309,28 @@ def test_a_leg_hides_a_drift_once_it_may_sway_by_more_than_a_tenth() -> None:
         assert (watch.stands, watch.hides_drift) == (False, False)
 
 
+def test_commands_along_the_polar_mode_alone_let_a_leg_sway() -> None:
+    for moved, hides in (((-0.9, 0.9), False), ((-0.4, 0.6), True)):
+        watch = LinkWatch(BOUNDS)
+        for _ in range(20):
+            assert see_links(watch, REST) is None
+        watch.expect(moved)
+        assert watch.hides_drift is hides
+
+
+def test_a_sway_at_its_limit_is_allowed() -> None:
+    # Its reference takes up 1/1024 of what lasts in each cycle, so that all numbers are exact.
+    fourth = 0.0625 * (1023 / 1024) ** 4
+    for limit, found in ((fourth, False), (math.nextafter(fourth, 0.0), True)):
+        watch = LinkWatch(
+            replace(BOUNDS, period=1 / 1024, sway=limit, joint_speed=math.inf, standing=math.inf)
+        )
+        see_links(watch, (0.0, 0.0))
+        told = [see_links(watch, (0.03125, 0.03125)) for _ in range(4)]
+        assert told[:3] == [None] * 3
+        assert (told[3] is not None) is found
+
+
 def test_a_motor_that_was_never_started_is_taken_to_stand_at_zero() -> None:
     for shown, found in ((0.0299, False), (0.5, True), (-0.5, True)):
         watch = MotorWatch(BOUNDS)
