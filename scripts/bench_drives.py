@@ -119,7 +119,7 @@ def cpu_parts(plant: CanPlant, kind: Kind, seen: Observation) -> dict[str, list[
 
 def measure(config: BusConfig, kind: Kind) -> tuple[dict[str, list[float]], dict[str, Blocks]]:
     """CPU time of the parts of a cycle and wall time of blocks, for one motion [us]."""
-    motion = record_motion(config, WARM_UP + CYCLES + TURNS, kind)
+    motion = record_motion(config, WARM_UP + CYCLES + TURNS + 1, kind)
     with served(motion) as (bus, move):
         first = emulated_bus(config, kind)
         switched, free = Switched(first), Free(first)
@@ -135,9 +135,10 @@ def measure(config: BusConfig, kind: Kind) -> tuple[dict[str, list[float]], dict
             commands = iter(motion.commands[WARM_UP + CYCLES :])
 
             def exchange() -> None:
-                link.command(next(commands))
                 link.exchange()
+                link.command(next(commands))
 
+            link.command(next(commands))
             first_target, second_target = [axis.target_counts for axis in link.cycle.axes]
             took = rounds((bus, switched), exchange, (first_target, second_target), move)
         finally:

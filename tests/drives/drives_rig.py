@@ -11,7 +11,6 @@ from legbench.drives.emulated.body import Body, stiff_body
 from legbench.drives.emulated.build import emulate
 from legbench.drives.emulated.bus import LockstepBus
 from legbench.drives.emulated.network import Network
-from legbench.drives.master.axis_link import AxisLink
 from legbench.drives.master.link import Link
 from legbench.drives.protocol.cia402 import DriveState, decode_state
 from legbench.drives.setup.config import BusConfig, Identity, NodeConfig
@@ -112,13 +111,6 @@ def rig(
     finally:
         link.close()
         bus.shutdown()
-
-
-def rpdos(axis: AxisLink, controlword: int) -> list[tuple[int, bytes]]:
-    """COB-ID and data of the RPDOs that a drive is sent in a cycle."""
-    written = {cob_id: bytearray(size) for cob_id, size in axis.rpdo_sizes.items()}
-    axis.write(controlword, list(written.values()))
-    return [(cob_id, bytes(data)) for cob_id, data in written.items()]
 
 
 def state_of(statusword: int) -> DriveState | None:

@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 
 import pytest
-from drives_rig import node, rpdos
+from drives_rig import node
 
 from legbench.drives.master.axis_link import AxisLink
 from legbench.drives.protocol.datatypes import DataType
@@ -34,7 +34,7 @@ def test_before_its_first_answer_a_drive_has_shown_nothing() -> None:
         axis.target_counts = 4321
         axis.hold()
         assert axis.target_counts == 4321
-        rpdos(axis, 0x0F)
+        axis.frames(0x0F)
         axis.target_counts = 5000
         axis.hold()
         assert axis.target_counts == 4321

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import can
 import pytest
-from drives_rig import START, Rig, config, rig, rpdos
+from drives_rig import START, Rig, config, rig
 
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.bus import LockstepBus
@@ -67,7 +67,7 @@ def one_exchange(folder: Path, beats: int) -> tuple[float, float, list[Frame]]:
         answered_ns = wait_for(it, ANSWERS, since)
         in_front(2, answered_ns + US)
         for cob_id in COMMANDS:
-            it.bus.send(message(cob_id, rpdos(it.link.cycle.axes[0], 0x0F)[0][1]))
+            it.bus.send(message(cob_id, it.link.cycle.axes[0].frames(0x0F)[0][1]))
         commanded_ns = wait_for(it, COMMANDS, since)
         frames = [frame for _, frame in (network.log or [])[since:]]
         others.shutdown()

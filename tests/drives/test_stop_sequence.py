@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, cast
 
 import pytest
-from drives_rig import node, rpdos
+from drives_rig import node
 
 from legbench.drives.master.axis_link import AxisLink
 from legbench.drives.master.stop import StopSequence
@@ -89,7 +89,7 @@ def test_both_are_told_quick_stop_until_both_stand_and_then_to_have_no_voltage(
 ) -> None:
     cycle = ScriptedCycle(*pair(place, until(ramp, BRAKING, OFF), always(OFF)))
     for axis in cycle.axes:
-        rpdos(axis, 0x0F)
+        axis.frames(0x0F)
         axis.aim(1.0)
     report, held = cycle.stop()
     assert report == StopReport()

@@ -160,9 +160,9 @@ class LinkWatch:
             self._led_rest = led
         self._led_rest = rest = self._led_rest + self._forget * (led - self._led_rest)
         fading, led = self._led * self._keep, abs(led - rest)
-        self._led = led = fading if fading > led else led
+        self._led = led = led if led > fading else fading
         fading, past = self._swayed * self._fade, self._young[0]
-        self._swayed = swayed = fading if fading > past else past
+        self._swayed = swayed = past if past > fading else fading
         self._widening = widening = SWAY_GROWTH * swayed + POLAR_GAIN * led
         self._limit = limit = self._bounds.sway + widening
         self.hides_drift = limit > HIDDEN

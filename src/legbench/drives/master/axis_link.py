@@ -103,7 +103,6 @@ class AxisLink:
         self.rpdo_sizes = {cob_id: layout.size for cob_id, layout in self._rpdos}
         self.rpdo_ids = tuple(self.rpdo_sizes)
         self._plain = self._plain_layout()
-        self._write_plain = self._rpdos[0][1].pack_into
         self._known = False
 
     def _plain_layout(self) -> bool:
@@ -202,16 +201,18 @@ class AxisLink:
         if self.sent_counts is not None:
             self.target_counts = self.sent_counts
 
-    def write(self, controlword: int, rpdos: Sequence[bytearray]) -> None:
-        """Write the data of this cycle's RPDOs, in the order of `rpdo_ids`."""
-        self.sent_counts = counts = self.target_counts
+    def frames(self, controlword: int) -> list[tuple[int, bytes]]:
+        """RPDOs of this cycle: COB-ID and data."""
+        self.sent_counts = self.target_counts
         # As `AxisUnits.show`, without its calls.
         lowest = self._lowest
-        target = lowest + (counts - lowest) % self._modulus
+        target = lowest + (self.target_counts - lowest) % self._modulus
         if self._plain:
-            self._write_plain(rpdos[0], 0, controlword, target)
-            return
+            cob_id, layout = self._rpdos[0]
+            return [(cob_id, layout.bytes_of(controlword, target))]
         known = {CONTROLWORD.key: controlword, self.node.target_object.key: target}
         known[0x6060, 0] = 8
-        for data, (_, layout) in zip(rpdos, self._rpdos, strict=True):
-            data[:] = layout.pack([known.get(entry.key, 0) for entry in layout.entries])
+        return [
+            (cob_id, layout.pack([known.get(entry.key, 0) for entry in layout.entries]))
+            for cob_id, layout in self._rpdos
+        ]

@@ -36,12 +36,12 @@ class Outgoing:
         self._beat = port.message(beat.cob_id, beat.data)
         self._beat_ns = 1_000_000 * config.master_heartbeat_ms
         self._beat_due_ns = 0
-        self._commands = [
-            [port.message(cob_id, bytes(size)) for cob_id, size in axis.rpdo_sizes.items()]
+        self._commands = {
+            cob_id: port.message(cob_id, bytes(size))
             for axis in axes
-        ]
-        """Messages of each drive's RPDOs, whose bytes are replaced in every cycle."""
-        self._data = [[message.data for message in messages] for messages in self._commands]
+            for cob_id, size in axis.rpdo_sizes.items()
+        }
+        """COB-ID -> message of its true length, whose bytes are replaced in every cycle."""
 
     def begin(self, due_ns: int) -> None:
         """Place the next heartbeat one interval after a tick of the grid [ns]."""
@@ -67,12 +67,13 @@ class Outgoing:
         """
         if len(controlwords) != len(self._axes):
             raise ValueError(f"{len(controlwords)} controlwords for {len(self._axes)} drives")
-        sent, put = True, self._port.put
+        sent, messages, put = True, self._commands, self._port.put
         for place, controlword in enumerate(controlwords):
             if controlword is None:
                 continue
-            self._axes[place].write(controlword, self._data[place])
-            for message in self._commands[place]:
+            for cob_id, data in self._axes[place].frames(controlword):
+                message = messages[cob_id]
+                message.data[:] = data
                 try:
                     put(message)
                 except BusError as error:

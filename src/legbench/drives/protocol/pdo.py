@@ -70,8 +70,8 @@ class PdoMap:
         """Length of the frame's data [bytes]."""
         self.values_of = self._layout.unpack
         """Function that unpacks as `unpack` does, but raises `struct.error` for a wrong length."""
-        self.pack_into = self._layout.pack_into
-        """Function that packs into a buffer from a place on, as that of `struct.Struct` does."""
+        self.bytes_of = self._layout.pack
+        """Function of one argument a value that packs as `pack` does, but raises `struct.error`."""
         if not self.entries or self.size > MAX_BYTES:
             names = ", ".join(map(str, self.entries)) or "nothing"
             raise CodecError(f"a PDO of {names} has {self.size} bytes; it must have 1 to 8")
