@@ -3,12 +3,10 @@
 The peer is a process of its own behind an AF_UNIX bus. It answers every SYNC with both drives'
 process data, those of a motion that was recorded on emulated drives (`bench_motion`): of a leg at
 rest, of one that hops, and of one that hops and sways, so that every watch of the limits works.
-Raw frames, the link and the other stack take turns. A cycle begins every millisecond, as in a run;
-how the same frames compare back to back, where nobody sleeps for long, is printed without a bound.
-
-Drives do not compute on the master's processor, so the peer has another one. How the same frames
-compare where both share one, and nothing is done while the peer answers, is printed without a
-bound.
+Raw frames, the link and the other stack take turns, all of them with SYNC first, then its answers,
+then commands. The bounds hold for cycles one after the other and a peer on a processor of its own,
+as drives do not compute on their master's. How the same frames compare every millisecond, where
+both sides sleep in between, and with a peer on the link's processor, is printed without a bound.
 """
 
 import os
@@ -154,11 +152,11 @@ def main() -> int:
     print(f"load {', '.join(f'{load:.2f}' for load in os.getloadavg())}")
     for kind in Kind:
         parts, took = measure(config, kind)
-        ours = took[named("ours", APART, Pace.GRID)]
+        ours = took[named("ours", APART, Pace.AT_ONCE)]
         found = {
-            "link over raw": ratio(ours, took[named("raw", APART, Pace.GRID)]),
+            "link over raw": ratio(ours, took[named("raw", APART, Pace.AT_ONCE)]),
             "link over canopen": ratio(
-                ours[::OTHER_EVERY], took[named("canopen", APART, Pace.GRID)]
+                ours[::OTHER_EVERY], took[named("canopen", APART, Pace.AT_ONCE)]
             ),
             "cycle cpu p50 [us]": statistics.median(parts["whole"]),
         }

@@ -40,7 +40,7 @@ class Pace(StrEnum):
     """When a cycle begins."""
 
     GRID = "every ms"
-    """At the next millisecond, for which the process sleeps, as in a run."""
+    """At the next millisecond, for which the process sleeps."""
     AT_ONCE = "back to back"
     """When the one before has ended."""
 
