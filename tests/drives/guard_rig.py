@@ -1,10 +1,11 @@
 """A guard at rest, and what its acts end in; numbers are exact in binary."""
 
+from collections.abc import Sequence
 from typing import Any
 
 from legbench.errors import PlantFault
 from legbench.limits.guard import Guard
-from legbench.limits.plausibility import HealthBounds
+from legbench.limits.plausibility import Doubt, HealthBounds, LinkWatch, MotorWatch
 from legbench.limits.safety import SafetyLimits
 
 PERIOD = 0.25
@@ -27,6 +28,31 @@ def started(limits: SafetyLimits, place: tuple[float, float] = REST) -> Guard:
     guard = Guard(limits, PERIOD)
     guard.start_at(place)
     return guard
+
+
+def see_motor(watch: MotorWatch, motor: int, position: float, command: float) -> Doubt | None:
+    """What a watch says of a motor in a cycle in which a command acts."""
+    watch.expect(command)
+    return watch.see(motor, position)
+
+
+def see_links(
+    watch: LinkWatch,
+    links: Sequence[float],
+    motors: Sequence[float] = REST,
+    commands: Sequence[float] = REST,
+    fresh: Sequence[bool] = (True, True),
+    elapsed: int = 1,
+) -> Doubt | None:
+    """What a watch says of links in a cycle in which commands act."""
+    watch.expect(commands)
+    return watch.see(motors, links, fresh, elapsed)
+
+
+def see_encoders(guard: Guard, commands: Sequence[float], **shown: Any) -> None:
+    """Check the encoders of a cycle in which commands act; raises PlantFault."""
+    guard.expect(commands)
+    guard.check_encoders(**shown)
 
 
 def pair(axis: int, value: float, other: float) -> tuple[float, float]:

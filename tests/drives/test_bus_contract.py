@@ -134,7 +134,11 @@ def test_a_bus_that_is_shut_down_does_nothing_any_more(ports: Ports) -> None:
         ports.pass_time()
         here.shutdown()
         here.shutdown()
-        for call in (lambda: here.send(message()), lambda: here.recv(0.0)):
+        for call in (
+            lambda: here.send(message()),
+            lambda: here.recv(0.0),
+            lambda: here.send_periodic(message(), 0.01),
+        ):
             with pytest.raises(can.CanOperationError, match="shut down"):
                 call()
         assert drain(ports, there) == []

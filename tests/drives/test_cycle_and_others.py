@@ -152,7 +152,7 @@ def test_without_a_word_no_command_goes_out() -> None:
 
 def test_words_for_another_number_of_drives_are_refused() -> None:
     for words in ([0x0F], [0x0F, 0x0F, 0x0F]):
-        with pytest.raises(ValueError, match="zip"):
+        with pytest.raises(ValueError, match=rf"^{len(words)} controlwords for 2 drives$"):
             cycle(Wire()).send(words)
 
 

@@ -2,6 +2,7 @@ import math
 from typing import Any
 
 import pytest
+from guard_rig import see_encoders
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -124,15 +125,15 @@ def test_every_limit_has_its_cause(change: dict[str, Any], cause: str, words: st
 def test_a_following_error_may_last_its_cycles() -> None:
     guard = Guard(LIMITS, PERIOD)
     guard.start_at((0.0, 1.0))
-    led: dict[str, Any] = {"joint_pos": (0.0, 1.0), "expected_pos": (0.0, 1.0)}
+    led: dict[str, Any] = {"commands": (0.0, 1.0), "joint_pos": (0.0, 1.0)}
     for _ in range(3):
-        guard.check_encoders(motor_pos=(0.2, 1.0), **led)
-    guard.check_encoders(motor_pos=(0.0, 1.0), **led)
+        see_encoders(guard, motor_pos=(0.2, 1.0), **led)
+    see_encoders(guard, motor_pos=(0.0, 1.0), **led)
     for _ in range(3):
-        guard.check_encoders(motor_pos=(0.2, 1.0), **led)
+        see_encoders(guard, motor_pos=(0.2, 1.0), **led)
     words = r"motor 1 shows 0\.200 rad and is 0\.200 rad away .* for 4 cycles"
     with pytest.raises(PlantFault, match=words) as caught:
-        guard.check_encoders(motor_pos=(0.2, 1.0), **led)
+        see_encoders(guard, motor_pos=(0.2, 1.0), **led)
     assert caught.value.cause == "following error"
 
 

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from guard_rig import BOUNDS
+from guard_rig import BOUNDS, see_links, see_motor
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -37,14 +37,14 @@ def test_no_position_loop_that_is_fast_enough_is_ever_doubted(
         for _ in range(cycles):
             position += gain * (command - position)
             shown = round(position / count) * count if count else position
-            assert watch.see(1, shown, command) is None
+            assert see_motor(watch, 1, shown, command) is None
 
 
 def first_doubt(shown: list[float], commands: list[float]) -> int | None:
     watch = MotorWatch(BOUNDS)
     watch.start_at(0.0)
     for cycle, (position, command) in enumerate(zip(shown, commands, strict=True)):
-        if watch.see(1, position, command) is not None:
+        if see_motor(watch, 1, position, command) is not None:
             return cycle
     return None
 
@@ -92,7 +92,7 @@ def watched(
     watch = LinkWatch(BOUNDS)
     for cycle, shown in enumerate(readings):
         led = motors[cycle] if motors else (-0.5, 0.5)
-        doubt = watch.see(led, shown, led, fresh[cycle] if fresh else BOTH, 1)
+        doubt = see_links(watch, shown, led, led, fresh[cycle] if fresh else BOTH)
         if doubt is not None:
             return cycle, doubt
     return None

@@ -204,7 +204,7 @@ def test_whatever_breaks_a_cycle_the_drives_are_stopped(
         it.link.start()
         it.run(5)
 
-        def broken() -> None:
+        def broken(now_ns: int) -> None:
             raise kind
 
         it.link._supervisor.states = broken
@@ -228,6 +228,32 @@ def test_a_listener_that_fails_hears_nothing_more_and_stops_nothing(tmp_path: Pa
         assert [watch.lost_total for watch in it.link.cycle.watches] == [0, 0]
         it.link.stop()
         assert it.states == [SO, SO]
+
+
+@pytest.mark.parametrize("touch", ["replaces", "cuts", "pads"])
+def test_a_listener_that_touches_commands_keeps_no_drive_from_its_stop(
+    tmp_path: Path, touch: str
+) -> None:
+    with rig(tmp_path) as it:
+        it.link.start()
+        it.run(5)
+
+        def touching(message: can.Message) -> None:
+            if message.arbitration_id not in (0x201, 0x202):
+                return
+            if touch == "replaces":
+                message.data = bytearray(message.data)
+            elif touch == "cuts":
+                del message.data[2:]
+            else:
+                message.data.extend(bytes(2))
+
+        it.link.show_frames_to(touching)
+        it.run(20)
+        it.link.stop()
+        assert it.states == [SO, SO]
+        assert it.link.stopped is not None
+        assert it.link.stopped.verified
 
 
 def test_every_node_is_sent_to_pre_operational_and_the_lock_is_released(tmp_path: Path) -> None:

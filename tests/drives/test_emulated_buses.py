@@ -111,6 +111,18 @@ def test_what_is_sent_periodically_ends_with_the_bus(monkeypatch: pytest.MonkeyP
         can.BusABC.shutdown(one)
 
 
+def test_channels_that_are_shut_down_do_nothing_any_more() -> None:
+    bus = ChannelsBus(emulate_channels(two()), two())
+    bus.shutdown()
+    for call in (
+        lambda: bus.send(message(0x123)),
+        lambda: bus.recv(0.0),
+        lambda: bus.send_periodic(message(0x123), 0.01),
+    ):
+        with pytest.raises(can.CanOperationError, match="shut down"):
+            call()
+
+
 # --- several channels ------------------------------------------------------------------------
 
 

@@ -1,5 +1,7 @@
 """The watch over all encoders of a leg: whom it doubts first, and when it asks its momentum."""
 
+from collections.abc import Sequence
+
 import pytest
 from test_momentum import PERIOD, POSTURE, SPIN, springs
 
@@ -19,11 +21,23 @@ def watching() -> EncoderWatch:
     return watch
 
 
+def looked(
+    watch: EncoderWatch,
+    motors: Sequence[float],
+    joints: Sequence[float],
+    commands: Sequence[float],
+    fresh: tuple[bool, bool] = (True, True),
+) -> Doubt | None:
+    """What a watch says of a cycle in which commands act."""
+    watch.expect(commands)
+    return watch.see(motors, joints, fresh, 1, PERIOD)
+
+
 def first_doubt(watch: EncoderWatch, silent: int | None = None) -> int | None:
     """Number of cycles until the leg is doubted, while drive 2 is silent in some."""
     for cycle in range(1, 1300):
         fresh = (True, silent is None or cycle % silent != 0)
-        assert watch.see(MOTORS, POSTURE, MOTORS, fresh, 1, PERIOD) is None
+        assert looked(watch, MOTORS, POSTURE, MOTORS, fresh) is None
         found = watch.see_momentum()
         # A cycle is held against the momentum once.
         assert watch.see_momentum() is None
@@ -51,11 +65,11 @@ def test_a_reading_of_before_is_no_first_one_of_what_begins_anew(after: str) -> 
     for asked in (True, False):
         watch = watching()
         assert first_doubt(watch) is not None
-        watch.see(MOTORS, POSTURE, MOTORS, (True, True), 1, PERIOD)
+        looked(watch, MOTORS, POSTURE, MOTORS)
         if after == "start":
             watch.start(MOTORS)
         else:
-            watch.see(MOTORS, POSTURE, MOTORS, (True, False), 1, PERIOD)
+            looked(watch, MOTORS, POSTURE, MOTORS, (True, False))
         if asked:
             assert watch.see_momentum() is None
         counts.append(first_doubt(watch))
@@ -87,7 +101,7 @@ def seen(
     """Cause and whom it names, after some cycles under commands that rest."""
     doubt: Doubt | None = None
     for _ in range(cycles):
-        doubt = watch.see(motors, joints, POSTURE, (True, True), 1, PERIOD)
+        doubt = looked(watch, motors, joints, POSTURE)
     return None if doubt is None else f"{doubt.cause}: {' '.join(doubt.message.split()[:2])}"
 
 
@@ -136,4 +150,4 @@ def test_a_start_forgets_where_motors_and_links_were() -> None:
     elsewhere = (POSTURE[0] + 0.5, POSTURE[1] - 0.5)
     watch.start(elsewhere)
     for _ in range(10):
-        assert watch.see(elsewhere, elsewhere, elsewhere, (True, True), 1, PERIOD) is None
+        assert looked(watch, elsewhere, elsewhere, elsewhere) is None

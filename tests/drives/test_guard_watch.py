@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 import pytest
-from guard_rig import REST, fault, pair, started
+from guard_rig import REST, fault, pair, see_encoders, started
 
 from legbench.limits.guard import ALL, Guard
 from legbench.limits.safety import SafetyLimits
@@ -22,8 +22,8 @@ def seen(guard: Guard, **changes: Any) -> str | None:
 
 
 def judged(guard: Guard, **changes: Any) -> str | None:
-    usual = {"motor_pos": REST, "joint_pos": REST, "expected_pos": REST}
-    return fault(guard.check_encoders, **{**usual, **changes})
+    usual = {"commands": REST, "motor_pos": REST, "joint_pos": REST}
+    return fault(see_encoders, guard, **{**usual, **changes})
 
 
 def beyond(value: float) -> float:
@@ -129,7 +129,7 @@ def test_a_motor_away_from_its_command_is_found_after_its_cycles_and_no_other(ax
     # Wherever the motors are led from: none is suspected of what was before.
     guard.start_at(away)
     for _ in range(5):
-        assert judged(guard, motor_pos=away, expected_pos=away) is None
+        assert judged(guard, motor_pos=away, commands=away) is None
 
 
 @pytest.mark.parametrize("axis", [0, 1])
@@ -141,9 +141,9 @@ def test_a_new_start_forgets_where_the_motors_and_the_links_were(axis: int) -> N
         assert judged(guard, motor_pos=away) is None
     # The motor that was suspected has its two cycles again, and stands where it is led to.
     guard.start_at(away)
-    assert [judged(guard, expected_pos=away, joint_pos=away) for _ in range(2)] == [None, None]
+    assert [judged(guard, commands=away, joint_pos=away) for _ in range(2)] == [None, None]
     # Had it been on its way from its former place it would be there eight cycles later.
-    told = judged(guard, expected_pos=away, joint_pos=away)
+    told = judged(guard, commands=away, joint_pos=away)
     assert told is not None
     assert told.startswith(f"following error: motor {axis + 1} shows")
 

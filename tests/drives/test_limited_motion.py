@@ -30,6 +30,7 @@ class Told:
     checks: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
     encoders: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
     momenta: int = 0
+    expected: list[Sequence[float]] = field(default_factory=list[Sequence[float]])
     began: list[Sequence[float]] = field(default_factory=list[Sequence[float]])
     applied: tuple[float, ...] = ()
 
@@ -41,6 +42,9 @@ class Told:
 
     def check_momentum(self) -> None:
         self.momenta += 1
+
+    def expect(self, commands: Sequence[float]) -> None:
+        self.expected.append(commands)
 
     def start_at(self, motor_pos: Sequence[float]) -> None:
         self.began.append(motor_pos)
@@ -96,22 +100,24 @@ class Leg:
     def judge(self, at_ms: int, skipped: int = 0) -> dict[str, Any]:
         """What the guard is told of the encoders of a cycle."""
         before = len(self.guard.encoders)
+        self.motion.meanwhile()
         self.check(at_ms, skipped)
         (told,) = self.guard.encoders[before:]
-        return told
+        return {**told, "expected_pos": self.guard.expected[-1]}
 
 
 def test_encoders_are_judged_only_while_the_leg_is_commanded_and_its_momentum_when_asked() -> None:
     leg = Leg()
     leg.show((0.1, -0.2), (0.1, -0.2))
     # As long as nothing is commanded a motor may be moved by hand.
+    leg.motion.meanwhile()
     leg.check(1)
-    assert leg.guard.encoders == []
+    assert leg.guard.encoders == leg.guard.expected == []
     leg.motion.begin()
     leg.check(2)
-    assert (len(leg.guard.encoders), leg.guard.momenta) == (1, 0)
-    leg.motion.check_momentum()
     assert (len(leg.guard.encoders), leg.guard.momenta) == (1, 1)
+    leg.motion.meanwhile()
+    assert (len(leg.guard.encoders), leg.guard.momenta) == (1, 2)
 
 
 def test_a_command_is_expected_to_have_acted_two_looks_later() -> None:

@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 
 import pytest
-from guard_rig import BOUNDS, REST, pair
+from guard_rig import BOUNDS, REST, pair, see_links
 
 from legbench.limits.plausibility import LinkWatch
 
@@ -15,7 +15,7 @@ def see(
     watch: LinkWatch, links: tuple[float, float], fresh: tuple[bool, bool] = BOTH
 ) -> str | None:
     """What is said of links in a cycle, in which motors and commands rest."""
-    doubt = watch.see(REST, links, REST, fresh, 1)
+    doubt = see_links(watch, links, fresh=fresh)
     return None if doubt is None else f"{doubt.cause}: {doubt.message}"
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from can_rig import BUS
-from guard_rig import fault
+from guard_rig import fault, see_encoders
 
 from legbench.analytic import floating_terms
 from legbench.analytic.matrices import pair_coriolis, pair_gravity, pair_mass
@@ -293,9 +293,9 @@ def guarded(sway: float, leg: LegMomentum | None) -> str | None:
     guard = Guard(limits, PERIOD, momentum=leg)
     motors = (POSTURE[0] + 0.2, POSTURE[1] + 0.2)
     guard.start_at(motors)
-    seen = {"motor_pos": motors, "joint_pos": POSTURE, "expected_pos": motors}
+    seen = {"commands": motors, "motor_pos": motors, "joint_pos": POSTURE}
     for _ in range(1300):
-        assert fault(guard.check_encoders, **seen) is None
+        assert fault(see_encoders, guard, **seen) is None
         doubt = fault(guard.check_momentum)
         assert fault(guard.check_momentum) is None
         if doubt is not None:
@@ -316,13 +316,13 @@ def calls_in_a_cycle(leg: LegMomentum | None) -> int:
     """Calls that a guard makes to look at a leg that does not sway."""
     guard = Guard(SafetyLimits(sway=0.05, standing=0.02, link_error=0.025), PERIOD, momentum=leg)
     guard.start_at(POSTURE)
-    seen = {"motor_pos": POSTURE, "joint_pos": POSTURE, "expected_pos": POSTURE}
-    guard.check_encoders(**seen)
+    seen = {"commands": POSTURE, "motor_pos": POSTURE, "joint_pos": POSTURE}
+    see_encoders(guard, **seen)
     found: list[str] = []
     before = sys.getprofile()
     sys.setprofile(lambda frame, event, _: found.append(event) if event == "call" else None)
     try:
-        guard.check_encoders(**seen)
+        see_encoders(guard, **seen)
     finally:
         sys.setprofile(before)
     return len(found)

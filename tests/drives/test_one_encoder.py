@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 from can_rig import BUS, LIMITS
+from guard_rig import see_encoders
 
 from legbench import load_design, phase_figure, run, summarise
 from legbench.control import BangBangConfig, ControllerSettings, JumpConfig, PositionJumpConfig
@@ -130,10 +131,10 @@ def test_limits_of_what_is_not_known_do_not_act_and_all_others_do() -> None:
     guard = Guard(limits, 0.001, known=[frozenset(["motor_pos"])] * 2, two_encoders=False)
     guard.start_at((0.0, 0.0))
     guard.check(joint_pos=nan, spring_torque=nan)
-    guard.check_encoders(motor_pos=(0.0, 0.0), joint_pos=nan, expected_pos=(0.0, 0.0))
+    see_encoders(guard, (0.0, 0.0), motor_pos=(0.0, 0.0), joint_pos=nan)
 
     def far() -> None:
-        guard.check_encoders(motor_pos=(0.0, 0.5), joint_pos=nan, expected_pos=(0.0, 0.0))
+        see_encoders(guard, (0.0, 0.0), motor_pos=(0.0, 0.5), joint_pos=nan)
 
     for _ in range(limits.following_cycles):
         far()

@@ -6,7 +6,7 @@ from collections import deque
 from dataclasses import replace
 
 import pytest
-from guard_rig import BOUNDS, REST, pair
+from guard_rig import BOUNDS, REST, pair, see_links, see_motor
 
 from legbench.limits.plausibility import Doubt, LinkWatch, MotorWatch
 
@@ -39,7 +39,7 @@ class Links:
         elapsed: int = 1,
     ) -> str | None:
         self.cycle += 1
-        doubt = self.watch.see(motors, links, commands, fresh, elapsed)
+        doubt = see_links(self.watch, links, motors, commands, fresh, elapsed)
         return None if doubt is None else f"{doubt.cause}: {doubt.message}"
 
     def rest(self, cycles: int) -> "Links":
@@ -56,7 +56,7 @@ def test_a_motor_may_be_so_far_from_a_command_that_rests_and_no_farther(side: fl
     for away, found in ((0.0299, False), (0.0301, True)):
         watch = MotorWatch(BOUNDS)
         watch.start_at(0.25)
-        doubts = [watch.see(2, 0.25 + side * away, 0.25) for _ in range(8)]
+        doubts = [see_motor(watch, 2, 0.25 + side * away, 0.25) for _ in range(8)]
         # It may last five cycles; it is suspected from the first one on.
         assert [doubt is not None for doubt in doubts] == [False] * 5 + [found] * 3
         assert (watch.suspicion is not None) is found
@@ -65,9 +65,9 @@ def test_a_motor_may_be_so_far_from_a_command_that_rests_and_no_farther(side: fl
             assert "motor 2 shows" in str(doubts[5])
             assert "for 6 cycles" in str(doubts[5])
         # One cycle in its place, and all is forgotten.
-        assert watch.see(2, 0.25, 0.25) is None
+        assert see_motor(watch, 2, 0.25, 0.25) is None
         assert watch.suspicion is None
-        assert [watch.see(2, 0.25 + side * away, 0.25) for _ in range(5)] == [None] * 5
+        assert [see_motor(watch, 2, 0.25 + side * away, 0.25) for _ in range(5)] == [None] * 5
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
@@ -84,7 +84,7 @@ def test_a_motor_is_between_an_ideal_loop_and_the_slowest_one(side: float) -> No
             watch = MotorWatch(BOUNDS)
             watch.start_at(1.0)
             for _ in range(cycle):
-                watch.see(1, 1.0 + side * shown, 1.0 + side * 0.2)
+                see_motor(watch, 1, 1.0 + side * shown, 1.0 + side * 0.2)
             assert (watch.suspicion is not None) is found
 
 
@@ -92,17 +92,17 @@ def test_a_new_start_closes_the_bounds_and_forgets_how_long_it_lasted() -> None:
     watch = MotorWatch(BOUNDS)
     watch.start_at(0.0)
     for _ in range(5):
-        assert watch.see(1, 1.0, 0.0) is None
+        assert see_motor(watch, 1, 1.0, 0.0) is None
     watch.start_at(1.0)
-    doubts = [watch.see(1, 0.9, 1.0) for _ in range(6)]
+    doubts = [see_motor(watch, 1, 0.9, 1.0) for _ in range(6)]
     assert doubts[:5] == [None] * 5
     assert isinstance(doubts[5], Doubt)
 
 
 def test_a_watch_that_was_never_started_begins_at_zero_with_all_its_cycles() -> None:
     watch = MotorWatch(BOUNDS)
-    assert [watch.see(1, 0.1, 0.0) for _ in range(5)] == [None] * 5
-    assert watch.see(1, 0.1, 0.0) is not None
+    assert [see_motor(watch, 1, 0.1, 0.0) for _ in range(5)] == [None] * 5
+    assert see_motor(watch, 1, 0.1, 0.0) is not None
 
 
 # --- speed of links --------------------------------------------------------------------------
@@ -252,7 +252,7 @@ def test_a_link_stands_as_the_ranges_of_its_last_readings_say(seed: int) -> None
             speeds = [speed * dice.choice((-1, 1)) for speed in speeds]
         links = [link + speed for link, speed in zip(links, speeds, strict=True)]
         last.append((links[0], links[1]))
-        watch.see(REST, links, REST, (True, True), 1)
+        see_links(watch, links)
         ranges = [max(each) - min(each) for each in zip(*last, strict=True)]
         stands = min(ranges) <= 0.002 and max(ranges) > BOUNDS.standing
         assert watch.stands is (stands and len(last) == 20), cycle
@@ -283,9 +283,15 @@ def test_the_bounds_themselves_are_allowed() -> None:
     exact = replace(BOUNDS, period=1.0 / 1024.0, joint_speed=64.0)
     for turn, found in ((0.0625, False), (math.nextafter(0.0625, 1.0), True)):
         watch = LinkWatch(exact)
-        assert watch.see((0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (True, True), 1) is None
-        told = watch.see((0.0, 0.0), (turn, -turn), (0.0, 0.0), (True, True), 1)
+        assert see_links(watch, (0.0, 0.0), (0.0, 0.0), (0.0, 0.0)) is None
+        told = see_links(watch, (turn, -turn), (0.0, 0.0), (0.0, 0.0))
         assert (told is not None) is found
+    near = replace(BOUNDS, following_error=0.03125)
+    for off, found in ((0.03125, False), (math.nextafter(0.03125, 1.0), True)):
+        for side in (-1.0, 1.0):
+            motor = MotorWatch(near)
+            see_motor(motor, 1, side * off, 0.0)
+            assert (motor.suspicion is not None) is found
     for band, found in ((0.002, True), (math.nextafter(0.002, 1.0), False)):
         it, seen = Links(), []
         for cycle in range(20):
@@ -293,8 +299,40 @@ def test_the_bounds_themselves_are_allowed() -> None:
         assert (seen[-1] is not None) is found
 
 
+def test_a_leg_hides_a_drift_once_it_may_sway_by_more_than_a_tenth() -> None:
+    for sway, hides in ((0.1, False), (math.nextafter(0.1, 1.0), True)):
+        watch = LinkWatch(replace(BOUNDS, sway=sway))
+        assert (watch.stands, watch.hides_drift) == (False, False)
+        watch.expect(REST)
+        assert watch.hides_drift is hides
+        watch.start()
+        assert (watch.stands, watch.hides_drift) == (False, False)
+
+
+def test_commands_along_the_polar_mode_alone_let_a_leg_sway() -> None:
+    for moved, hides in (((-0.9, 0.9), False), ((-0.4, 0.6), True)):
+        watch = LinkWatch(BOUNDS)
+        for _ in range(20):
+            assert see_links(watch, REST) is None
+        watch.expect(moved)
+        assert watch.hides_drift is hides
+
+
+def test_a_sway_at_its_limit_is_allowed() -> None:
+    # Its reference takes up 1/1024 of what lasts in each cycle, so that all numbers are exact.
+    fourth = 0.0625 * (1023 / 1024) ** 4
+    for limit, found in ((fourth, False), (math.nextafter(fourth, 0.0), True)):
+        watch = LinkWatch(
+            replace(BOUNDS, period=1 / 1024, sway=limit, joint_speed=math.inf, standing=math.inf)
+        )
+        see_links(watch, (0.0, 0.0))
+        told = [see_links(watch, (0.03125, 0.03125)) for _ in range(4)]
+        assert told[:3] == [None] * 3
+        assert (told[3] is not None) is found
+
+
 def test_a_motor_that_was_never_started_is_taken_to_stand_at_zero() -> None:
     for shown, found in ((0.0299, False), (0.5, True), (-0.5, True)):
         watch = MotorWatch(BOUNDS)
-        watch.see(1, shown, 0.0)
+        see_motor(watch, 1, shown, 0.0)
         assert (watch.suspicion is not None) is found

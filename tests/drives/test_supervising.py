@@ -9,6 +9,7 @@ from drives_rig import LIMITS, config, node
 
 from legbench.drives.master.axis_link import AxisLink
 from legbench.drives.master.cycle import Tick
+from legbench.drives.master.notices import Notices
 from legbench.drives.master.supervisor import Supervisor
 from legbench.drives.protocol.cia402 import Goal
 from legbench.drives.setup.config import BusConfig
@@ -24,6 +25,7 @@ class Watch:
 
     found: tuple[str, str] | None = None
     asked: list[tuple[int, int]] = field(default_factory=list)
+    well_until_ns: int = 1233
 
     def trouble(self, now_ns: int, lost_frames: int) -> tuple[str, str] | None:
         self.asked.append((now_ns, lost_frames))
@@ -40,6 +42,7 @@ class Scene:
     bus_error: Exception | None = None
     axes: list[AxisLink] = field(default_factory=lambda: [AxisLink(node(0)), AxisLink(node(1))])
     watches: list[Watch] = field(default_factory=lambda: [Watch(), Watch()])
+    notices: Notices = field(default_factory=Notices)
     polls: list[Any] = field(
         default_factory=lambda: [SimpleNamespace(unanswered=0), SimpleNamespace(unanswered=0)]
     )
@@ -130,6 +133,9 @@ def test_trouble_of_either_drive_ends_a_run_with_what_the_bus_said(place: int) -
         watched = scene.supervisor(lost_frames=7)
         assert cause(watched.drives) is None
         assert [watch.asked for watch in scene.watches] == [[(1234, 7)]] * 2
+        scene.watches[1 - place].well_until_ns = 1234
+        assert cause(watched.drives) is None
+        assert [len(watch.asked) for watch in scene.watches] == [2 - place, 1 + place]
         scene.watches[place].found = ("drive emergency", "it hurts")
         with pytest.raises(PlantFault) as caught:
             watched.drives()
@@ -171,16 +177,32 @@ def test_a_drive_that_left_operation_enabled_ends_a_run_at_once(place: int) -> N
     scene = Scene()
     enabled(scene)
     watched = scene.supervisor()
-    assert cause(watched.states) is None
+    assert cause(watched.states, 0) is None
     scene.axes[place].statusword = 0x0250
     # What it showed before its frame was lost says nothing of this cycle.
     scene.axes[place].fresh = False
-    assert cause(watched.states) is None
+    assert cause(watched.states, 0) is None
     scene.axes[place].fresh = True
     words = rf"'{name}' \(node {place + 1}\) left operation enabled: 0250h: switch on disabled"
     with pytest.raises(PlantFault, match=words) as caught:
-        watched.states()
+        watched.states(0)
     assert caught.value.cause == "drive not enabled"
+
+
+@pytest.mark.parametrize("place", [0, 1])
+@pytest.mark.parametrize("bit", [7, 11])
+def test_a_warning_is_noted_with_its_time_though_the_run_ends_with_it(place: int, bit: int) -> None:
+    scene = Scene()
+    enabled(scene)
+    watched = scene.supervisor(following_cycles=1)
+    watched.states(5)
+    assert scene.notices.events == {}
+    scene.axes[place].statusword = ENABLED | 1 << bit
+    assert cause(watched.states, 2_000_000_000) is None
+    assert cause(watched.states, 3_000_000_000) == "command ignored"
+    ((name, event),) = scene.notices.events.items()
+    assert name.endswith(("hip", "knee")[place])
+    assert (event["count"], event["first"]) == (2, 2.0)
 
 
 @pytest.mark.parametrize("place", [0, 1])
@@ -191,7 +213,7 @@ def test_a_drive_without_data_hides_nothing_of_the_other_one(place: int) -> None
         watched = scene.supervisor(following_cycles=limit)
         scene.axes[1 - place].fresh = False
         scene.axes[place].statusword = shown
-        told = [cause(watched.states) for _ in range(2)]
+        told = [cause(watched.states, 0) for _ in range(2)]
         assert told == ([found] * 2 if shown != ENABLED else [None, found])
 
 
@@ -206,15 +228,15 @@ def test_a_drive_that_ignores_its_target_longer_than_allowed_ends_a_run(
     for _ in range(3):
         scene.axes[place].statusword = ENABLED
         for _ in range(limit):
-            assert cause(watched.states) is None
+            assert cause(watched.states, 0) is None
         # One cycle in which it follows, and the count begins anew.
         scene.axes[place].statusword = ENABLED | FOLLOWS
-        assert cause(watched.states) is None
+        assert cause(watched.states, 0) is None
     scene.axes[place].statusword = ENABLED
     for _ in range(limit):
-        watched.states()
+        watched.states(0)
     with pytest.raises(PlantFault, match="does not follow its target: ") as caught:
-        watched.states()
+        watched.states(0)
     assert caught.value.cause == "command ignored"
     shown = ["0237h", "0237h"]
     shown[1 - place] = "1237h"

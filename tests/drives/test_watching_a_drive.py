@@ -1,6 +1,7 @@
 """What a master knows of a drive beside the cycle: losses, heartbeats, emergencies, temperature."""
 
 import math
+import random
 from dataclasses import replace
 
 import pytest
@@ -137,8 +138,49 @@ def test_cycles_without_data_add_up_until_two_in_a_row_have_theirs() -> None:
             assert found == ("process data lost", text)
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_a_drive_is_looked_at_whenever_a_look_finds_something(seed: int) -> None:
+    dice, made, found = random.Random(seed), watch(), 0
+    for at_ms in range(300):
+        now_ns = at_ms * MS
+        event = dice.choices(
+            ("cycle", "lost", "beat", "state", "emergency", "arm", "silent"),
+            (60, 6, 6, 1, 1, 8, 1),
+        )[0]
+        match event:
+            case "cycle" | "lost":
+                made.cycle(complete=event == "cycle")
+            case "beat" | "state":
+                byte = 5 if event == "beat" else dice.choice((0, 4, 5, 0x7F))
+                made.take_heartbeat(bytes((byte,)), now_ns)
+            case "emergency":
+                made.take_emergency(dice.choice((b"\x10\x23", b"\x00\x00")) + bytes(6))
+            case "arm":
+                made.arm(now_ns)
+            case _:
+                made.expects_heartbeat = not made.expects_heartbeat
+        found += made.trouble(now_ns, 1) is not None
+        if now_ns <= made.well_until_ns:
+            assert made.trouble(now_ns, 1) is None
+        else:
+            # It is looked at for a reason, even where one loss is not yet too many.
+            assert made.trouble(now_ns, 1) is not None
+    assert 30 < found < 270
+
+
+def test_a_drive_in_order_is_looked_at_when_its_heartbeat_is_overdue_and_not_before() -> None:
+    made = watch(5 * MS)
+    assert made.well_until_ns == 35 * MS
+    made.take_heartbeat(b"\x05", 12 * MS)
+    assert made.well_until_ns == 42 * MS
+    made.expects_heartbeat = False
+    assert made.well_until_ns == math.inf
+    assert made.trouble(1 << 63, 1) is None
+
+
 def test_arming_forgets_all_that_was_before() -> None:
     made = watch()
+    assert (made.missed, made.lost_total, made.bad_total) == (0, 0, 0)
     made.cycle(complete=False)
     made.bad_total = 4
     made.arm(0)
@@ -306,6 +348,7 @@ def test_commands_in_other_layouts_say_the_same_with_the_mode_8() -> None:
         ((CONTROLWORD, TARGET_POSITION, MODE),),
         ((CONTROLWORD, MODE), (TARGET_POSITION, other)),
         ((CONTROLWORD,), (TARGET_POSITION,)),
+        ((CONTROLWORD, TARGET_POSITION), (MODE,)),
     )
     parts = {
         CONTROLWORD: b"\x1f\x00",

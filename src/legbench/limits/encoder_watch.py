@@ -51,36 +51,46 @@ class EncoderWatch:
         if self._momentum is not None:
             self._momentum.start()
 
+    def expect(self, commands: Sequence[float]) -> None:
+        """Prepare for the coming cycle, in which these commands act [rad]."""
+        watch_1, watch_2 = self._motors
+        command_1, command_2 = commands
+        watch_1.expect(command_1)
+        watch_2.expect(command_2)
+        if self._two_encoders:
+            self._links.expect(commands)
+
     def see(
         self,
         motor_pos: Sequence[float],
         joint_pos: Sequence[float],
-        expected_pos: Sequence[float],
         fresh: Sequence[bool],
         elapsed: int,
         interval: float,
     ) -> Doubt | None:
-        """Look at one cycle, but for its momentum; returns what a healthy leg would not show.
+        """Look at the cycle that was expected, but for its momentum.
+
+        Returns what a healthy leg would not show.
 
         Args:
             motor_pos: positions that the drives' loops lead [rad].
             joint_pos: links [rad].
-            expected_pos: command that should act by now [rad].
             fresh: which drives have told something new in this cycle.
             elapsed: periods since the cycle before.
             interval: time since the cycle before [s].
         """
         watch_1, watch_2 = self._motors
         motor_1, motor_2 = motor_pos
-        expected_1, expected_2 = expected_pos
-        found = watch_1.see(1, motor_1, expected_1)
-        found = watch_2.see(2, motor_2, expected_2) or found
+        found = watch_1.see(1, motor_1)
+        found = watch_2.see(2, motor_2) or found
         if not self._two_encoders:
             return found
-        doubt = self._links.see(motor_pos, joint_pos, expected_pos, fresh, elapsed)
+        doubt = self._links.see(motor_pos, joint_pos, fresh, elapsed)
         self._unweighed = None
         momentum = self._momentum
-        if momentum is not None and doubt is None:
+        if doubt is not None:
+            return self._first(doubt) if found is None else found
+        if momentum is not None:
             # It is asked where a sway may hide an encoder that is wrong.
             if self._links.hides_drift and all(fresh):
                 self._asked = True
@@ -89,7 +99,7 @@ class EncoderWatch:
             elif self._asked:
                 self._asked = False
                 momentum.restart()
-        return self._first(doubt) if found is None else found
+        return found
 
     def see_momentum(self) -> Doubt | None:
         """Hold the cycle seen last against the leg's momentum, once; where a sway asks for it."""

@@ -1,6 +1,7 @@
 """The limits of one leg, enforced cycle by cycle in the lowest layer of every plant; pure."""
 
 import math
+import sys
 from collections.abc import Sequence
 from typing import NoReturn, final
 
@@ -48,6 +49,7 @@ class Guard:
         self._loads = tuple("spring_torque" in names for names in known)
         self._shown = tuple("joint_pos" in names for names in known)
         self._step_max = limits.command_speed * period
+        self._command_step = min(limits.command_step, sys.float_info.max)
         self._knee = None if limits.motor_knee_range == UNLIMITED else limits.motor_knee_range
         limited_knee = limits.joint_knee_range != UNLIMITED and all(self._shown)
         self._joint_knee = limits.joint_knee_range if limited_knee else None
@@ -74,13 +76,14 @@ class Guard:
         Raises:
             PlantFault: the wish is not finite or jumps too far; `applied` stands.
         """
-        self._check_wish(wish)
-        step, last, asked = self._step_max, self.applied, tuple(wish)
+        asked = tuple(wish)
+        self._check_wish(asked)
         self._wish = asked
         self.shortfall.cycles += 1
         if self._allows(asked):
             self.applied = asked
             return asked
+        step, last = self._step_max, self.applied
         # From outside a range the way leads back no faster than wished.
         boxes = [
             (min(low, value), max(high, value))
@@ -122,15 +125,10 @@ class Guard:
 
     def _check_wish(self, wish: Sequence[float]) -> None:
         before = self.applied if self._wish is None else self._wish
-        limit = self._limits.command_step
+        limit = self._command_step
         (wish_1, wish_2), (before_1, before_2) = wish, before
-        # Of what is not finite no step is within a limit, unless there is none.
-        if not (
-            abs(wish_1 - before_1) <= limit
-            and abs(wish_2 - before_2) <= limit
-            and math.isfinite(wish_1)
-            and math.isfinite(wish_2)
-        ):
+        # Of what is not finite no step is within a limit.
+        if not (abs(wish_1 - before_1) <= limit and abs(wish_2 - before_2) <= limit):
             self._refuse_wish(wish, before)
 
     def _refuse_wish(self, wish: Sequence[float], before: Sequence[float]) -> None:
@@ -151,9 +149,8 @@ class Guard:
     def reachable(self, wish: Sequence[float]) -> tuple[float, ...]:
         """What of a wish the ranges let through, in the end [rad]."""
         boxes = self._limits.motor_range
-        clamped = tuple(
-            min(max(value, low), high) for value, (low, high) in zip(wish, boxes, strict=True)
-        )
+        pairs = zip(wish, boxes, strict=True)
+        clamped = tuple(min(max(value, low), high) for value, (low, high) in pairs)
         return clamped if self._knee is None else project(clamped, self._knee, boxes)
 
     def check_start(self, motor_pos: Sequence[float]) -> None:
@@ -162,9 +159,8 @@ class Guard:
         Raises:
             PlantFault: one is outside its range.
         """
-        for axis, (value, (low, high)) in enumerate(
-            zip(motor_pos, self._limits.motor_range, strict=True), start=1
-        ):
+        ranges = zip(motor_pos, self._limits.motor_range, strict=True)
+        for axis, (value, (low, high)) in enumerate(ranges, start=1):
             if not low - START_TOLERANCE <= value <= high + START_TOLERANCE:
                 raise PlantFault(
                     "motor range",
@@ -217,24 +213,26 @@ class Guard:
             if value is not None and value > hottest:
                 self._refuse_temperatures(temperature)
 
+    def expect(self, commands: Sequence[float]) -> None:
+        """Prepare `check_encoders` for the coming cycle, in which these commands act [rad]."""
+        self._encoders.expect(commands)
+
     def check_encoders(
         self,
         *,
         motor_pos: Sequence[float],
         joint_pos: Sequence[float],
-        expected_pos: Sequence[float],
         fresh: Sequence[bool] = (True, True),
         elapsed: int = 1,
         interval: float | None = None,
     ) -> None:
-        """Check whether motors and encoders work, by all that a healthy leg can show in a cycle.
+        """Check the cycle of the last `expect` for all that a healthy leg can show by then.
 
-        What takes longer than that is left to `check_momentum`.
+        What takes longer is left to `check_momentum`.
 
         Args:
             motor_pos: positions that the drives' loops lead [rad].
             joint_pos: links [rad].
-            expected_pos: command that acted by then [rad].
             fresh: which drives had told something new in that cycle.
             elapsed: periods since the cycle before.
             interval: time since the cycle before, by default these periods [s].
@@ -243,7 +241,7 @@ class Guard:
             PlantFault: a motor does not follow, or an encoder contradicts the others or the leg.
         """
         after = elapsed * self._period if interval is None else interval
-        doubt = self._encoders.see(motor_pos, joint_pos, expected_pos, fresh, elapsed, after)
+        doubt = self._encoders.see(motor_pos, joint_pos, fresh, elapsed, after)
         if doubt is not None:
             raise PlantFault(doubt.cause, doubt.message)
 
@@ -289,9 +287,8 @@ class Guard:
 
     def _refuse_joints(self, joint_pos: Sequence[float]) -> None:
         """Raise PlantFault for the first known joint beyond its range; none if all are unknown."""
-        for axis, (value, (low, high)) in enumerate(
-            zip(joint_pos, self._limits.joint_range, strict=True), start=1
-        ):
+        ranges = zip(joint_pos, self._limits.joint_range, strict=True)
+        for axis, (value, (low, high)) in enumerate(ranges, start=1):
             if not low <= value <= high and self._shown[axis - 1]:
                 raise PlantFault(
                     "joint range",

@@ -83,12 +83,15 @@ class MotorWatch:
         self._low = self._high = position
         self._age = 0
 
-    def see(self, motor: int, position: float, expected: float) -> Doubt | None:
-        """Compare a motor's position with the command that should act by now [rad]."""
+    def expect(self, command: float) -> None:
+        """Move the bounds on by the command that acts in the coming cycle [rad]."""
         low, high, gain = self._low, self._high, self._gain
-        self._low = low = expected if expected < low else low + gain * (expected - low)
-        self._high = high = expected if expected > high else high + gain * (expected - high)
-        limit = self._limit
+        self._low = command if command < low else low + gain * (command - low)
+        self._high = command if command > high else high + gain * (command - high)
+
+    def see(self, motor: int, position: float) -> Doubt | None:
+        """Compare a motor's position [rad] with the bounds of the cycle that was expected."""
+        low, high, limit = self._low, self._high, self._limit
         if low - position <= limit and position - high <= limit:
             self._age, self.suspicion = 0, None
             return None
@@ -140,37 +143,50 @@ class LinkWatch:
         self._heard = True
         self._sway_age = 0
         self._sway_rest = self._led_rest = self._led = self._swayed = self._widening = 0.0
+        self._limit = 0.0
         self._young = deque([0.0] * self._delay, maxlen=self._delay)
         self._window = deque[tuple[float, float, float, float]](maxlen=self._standing_cycles)
         self._place = (math.nan, math.nan)
         self._near_cycles = 0
 
+    def expect(self, commands: Sequence[float]) -> None:
+        """Widen the bounds of the coming cycle by the commands that act in it [rad].
+
+        The leg may do so much along the polar mode, from what it did and was led to do.
+        """
+        command_1, command_2 = commands
+        led = command_1 + command_2
+        if self._last is None:
+            self._led_rest = led
+        self._led_rest = rest = self._led_rest + self._forget * (led - self._led_rest)
+        fading, led = self._led * self._keep, abs(led - rest)
+        self._led = led = led if led > fading else fading
+        fading, past = self._swayed * self._fade, self._young[0]
+        self._swayed = swayed = past if past > fading else fading
+        self._widening = widening = SWAY_GROWTH * swayed + POLAR_GAIN * led
+        self._limit = limit = self._bounds.sway + widening
+        self.hides_drift = limit > HIDDEN
+
     def see(
         self,
         motor_pos: Sequence[float],
         joint_pos: Sequence[float],
-        commands: Sequence[float],
         fresh: Sequence[bool],
         elapsed: int,
     ) -> Doubt | None:
-        """Compare the readings of a cycle.
+        """Compare the readings of the cycle that was expected.
 
         Args:
             motor_pos: motors [rad].
-            commands: what they should follow [rad].
             joint_pos: links [rad].
             fresh: which drives have told something new.
             elapsed: periods since the readings before.
         """
         joint_1, joint_2 = joint_pos
-        command_1, command_2 = commands
-        polar, led = joint_1 + joint_2, command_1 + command_2
-        last = self._last
+        polar, last = joint_1 + joint_2, self._last
         if last is None:
             self._last = last = (joint_1, joint_2)
-            self._sway_rest, self._led_rest = polar, led
-        self._led_rest = rest = self._led_rest + self._forget * (led - self._led_rest)
-        self._led = max(self._led * self._keep, abs(led - rest))
+            self._sway_rest = polar
         complete, reach = all(fresh), self._step_max * elapsed
         doubt, usual = None, complete and self._heard
         if usual and abs(joint_1 - last[0]) <= reach and abs(joint_2 - last[1]) <= reach:
@@ -179,14 +195,9 @@ class LinkWatch:
             doubt = self._speed((joint_1, joint_2), last, fresh, elapsed)
         self._sway_rest = rest = self._sway_rest + self._forget * (polar - self._sway_rest)
         sway = abs(polar - rest)
-        self._swayed = swayed = max(self._swayed * self._fade, self._young[0])
         self._young.append(sway)
-        # What the leg may do along the polar mode, from what it did and was led to do.
-        self._widening = widening = SWAY_GROWTH * swayed + POLAR_GAIN * self._led
-        limit = self._bounds.sway + widening
-        self.hides_drift = limit > HIDDEN
-        if sway > limit:
-            doubt = self._doubt_sway(sway, limit) or doubt
+        if sway > self._limit:
+            doubt = self._doubt_sway(sway) or doubt
         else:
             self._sway_age = 0
         if not (complete and self._watches_standing):
@@ -220,15 +231,15 @@ class LinkWatch:
         self._heard = not any(self._silent)
         return doubt
 
-    def _doubt_sway(self, sway: float, limit: float) -> Doubt | None:
+    def _doubt_sway(self, sway: float) -> Doubt | None:
         """Doubt a sway that is beyond its limit [rad], once it has lasted."""
         self._sway_age += 1
         if self._sway_age < SWAY_CYCLES:
             return None
         return Doubt(
             "sway",
-            f"the links sway by {sway:.3f} rad along q1 + q2, where the motors have not led "
-            f"them; the limit is {limit:.3f} rad: look at the link encoders, or raise sway for a "
+            f"the links sway by {sway:.3f} rad along q1 + q2, where the motors have not led them; "
+            f"the limit is {self._limit:.3f} rad: look at the link encoders, or raise sway for a "
             "leg that is pushed from outside",
         )
 

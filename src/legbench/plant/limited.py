@@ -62,11 +62,11 @@ class LimitedPlant(AbstractPlant):
         self._expected.append(applied)
         seen = self._plant.step(replace(command, motor_pos=np.array(applied)))
         joint_pos = seen.joint_pos.tolist()
+        self._guard.expect(self._expected.popleft())
         self._guard.check(joint_pos=joint_pos, spring_torque=seen.spring_torque.tolist())
         self._guard.check_encoders(
             motor_pos=seen.motor_pos.tolist(),
             joint_pos=joint_pos,
-            expected_pos=self._expected.popleft(),
         )
         self._guard.check_momentum()
         return seen

@@ -21,6 +21,7 @@ from legbench.drives.errors import BusError
 from legbench.drives.protocol.frame import Frame
 from legbench.drives.setup.bus_file import load_bus
 from legbench.drives.transport.messages import frame_of, message_of, refuse_fd
+from legbench.drives.transport.shut_bus import ShutBus
 from legbench.drives.transport.virtual_bus import VirtualBus
 from legbench.errors import ConfigError
 from legbench.shipped import locate
@@ -34,7 +35,7 @@ LOOK_NS = 50_000
 
 
 @final
-class LockstepBus(VirtualBus):
+class LockstepBus(ShutBus, VirtualBus):
     """One master's port to an emulated bus.
 
     Attributes:
@@ -79,7 +80,6 @@ class LockstepBus(VirtualBus):
         self.network = network
         self.timebase = NetworkTime(network)
         self._station = network.attach(tx_queue, bitrate, echo=receive_own_messages)
-        self._open = True
         self.channel_info = f"emulated bus {channel}"
         self.channel = channel
         super().__init__(channel=channel, can_filters=can_filters)
@@ -107,10 +107,6 @@ class LockstepBus(VirtualBus):
         if new_state is not can.BusState.ACTIVE:
             raise NotImplementedError(f"{new_state.name} cannot be set, only ACTIVE")
         self.network.recover(self._station)
-
-    def _check_open(self) -> None:
-        if not self._open:
-            raise can.CanOperationError(f"{self.channel_info} is shut down")
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
         """Hand a frame to the controller; lets time pass only to wait for room, up to `timeout`.
@@ -171,8 +167,8 @@ class LockstepBus(VirtualBus):
 
     def shutdown(self) -> None:
         """End what is sent periodically and detach from the network."""
+        attached = not self._shut
         super().shutdown()
-        if self._open:
-            self._open = False
+        if attached:
             with self.network.lock:
                 self.network.detach(self._station)

@@ -9,12 +9,13 @@ from legbench.drives.emulated.bus import IDLE_NS, LockstepBus
 from legbench.drives.emulated.network import Network
 from legbench.drives.emulated.shared_body import LockstepChannels
 from legbench.drives.setup.config import BusConfig
+from legbench.drives.transport.shut_bus import ShutBus
 from legbench.drives.transport.split_bus import Routes, worst_state
 from legbench.drives.transport.virtual_bus import VirtualBus
 
 
 @final
-class ChannelsBus(VirtualBus):
+class ChannelsBus(ShutBus, VirtualBus):
     """One master's ports to the emulated channels of a bus file.
 
     Attributes:
@@ -70,7 +71,12 @@ class ChannelsBus(VirtualBus):
             raise refused
 
     def recv(self, timeout: float | None = None) -> can.Message | None:
-        """The next frame of any channel; lets time pass until it comes."""
+        """The next frame of any channel; lets time pass until it comes.
+
+        Raises:
+            can.CanOperationError: the bus is shut down.
+        """
+        self._check_open()
         span_ns = IDLE_NS if timeout is None else math.ceil(1e9 * max(0.0, timeout))
         if not any([station.received for station in self._stations]):
             self._time.advance(self._time.now_ns() + span_ns, self._stations)

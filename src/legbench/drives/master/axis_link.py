@@ -132,22 +132,19 @@ class AxisLink:
             values = values_of(data)
         except struct.error:
             return False
-        if self._pick is not None:
-            self._missing, self.fresh = 0, True
-            self._digest(self._pick(values))
-            return True
-        shown = self._shown
-        for slot, place in wanted:
-            shown[slot] = values[place]
-        self._missing &= ~bit
-        if not self._missing:
-            self.fresh = True
-            self._digest(shown)
-        return True
-
-    def _digest(self, shown: Sequence[int]) -> None:
-        """Take all that a drive has shown in a cycle, in the order of the slots."""
-        self.statusword, motor, link, torque = shown
+        pick = self._pick
+        if pick is not None:
+            self._missing = 0
+            self.statusword, motor, link, torque = pick(values)
+        else:
+            shown = self._shown
+            for slot, place in wanted:
+                shown[slot] = values[place]
+            self._missing &= ~bit
+            if self._missing:
+                return True
+            self.statusword, motor, link, torque = shown
+        self.fresh = True
         if not self._known:
             self._find(motor)
         # As `AxisUnits.nearest` and `to_rad`, without their calls, four times a cycle.
@@ -160,6 +157,7 @@ class AxisLink:
             self.link_pos = (counts - self._link_zero) / self._link_scale
         if self._tells_torque:
             self.torque = self._torque_scale * torque
+        return True
 
     def _find(self, motor: int) -> None:
         """Unwrap for the first time: the link lies within half a turn of its motor.

@@ -80,20 +80,22 @@ class LimitedMotion:
             self._guard.check_encoders(
                 motor_pos=sample.motor_pos if self._two_encoders else self.led_pos,
                 joint_pos=sample.link_pos,
-                expected_pos=self._acting,
                 fresh=sample.fresh,
                 elapsed=1 + sample.skipped,
                 interval=interval,
             )
 
-    def check_momentum(self) -> None:
-        """Check the measurements checked last against the leg's momentum; raises PlantFault.
+    def meanwhile(self) -> None:
+        """Do, while the drives answer a SYNC, what needs none of their answers; raises PlantFault.
 
-        Called while the drives answer the next SYNC, when this processor has nothing else to do:
-        it takes longer than all other limits together, and its evidence grows over ten cycles and
+        The processor has nothing else to do until then. So the bounds of what they may answer are
+        computed here, and the measurements checked last are held against the leg's momentum: that
+        takes longer than all other limits together, and its evidence grows over ten cycles and
         more, to which one adds little.
         """
         self._guard.check_momentum()
+        if self._acting is not None:
+            self._guard.expect(self._acting)
 
     def aim(self, motor_pos: Sequence[float]) -> tuple[tuple[float, ...], list[int | None]]:
         """Set the targets of all drives; returns them [rad] and the controlwords to send.
@@ -102,10 +104,11 @@ class LimitedMotion:
             PlantFault: the command is not finite or jumps too far.
         """
         applied = self._guard.command(motor_pos)
-        axes = self._cycle.axes
-        for axis, target in zip(axes, applied, strict=True):
-            axis.aim(target)
-        words: list[int | None] = [axis.machine.controlword for axis in axes]
+        axis_1, axis_2 = self._cycle.axes
+        target_1, target_2 = applied
+        axis_1.aim(target_1)
+        axis_2.aim(target_2)
+        words: list[int | None] = [axis_1.machine.controlword, axis_2.machine.controlword]
         self._acting, self._sent = self._sent, applied
         return applied, words
 

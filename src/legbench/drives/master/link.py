@@ -8,7 +8,8 @@
 
 A cycle: tick of the grid, SYNC, process data of all drives until a deadline, watchdogs and limits
 (`exchange`), then the command, slewed and clamped, in RPDOs that act at the next SYNC (`command`);
-momentum is judged while drives answer that one. Whatever goes wrong, all drives are told to stop.
+what needs none of its answers is done until they come. Whatever goes wrong, all drives are told to
+stop.
 """
 
 import math
@@ -40,7 +41,7 @@ from legbench.limits.momentum import LegMomentum
 from legbench.limits.safety import SafetyLimits
 from legbench.limits.shortfall import Shortfall
 
-EXCHANGING = (LinkState.RUNNING, LinkState.CYCLIC)
+RUNNING, CYCLIC = EXCHANGING = (LinkState.RUNNING, LinkState.CYCLIC)
 """States in which process data is exchanged."""
 
 
@@ -100,7 +101,7 @@ class Link(DriveLeader):
         self._motion = LimitedMotion(
             parts.cycle, self._guard, stiffness, two_encoders=config.two_encoders
         )
-        self._ticks = Ticks(parts, self._motion.check_momentum)
+        self._ticks = Ticks(parts, self._motion.meanwhile)
 
     # --- what has become of it ---------------------------------------------------------------
 
@@ -181,7 +182,7 @@ class Link(DriveLeader):
         parts, ticks = self._parts, self._ticks
         if not parts.read_only and self.cycle.led_by_another():
             self._supervisor.check_no_other_master()  # It came after `open`, and keeps the drives.
-        self._status.state = LinkState.CYCLIC
+        self._status.state = CYCLIC
         with self._stop_on_error:
             self._start_up.settle(ticks.settling)
             if not parts.read_only:
@@ -213,15 +214,14 @@ class Link(DriveLeader):
         Raises:
             PlantFault: a watchdog or a limit; all drives have been stopped by then.
         """
-        status, cycle, motion = self._status, self.cycle, self._motion
+        status, motion = self._status, self._motion
         self._refuse_ended()
         try:
             tick = self._ticks.watched()
-            if status.state is LinkState.CYCLIC:
+            if status.state is CYCLIC:
                 self._start_up.idle()
                 return motion.sample(tick)
-            self._supervisor.states()
-            cycle.notices.statuswords(cycle.axes, tick.time_ns)
+            self._supervisor.states(tick.time_ns)
             sample = motion.sample(tick)
             motion.check(sample)
         except BaseException as error:  # Whatever is raised, the drives stop.
@@ -254,7 +254,7 @@ class Link(DriveLeader):
             DriveError: the drives are not enabled.
         """
         status = self._status
-        if status.fault is not None or status.state is not LinkState.RUNNING:
+        if status.fault is not None or status.state is not RUNNING:
             self._refuse_ended()
             why = (
                 "this link is read-only" if self._parts.read_only else "the drives are not enabled"

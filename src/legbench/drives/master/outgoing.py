@@ -61,12 +61,17 @@ class Outgoing:
 
         A frame that is refused keeps no other drive from its own. A drive without a controlword
         gets no frame.
+
+        Raises:
+            ValueError: not one controlword, or none, for each drive.
         """
+        if len(controlwords) != len(self._axes):
+            raise ValueError(f"{len(controlwords)} controlwords for {len(self._axes)} drives")
         sent, messages, put = True, self._commands, self._port.put
-        for axis, controlword in zip(self._axes, controlwords, strict=True):
+        for place, controlword in enumerate(controlwords):
             if controlword is None:
                 continue
-            for cob_id, data in axis.frames(controlword):
+            for cob_id, data in self._axes[place].frames(controlword):
                 message = messages[cob_id]
                 message.data[:] = data
                 try:

@@ -89,24 +89,23 @@ class Port:
         Raises:
             BusError: the driver has failed.
         """
-        now_ns = self.timebase.now_ns
         while True:
-            left = 1e-9 * (until_ns - now_ns())
-            message = self._receive(left if left > 0.0 else 0.0)
-            if message is None or message.is_error_frame:
+            left_ns = until_ns - self.timebase.now_ns()
+            message = self._receive(1e-9 * left_ns if left_ns > 0 else 0.0)
+            if message is None or not (message.is_extended_id or message.is_remote_frame):
                 return message
-            if not (message.is_extended_id or message.is_remote_frame):
+            if message.is_error_frame:
                 return message
-            if left <= 0.0:
+            if left_ns <= 0:
                 return None
 
     def take(self) -> can.Message | None:
         """Take the next frame that has come already, none if none has; raises BusError."""
         while True:
             message = self._receive(0.0)
-            if message is None or message.is_error_frame:
+            if message is None or not (message.is_extended_id or message.is_remote_frame):
                 return message
-            if not (message.is_extended_id or message.is_remote_frame):
+            if message.is_error_frame:
                 return message
 
     def _receive(self, timeout: float) -> can.Message | None:

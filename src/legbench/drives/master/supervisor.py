@@ -5,6 +5,7 @@ from typing import final
 
 from legbench.drives.master.axis_link import AxisLink
 from legbench.drives.master.cycle import Cycle
+from legbench.drives.master.notices import TOLD
 from legbench.drives.master.tick import Tick
 from legbench.drives.protocol.cia402 import Way, describe_statusword
 from legbench.drives.setup.config import BusConfig
@@ -29,7 +30,7 @@ class Supervisor:
         self._ignored = 0
         self._unsent = 0
         self._lost_frames = limits.lost_frames
-        self._watches_temperature = math.isfinite(limits.temperature)
+        self._polls = cycle.polls if math.isfinite(limits.temperature) else ()
 
     def bus(self, tick: Tick) -> None:
         """Check that the controller is on the bus and the grid is kept; raises PlantFault."""
@@ -75,23 +76,26 @@ class Supervisor:
     def drives(self) -> None:
         """Check that every drive answers, lives and reports no emergency; raises PlantFault."""
         now_ns, cycle = self._timebase.now_ns(), self._cycle
-        if self._watches_temperature:
-            for place, poll in enumerate(cycle.polls):
-                if poll.unanswered >= MISSING_TEMPERATURES:
-                    raise _unknown_temperature(cycle.axes[place], poll.unanswered)
+        for poll in self._polls:
+            if poll.unanswered >= MISSING_TEMPERATURES:
+                axis = cycle.axes[self._polls.index(poll)]
+                raise _unknown_temperature(axis, poll.unanswered)
         for watch in cycle.watches:
+            if now_ns <= watch.well_until_ns:
+                continue
             trouble = watch.trouble(now_ns, self._lost_frames)
             if trouble is not None:
                 cause, text = trouble
                 error = cycle.bus_error
                 raise PlantFault(cause, text if error is None else f"{text}; {error}")
 
-    def states(self) -> None:
+    def states(self, now_ns: int) -> None:
         """Check that every drive is enabled and follows its target; raises PlantFault.
 
-        A statusword that was taken in the cycle before needs no new decision.
+        A statusword that was taken in the cycle before needs no new decision. Warnings in it are
+        noted at this time [ns].
         """
-        ignored = False
+        ignored, told = False, 0
         for axis in self._cycle.axes:
             if not axis.fresh:
                 continue
@@ -102,7 +106,10 @@ class Supervisor:
                     f"drive '{axis.node.name}' (node {axis.node.node_id}) left operation enabled: "
                     f"{describe_statusword(word)}",
                 )
+            told |= word
             ignored = ignored or word & follows != follows
+        if told & TOLD:
+            self._cycle.notices.statuswords(self._cycle.axes, now_ns)
         if not ignored:
             self._ignored = 0
             return

@@ -48,7 +48,8 @@ class Ticks:
                 self._status.fault = self._status.fault or fault
                 raise
             finally:  # What the drives answer must be no answer to the SYNC of a stop.
-                tick = self._keep(self._cycle.answers())
+                self.last = tick = self._cycle.answers()
+                self.skipped_total += tick.skipped
         self._supervisor.bus(tick)
         self._supervisor.drives()
         return tick

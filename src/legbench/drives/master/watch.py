@@ -1,5 +1,6 @@
 """Watch of a drive besides its process data: heartbeat, emergencies, losses; pure."""
 
+import math
 from typing import final
 
 from legbench.drives.protocol.emcy import MEANINGS, Emergency, decode_emcy
@@ -24,7 +25,8 @@ class NodeWatch:
             no answer, and may be an old one.
         lost_total: all cycles without process data.
         bad_total: process data of a wrong length.
-        expects_heartbeat: whether the drive produces one (1017h), which then must come.
+        well_until_ns: time until which `trouble` finds nothing, unless something comes, or fails to
+            come; in the past if it may find something at once [ns].
     """
 
     def __init__(self, bus: BusConfig, node: NodeConfig, now_ns: int) -> None:
@@ -36,10 +38,10 @@ class NodeWatch:
         self.missed = 0
         self.lost_total = 0
         self.bad_total = 0
-        self.expects_heartbeat = True
+        self._expects_heartbeat = True
         self._rebooted = False
         self._well = True
-        self._reports_trouble = False
+        self._judge()
 
     def arm(self, now_ns: int) -> None:
         """Start watching from now: the counts, emergency and state of before are cleared."""
@@ -47,7 +49,17 @@ class NodeWatch:
         self.emergency, self.missed, self._rebooted = None, 0, False
         self.lost_total = self.bad_total = 0
         self.state = None
-        self._reports_trouble = False
+        self._judge()
+
+    @property
+    def expects_heartbeat(self) -> bool:
+        """Whether the drive produces a heartbeat (1017h), which then must come."""
+        return self._expects_heartbeat
+
+    @expects_heartbeat.setter
+    def expects_heartbeat(self, expects: bool) -> None:
+        self._expects_heartbeat = expects
+        self._judge()
 
     def take_heartbeat(self, data: bytes, now_ns: int) -> None:
         """Take a heartbeat or boot-up message."""
@@ -72,20 +84,27 @@ class NodeWatch:
             self._judge()
 
     def _judge(self) -> None:
-        """Judge what the drive has reported, once a message instead of once a cycle."""
+        """Judge what has come from the drive, once a message instead of once a cycle."""
         stands = self.state in NOT_OPERATIONAL
-        self._reports_trouble = stands or self._rebooted or self.emergency is not None
+        if stands or self._rebooted or self.emergency is not None or self.missed > 0:
+            self.well_until_ns: float = -1
+        else:
+            beat = self._beat
+            late_ns = beat.last_ns + beat.timeout_ns
+            self.well_until_ns = late_ns if self._expects_heartbeat else math.inf
 
     def cycle(self, *, complete: bool) -> None:
         """Count a cycle that has ended with or without its process data."""
         if complete:
-            if self._well:
+            if self._well and self.missed:
                 self.missed = 0
+                self._judge()
             self._well = True
         else:
             self._well = False
             self.missed += 1
             self.lost_total += 1
+            self._judge()
 
     @property
     def gaps(self) -> bool:
@@ -101,10 +120,7 @@ class NodeWatch:
 
     def trouble(self, now_ns: int, lost_frames: int) -> tuple[str, str] | None:
         """Cause and message of what is wrong with the drive; none if nothing is."""
-        beat = self._beat  # Its `lost` without the call.
-        late = now_ns - beat.last_ns > beat.timeout_ns and self.expects_heartbeat
-        if not (late or self._reports_trouble or self.missed >= lost_frames):
-            return None
+        late = self._expects_heartbeat and self._beat.lost(now_ns)
         if self.emergency is not None:
             return "drive emergency", f"{self._who}: {self.emergency}{self._way()}"
         if self._rebooted:

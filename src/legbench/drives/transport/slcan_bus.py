@@ -17,6 +17,7 @@ from can.interfaces.slcan import slcanBus
 
 from legbench.drives.protocol.slcan import OK, REFUSED, format_frame, parse_frame
 from legbench.drives.transport.messages import frame_of, message_of, refuse_fd
+from legbench.drives.transport.shut_bus import ShutBus
 
 CHUNK = 4096
 """Largest number of bytes read at once."""
@@ -30,7 +31,7 @@ CLOSING_S = 0.1
 
 
 @final
-class SlcanBus(slcanBus):
+class SlcanBus(ShutBus, slcanBus):
     """Bus behind a CAN adapter on a serial line."""
 
     def __init__(self, channel: str, **options: Any) -> None:
@@ -52,10 +53,6 @@ class SlcanBus(slcanBus):
         self.serialPortOrig.write_timeout = CLOSING_S
         self.channel_info = f"slcan {channel}"
         self.channel = channel
-
-    def _check_open(self) -> None:
-        if self._is_shutdown:
-            raise can.CanOperationError(f"{self.channel_info} is shut down")
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
         """Hand a frame to the serial port; waits for nothing.

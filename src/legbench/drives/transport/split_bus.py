@@ -10,6 +10,7 @@ import can
 
 from legbench.drives.protocol.frame import LAST_NODE, NMT_ID, SDO_REQUEST_BASE
 from legbench.drives.setup.config import BusConfig
+from legbench.drives.transport.shut_bus import ShutBus
 
 LOOK_S = 2e-4
 """Time between two looks at interfaces that cannot be waited for together [s]."""
@@ -60,7 +61,7 @@ def wait_for_any(parts: Sequence[can.BusABC], left: float | None) -> None:
 
 
 @final
-class SplitBus(can.BusABC):
+class SplitBus(ShutBus):
     """Buses of several channels as one interface of python-can.
 
     Attributes:

@@ -17,6 +17,7 @@ import can
 from can.typechecking import CanFilters
 
 from legbench.drives.transport.messages import frame_of, message_of, refuse_fd
+from legbench.drives.transport.shut_bus import ShutBus
 from legbench.drives.transport.system import require_linux
 from legbench.drives.transport.unix_packet import (
     NOTE,
@@ -45,7 +46,7 @@ STATES = {
 
 
 @final
-class UnixBus(can.BusABC):
+class UnixBus(ShutBus):
     """A port to a bus that another process serves."""
 
     def __init__(
@@ -76,7 +77,6 @@ class UnixBus(can.BusABC):
         self.channel_info = f"unix bus {channel}"
         self.channel = channel
         self._connect()
-        self._open = True
         super().__init__(channel=channel, can_filters=can_filters)
 
     def _connect(self) -> None:
@@ -118,10 +118,6 @@ class UnixBus(can.BusABC):
         self._check_open()
         self._socket.close()
         self._connect()
-
-    def _check_open(self) -> None:
-        if not self._open:
-            raise can.CanOperationError(f"{self.channel_info} is shut down")
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
         """Hand a frame to the controller; waits for room only if a time-out is given [s].
@@ -186,7 +182,6 @@ class UnixBus(can.BusABC):
     def shutdown(self) -> None:
         """End what is sent periodically and disconnect from the serving process."""
         super().shutdown()
-        self._open = False
         self._socket.close()
 
     @staticmethod
