@@ -117,7 +117,7 @@ def test_limits_that_cannot_be_meant_are_none() -> None:
 
 
 def test_types_that_cannot_be_meant_are_the_profiles() -> None:
-    i8, u8, u16, u32 = 0x02, 0x05, 0x06, 0x07
+    i8, i16, u8, u16, u32 = 0x02, 0x03, 0x05, 0x06, 0x07
     cases: dict[Key, tuple[int, str, int, int]] = {
         # The other sign, by the same bits.
         (0x60C2, 2): (u8, "0xFD", i8, -3),
@@ -128,13 +128,19 @@ def test_types_that_cannot_be_meant_are_the_profiles() -> None:
         (0x1018, 1): (u8, "0x5A65726F", u32, 0x5A65_726F),
         (0x1400, 1): (u16, "$NODEID+0x200", u32, 0x200),
         (0x1016, 1): (u16, "0", u32, 0),
+        (0x1601, 2): (u8, "0", u32, 0),
         (0x1A01, 2): (u8, "0", u32, 0),
+        (0x6098, 0): (u8, "-128", i8, -128),
+        (0x605B, 0): (u16, "65535", i16, -1),
         # Another length may be meant, and positions may have either sign.
         (0x6061, 0): (u16, "8", u16, 8),
         (0x6064, 0): (u32, "-1", u32, 0xFFFF_FFFF),
+        (0x607A, 0): (u32, "7", u32, 7),
         (0x607D, 1): (u32, "5", u32, 5),
+        (0x60E4, 1): (u32, "6", u32, 6),
         # Neither holds it.
         (0x1017, 0): (u8, "0x10000", u8, 0),
+        (0x605C, 0): (i8, "-32769", i8, 0),
     }
     sheet = stranger()
     for key, (kind, default, _, _) in cases.items():
@@ -142,8 +148,8 @@ def test_types_that_cannot_be_meant_are_the_profiles() -> None:
     found = read(sheet.text())
     for key, (_, _, kind, default) in cases.items():
         assert (found.objects[key].kind, found.objects[key].default) == (kind, default)
-        assert (key in found.given) is (key != (0x1017, 0))
-    assert found.remarks == ("8 objects have the profile's type instead of their own",)
+        assert (key in found.given) is (key not in ((0x1017, 0), (0x605C, 0)))
+    assert found.remarks == ("11 objects have the profile's type instead of their own",)
 
 
 def test_a_record_without_its_sub_index_0_has_got_one() -> None:
@@ -162,6 +168,9 @@ def test_an_object_can_be_mapped_unless_its_sheet_denies_it() -> None:
     mute = read(stranger().text().replace("PDOMapping=1\n", ""))
     assert mute.objects[0x607A, 0].mappable
     assert not mute.objects[0x607D, 1].mappable
+    # What stands elsewhere is no mapping.
+    other = stranger().add((0x2200, 0), DataType.UNSIGNED32, default="0x607D0120")
+    assert not read(other.text()).objects[0x607D, 1].mappable
     denied = stranger()
     denied.entries[0x607A, 0].mappable = False
     assert not read(denied.text()).objects[0x607A, 0].mappable

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 
-from legbench.drives.protocol.datatypes import FORMATS, DataType, range_of, size_of
+from legbench.drives.protocol.datatypes import FORMATS, DataType, range_of
 from legbench.drives.protocol.frame import COB_INVALID, COB_MASK, RPDO_BASES, TPDO_BASES
 from legbench.drives.protocol.objects import OBJECTS, Key
 from legbench.drives.protocol.pdo import split_word
@@ -67,30 +67,28 @@ def meant_type(key: Key, kind: DataType, default: int | None) -> DataType:
     known = OBJECTS.get(key)
     if known is None or known.kind not in FORMATS or kind not in FORMATS or key[0] in POSITIONS:
         return kind
-    too_short = default is not None and in_type(kind, default) is None
-    if too_short and in_type(known.kind, default or 0) is None:
-        return kind
-    length, usual = size_of(kind) or 0, size_of(known.kind) or 0
-    cannot_name = length < usual and (key in BASES or key[0] in NAMING)
-    return known.kind if too_short or cannot_name or length == usual else kind
+    if default is not None and in_type(kind, default) is None:
+        return kind if in_type(known.kind, default) is None else known.kind
+    own, usual = _span(kind), _span(known.kind)
+    cannot_name = own < usual and (key in BASES or key[0] in NAMING)
+    return known.kind if own == usual or cannot_name else kind
 
 
 def in_type(kind: DataType, value: int) -> int | None:
     """Return a value in a whole number's type, by its bits; none where it has more of them."""
+    low, span = range_of(kind)[0], _span(kind)
+    return (value - low) % span + low if -(span >> 1) <= value < span else None
+
+
+def _span(kind: DataType) -> int:
     low, high = range_of(kind)
-    span = high - low + 1
-    if not -(span >> 1) <= value < span:
-        return None
-    return (value - low) % span + low
+    return high - low + 1
 
 
 def mapped_keys(values: Iterable[tuple[Key, object]]) -> frozenset[Key]:
     """Objects that stand in a mapping at power-on, which can be mapped whatever is said of them."""
     return frozenset(
         split_word(value)[:2]
-        for (index, sub), value in values
-        if sub > 0
-        and isinstance(value, int)
-        and 0 < value < 1 << 32
-        and any(index in mapping for mapping in MAPPINGS)
+        for (index, _), value in values
+        if isinstance(value, int) and any(index in mapping for mapping in MAPPINGS)
     )
