@@ -62,7 +62,10 @@ SPELLINGS: dict[str, Callable[[str], bytes]] = {
         r"(?m)^((DataType|AccessType|DefaultValue)=[r0-9$].*)$", r"\1 // that # it ; is", text
     ).encode(),
     "access in words": lambda text: (
-        text.replace("Type=ro", "Type=Read Only").replace("Type=rw", "Type=R/W").encode()
+        text.replace("Type=ro", "Type=Read Only")
+        .replace("Type=rw", "Type=R/W")
+        .replace("Type=const", "Type=Constant")
+        .encode()
     ),
     "parents left out": lambda text: text.replace("ObjectType=0x9\n", "").encode(),
 }

@@ -153,7 +153,9 @@ def test_types_that_cannot_be_meant_are_the_profiles() -> None:
 
 
 def test_a_record_without_its_sub_index_0_has_got_one() -> None:
-    text = stranger().text()
+    it = stranger()
+    mapped(it, 0x1600, RPDO)
+    text = it.text()
     bare = re.sub(r"\[(1018|1400|1600|1A00|60C2)sub0\]\n[^\[]*", "", text)
     sheet, whole = read(bare), read(text)
     assert set(sheet.objects) == set(whole.objects)
@@ -165,9 +167,11 @@ def test_a_record_without_its_sub_index_0_has_got_one() -> None:
 
 
 def test_an_object_can_be_mapped_unless_its_sheet_denies_it() -> None:
-    mute = read(stranger().text().replace("PDOMapping=1\n", ""))
+    its_own = stranger().add((0x2064, 0), DataType.INTEGER16)
+    mute = read(its_own.text().replace("PDOMapping=1\n", ""))
     assert mute.objects[0x607A, 0].mappable
     assert not mute.objects[0x607D, 1].mappable
+    assert not mute.objects[0x2064, 0].mappable
     # What stands elsewhere is no mapping.
     other = stranger().add((0x2200, 0), DataType.UNSIGNED32, default="0x607D0120")
     assert not read(other.text()).objects[0x607D, 1].mappable
@@ -190,6 +194,11 @@ def no_second(it: Sheet) -> None:
     it.without(0x1801, 0x1802, 0x1803, 0x1A01, 0x1A02, 0x1A03)
 
 
+def torque_alone(it: Sheet) -> None:
+    no_second(it)
+    mapped(it, 0x1A00, (*TPDO, "0x60770010"), "ro")
+
+
 def always_on(it: Sheet) -> None:
     mapped(it, 0x1A01, ("0x606C0020",), "ro")
     it.fixed({(0x1801, 1): "$NODEID+0x280"})
@@ -200,6 +209,7 @@ def always_on(it: Sheet) -> None:
     [
         (two_entries, [(1, 2), (2, 1)]),
         (no_second, [(1, 2)]),
+        (torque_alone, [(1, 3)]),
         (always_on, [(1, 2), (2, 1), (3, 1)]),
     ],
 )

@@ -8,14 +8,14 @@ import re
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 
-from legbench.drives.protocol.objects import OBJECTS, Key
+from legbench.drives.protocol.objects import LINK_SHORT, OBJECTS, TEMPERATURE, Key
 from legbench.drives.setup.needs import MAPPINGS
 from legbench.drives.sheet.text import Section, Sections, bare, node_number, number, words
 from legbench.reading import UnreadableError
 
 RECORD = 0x9
-PROFILE = 0x6000
-"""First index of the device profile's objects."""
+OUR_OWN = (LINK_SHORT, TEMPERATURE)
+"""Manufacturer specific objects of the emulated drive, which mean something else elsewhere."""
 LAST_BASIC_TYPE = 0x1B
 """Last data type of CiA 301's table; a later one is a maker's own, which an object defines."""
 TEXTS = (0x09, 0x0A, 0x0B, 0x0F)
@@ -123,7 +123,7 @@ def _variable(
     yield f"AccessType={access}"
     mappable = number(section.get("pdomapping"))
     if mappable is None:
-        mappable = key[0] >= PROFILE and key in OBJECTS and OBJECTS[key].mappable
+        mappable = key[0] not in OUR_OWN and key in OBJECTS and OBJECTS[key].mappable
         remarks["do not say whether they can be mapped; the profile's can"] += mappable
     yield f"PDOMapping={int(bool(mappable))}"
     text = _told(section)
