@@ -18,6 +18,7 @@ from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.objects import Key
 from legbench.drives.protocol.pdo import Mapped
 from legbench.drives.protocol.sdo import Abort
+from legbench.drives.sheet.assess import assess
 from legbench.drives.sheet.bus_text import bus_text
 from legbench.drives.sheet.data_sheet import DataSheet
 from legbench.drives.sheet.load import sheet_of
@@ -308,7 +309,6 @@ def test_what_is_no_drive_is_refused_as_that(tmp_path: Path) -> None:
     for sheet, words in (
         (box, r"^'motor1', 'motor2': 6040h, 6041h, 6061h, 6064h, 607Ah are missing: it is no CiA"),
         (stranger().fixed({(0x1000, 0): "0x191"}), "1000h:00 is 00000191h: .*another drive$"),
-        (stranger().fixed({(0x6064, 0): "0"}, "wo"), "6064h:00 .* cannot be read; .*another drive"),
         (stranger().without(0x6061), "6061h:00 .*: another drive, or a complete data sheet$"),
     ):
         (tmp_path / "it.eds").write_text(sheet.text(), encoding="utf-8")
@@ -352,6 +352,30 @@ def test_a_number_is_written_and_read_in_the_length_that_the_drive_has(tmp_path:
         sdo.put(0x60B2, 0, DataType.INTEGER64, 70_000)
         with pytest.raises(DriveError, match="8 bytes are no INTEGER16"):
             sdo.get_int(0x60B2, 0, DataType.INTEGER16)
+
+
+def test_words_and_positions_are_as_long_as_the_bus_file_says(tmp_path: Path) -> None:
+    bus = learned_by(tmp_path, stranger())
+    for key, kind, words in (
+        ((0x6064, 0), DataType.UNSIGNED32, None),
+        ((0x6064, 0), DataType.INTEGER64, r'is of type i64, .*: write "6064:00 i64"'),
+        ((0x607A, 0), DataType.REAL32, "is of type f32, no whole number; another drive"),
+        ((0x6040, 0), DataType.INTEGER16, None),
+        ((0x6040, 0), DataType.UNSIGNED32, "is of type u32, not u16; another drive"),
+        ((0x6041, 0), DataType.UNSIGNED8, "is of type u8, not u16; another drive"),
+    ):
+        sheet = stranger()
+        sheet.entries[key].kind = int(kind)
+        problems = assess(read(sheet.text()), bus, bus.nodes[0]).problems
+        assert len(problems) == (words is not None)
+        assert all(re.search(f"^{key[0]:04X}h:00 .*{words}", line) for line in problems)
+    shown = ((0x6041, 0), (0x6061, 0), (0x6064, 0), (0x1000, 0), (0x1018, 1))
+    sheet = stranger()
+    for key in shown:
+        sheet.entries[key].access = "wo"
+    problems = assess(read(sheet.text()), bus, bus.nodes[0]).problems
+    for key, problem in zip(shown, problems, strict=True):
+        assert re.search(rf"^{key[0]:04X}h:0{key[1]} .* cannot be read; .*: another", problem)
 
 
 def test_a_value_that_is_fixed_and_not_told_is_as_wanted(tmp_path: Path) -> None:
