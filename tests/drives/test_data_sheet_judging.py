@@ -304,7 +304,7 @@ def test_a_ramp_in_a_unit_of_the_makers_own_is_no_ramp(tmp_path: Path) -> None:
     (tmp_path / "leg.toml").unlink()
     assert learned_by(tmp_path, sheet).waive == ("quick-stop ramp",)
     (tmp_path / "leg.toml").unlink()
-    for option, waived in (("6", True), ("5", False)):
+    for option, waived in (("6", True), ("1", False), ("5", False)):
         sheet.add((0x605A, 0), DataType.INTEGER16, default=option)
         assert (learned_by(tmp_path, sheet).waive == ("quick-stop ramp",)) is waived
         (tmp_path / "leg.toml").unlink()

@@ -22,6 +22,7 @@ from legbench.drives.sheet.assess import assess
 from legbench.drives.sheet.bus_text import bus_text
 from legbench.drives.sheet.data_sheet import DataSheet
 from legbench.drives.sheet.load import sheet_of
+from legbench.drives.sheet.predict import predict
 from legbench.drives.sheet.propose import propose
 from legbench.errors import ConfigError
 
@@ -275,6 +276,10 @@ def test_limits_of_the_drive_itself_are_proposed_where_it_takes_them() -> None:
             sheet.entries[0x607D, sub].limits = limits
         text = bus_text(propose(read(sheet.text()), "it.eds"), (1,))
         assert ("soft_limits = " in text) is proposed
+    # Positions that count from 0 have no such range before they are measured.
+    for key in ((0x6064, 0), (0x607A, 0), (0x607D, 1), (0x607D, 2)):
+        sheet.entries[key].kind = int(DataType.UNSIGNED32 if key[0] < 0x607D else 0x04)
+    assert "soft_limits" not in bus_text(propose(read(sheet.text()), "it.eds"), (1,))
 
 
 def test_space_in_a_fixed_command_is_sent_as_zeros(tmp_path: Path) -> None:
@@ -376,6 +381,17 @@ def test_words_and_positions_are_as_long_as_the_bus_file_says(tmp_path: Path) ->
     problems = assess(read(sheet.text()), bus, bus.nodes[0]).problems
     for key, problem in zip(shown, problems, strict=True):
         assert re.search(rf"^{key[0]:04X}h:0{key[1]} .* cannot be read; .*: another", problem)
+
+
+def test_a_number_that_is_no_whole_one_is_not_written(tmp_path: Path) -> None:
+    bus = learned_by(tmp_path, stranger())
+    sheet = stranger().add((0x605D, 0), DataType.REAL32, "rw")
+    sheet.add((0x605C, 0), DataType.OCTET_STRING, "rw", default="00")
+    codes = {
+        one.parameter.index: one.code for one in predict(read(sheet.text()), bus, bus.nodes[0])
+    }
+    assert codes[0x605D] == codes[0x605C] == Abort.TYPE_LENGTH
+    assert codes[0x605B] is None
 
 
 def test_a_value_that_is_fixed_and_not_told_is_as_wanted(tmp_path: Path) -> None:

@@ -110,7 +110,7 @@ def _place(found: Sections, name: str) -> tuple[Section, bool]:
 
 def bare(text: str) -> str:
     """Return a value without a comment after it."""
-    return _COMMENT.split(text, maxsplit=1)[0].strip()
+    return _COMMENT.split(text)[0].strip()
 
 
 def number(text: str | None) -> int | None:
