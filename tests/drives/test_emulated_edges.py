@@ -142,7 +142,7 @@ def test_a_drive_without_an_interpolation_time_or_a_mode_works_as_it_should_all_
     mode, display = (0x6060, 0), (0x6061, 0)
     for period_us, value in ((None, 1), (1000, 1), (2000, 2)):
         lacking = drive(cycle, power, mode)
-        how = {} if period_us is None else {"period_us": period_us}
+        how: dict[str, Any] = {} if period_us is None else {"period_us": period_us}
         shown = dictionary_of(node(0), lacking, **how)
         # Cyclic synchronous position is mode 8 (CiA 402).
         assert (shown.hidden[cycle], shown.hidden[power], shown.hidden[mode]) == (value, -3, 8)

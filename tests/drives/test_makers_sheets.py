@@ -154,6 +154,11 @@ def test_types_that_cannot_be_meant_are_the_profiles() -> None:
     assert found.remarks == ("11 objects have the profile's type instead of their own",)
 
 
+def test_modes_of_0_say_nothing() -> None:
+    sheet = read(stranger().add((0x6502, 0), DataType.UNSIGNED32, default="0").text())
+    assert (0x6502, 0) not in sheet.given
+
+
 def test_a_record_without_its_sub_index_0_has_got_one() -> None:
     it = stranger()
     mapped(it, 0x1600, RPDO)

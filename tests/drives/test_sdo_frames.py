@@ -280,6 +280,7 @@ def test_four_bytes_for_a_shorter_number_repeat_its_sign_or_are_zero() -> None:
         ("FFFEFFFF", DataType.INTEGER16, True, -257),
         ("05FFFFFF", DataType.INTEGER8, True, None),
         ("FBFFFF00", DataType.INTEGER8, True, None),
+        ("00FFFFFF", DataType.INTEGER8, True, None),
         ("05010000", DataType.UNSIGNED8, True, None),
         # Without a size the rest of the frame means nothing.
         ("05FFFFFF", DataType.INTEGER8, False, 5),
