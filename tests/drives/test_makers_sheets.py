@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,7 @@ from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.objects import Key
 from legbench.drives.protocol.pdo import Mapped
 from legbench.drives.protocol.sdo import Abort
+from legbench.drives.setup.config import Parameter
 from legbench.drives.sheet.assess import assess
 from legbench.drives.sheet.bus_text import bus_text
 from legbench.drives.sheet.data_sheet import DataSheet
@@ -152,6 +154,12 @@ def test_types_that_cannot_be_meant_are_the_profiles() -> None:
         assert (found.objects[key].kind, found.objects[key].default) == (kind, default)
         assert (key in found.given) is (key not in ((0x1017, 0), (0x605C, 0)))
     assert found.remarks == ("11 objects have the profile's type instead of their own",)
+    # What the emulated drive calls its link's position is something else to its maker.
+    own = stranger().add((0x2064, 0), u16, name="x", limits=("0", "65535"), default="0x8000")
+    found = read(own.text())
+    assert found.objects[0x2064, 0].kind is DataType.UNSIGNED16
+    assert found.limits[0x2064, 0] == (0, 65_535)
+    assert not found.remarks
 
 
 def test_modes_of_0_say_nothing() -> None:
@@ -341,7 +349,7 @@ def test_a_number_is_written_and_read_in_the_length_that_the_drive_has(tmp_path:
     with Session(LockstepBus("it", network=emulate(bus)), bus) as session:
         sdo = session.bring_up().sdo(bus.nodes[0])
         for index, kind, value, content in (
-            (0x6085, DataType.UNSIGNED32, 65_535, "ffff"),
+            (0x6085, DataType.UNSIGNED32, 32_767, "ff7f"),
             (0x60B0, DataType.INTEGER32, -5, "fb"),
             (0x60B0, DataType.INTEGER32, 127, "7f"),
             (0x6060, DataType.INTEGER8, 8, "08000000"),
@@ -351,6 +359,7 @@ def test_a_number_is_written_and_read_in_the_length_that_the_drive_has(tmp_path:
             assert sdo.read(index, 0).hex() == content
             assert sdo.get_int(index, 0, kind) == value
         for index, kind, value in (
+            (0x6085, DataType.UNSIGNED32, 32_768),
             (0x6085, DataType.UNSIGNED32, 65_536),
             (0x60B0, DataType.INTEGER32, 128),
             (0x60B0, DataType.REAL32, 1),
@@ -362,6 +371,24 @@ def test_a_number_is_written_and_read_in_the_length_that_the_drive_has(tmp_path:
         sdo.put(0x60B2, 0, DataType.INTEGER64, 70_000)
         with pytest.raises(DriveError, match="8 bytes are no INTEGER16"):
             sdo.get_int(0x60B2, 0, DataType.INTEGER16)
+
+
+def test_a_shorter_number_that_may_be_negative_protects_nothing(tmp_path: Path) -> None:
+    # 40000 in two bytes is -25536 to a drive with a sign, and both read back alike.
+    window = Parameter(index=0x6065, sub=0, kind=DataType.UNSIGNED32, value=40_000)
+    for access, held, words in (
+        ("rw", "0", "length .*holds 0, wanted 40000; .*give a value and a type"),
+        ("ro", "-25536", "6065h:00 .* 40000 in 2 bytes, or -25536.*give it in the drive's type"),
+    ):
+        sheet = stranger()
+        entry = sheet.entries[window.key]
+        entry.kind, entry.access, entry.default = int(DataType.INTEGER16), access, held
+        (tmp_path / "it.eds").write_text(sheet.text(), encoding="utf-8")
+        bus = bus_of(tmp_path / "it.eds")
+        first, *others = bus.nodes
+        bus = replace(bus, nodes=(replace(first, parameters=(window,)), *others))
+        with pytest.raises(DriveError, match=words):
+            really(bus)
 
 
 def test_words_and_positions_are_as_long_as_the_bus_file_says(tmp_path: Path) -> None:

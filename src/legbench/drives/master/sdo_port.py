@@ -10,9 +10,8 @@ from legbench.drives.master.port import Port
 from legbench.drives.protocol.datatypes import (
     DataType,
     Value,
+    fitting_type,
     pack,
-    range_of,
-    resized,
     size_of,
 )
 from legbench.drives.protocol.frame import SDO_REPLY_BASE, SDO_REQUEST_BASE
@@ -70,10 +69,14 @@ class SdoPort:
 
     def get_int(self, index: int, sub: int, kind: DataType) -> int:
         """Value of a whole number, in the drive's own length; raises as `get` does."""
-        value = self._decoded(self._upload(index, sub).widened, index, sub, kind)
-        if not isinstance(value, int):
-            raise DriveError(f"node {self.node_id}, {name_of(index, sub)} is no number")
-        return value
+        return self._whole(self._upload(index, sub).widened, index, sub, kind)
+
+    def get_certain(self, index: int, sub: int, kind: DataType) -> int:
+        """Value of a whole number that a protection depends on.
+
+        Raises as `get_int` does, and DriveError for a shorter number that may be negative as well.
+        """
+        return self._whole(self._upload(index, sub).certain, index, sub, kind)
 
     def get_number(self, index: int, sub: int, kind: DataType) -> float:
         """Value of an object that is a number of any kind; raises as `get` does."""
@@ -103,21 +106,26 @@ class SdoPort:
         try:
             self.write(index, sub, pack(kind, value))
         except SdoAbortError as error:
-            own = self._own_kind(index, sub, kind) if error.code in LENGTHS else None
+            length = self._own_length(index, sub) if error.code in LENGTHS else size_of(kind)
+            own = None if length == size_of(kind) else fitting_type(kind, length or 0, value)
             if own is None:
-                raise
-            low, high = range_of(own)
-            if not low <= value <= high:
                 raise
             self.write(index, sub, pack(own, value))
 
-    def _own_kind(self, index: int, sub: int, kind: DataType) -> DataType | None:
-        """Type of a whole number in the length that the drive answers with; none if it does not."""
+    def _own_length(self, index: int, sub: int) -> int | None:
+        """Length that the drive answers with [bytes]; none if it refuses."""
         try:
-            length = len(self.read(index, sub))
+            return len(self.read(index, sub))
         except SdoAbortError:
             return None
-        return None if length == size_of(kind) else resized(kind, length)
+
+    def _whole(
+        self, decode: Callable[[DataType], Value], index: int, sub: int, kind: DataType
+    ) -> int:
+        value = self._decoded(decode, index, sub, kind)
+        if not isinstance(value, int):
+            raise DriveError(f"node {self.node_id}, {name_of(index, sub)} is no number")
+        return value
 
     def _decoded(
         self, decode: Callable[[DataType], Value], index: int, sub: int, kind: DataType

@@ -139,7 +139,7 @@ def _held(
         if codes.get(parameter.key) in MISSING:
             continue
         try:
-            there = sdo.get_int(parameter.index, parameter.sub, parameter.kind)
+            there = sdo.get_certain(parameter.index, parameter.sub, parameter.kind)
         except SdoAbortError as error:
             codes.setdefault(parameter.key, error.code)
         else:

@@ -88,6 +88,21 @@ def resized(kind: DataType, size: int) -> DataType | None:
     )
 
 
+def fitting_type(kind: DataType, size: int, value: int) -> DataType | None:
+    """Type of another length [bytes] in which a whole number can be written; none if it cannot.
+
+    The bus does not tell the sign of the drive's own type. In a shorter one, a number of a type
+    without a sign must therefore be the same in a type that has one.
+    """
+    own = resized(kind, size)
+    if own is None:
+        return None
+    low, high = range_of(own)
+    if size < (size_of(kind) or 0):
+        high = min(high, (1 << 8 * size - 1) - 1)
+    return own if low <= value <= high else None
+
+
 def pack(kind: DataType, value: Value) -> bytes:
     """A value as its bytes.
 

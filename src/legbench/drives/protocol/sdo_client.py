@@ -110,7 +110,7 @@ class Upload(_Transfer):
         """The object's value, from an answer of another length: a shorter number is widened.
 
         It is taken to have the sign of the type that is asked for, which the bus cannot tell; a
-        number that protects something is therefore read by `value`.
+        number that protects something is therefore read by `certain`.
 
         Raises:
             CodecError: the bytes are none of this type.
@@ -118,6 +118,21 @@ class Upload(_Transfer):
         length, size = len(self.result), size_of(kind)
         narrow = resized(kind, length) if size is not None and length < size else None
         return self.value(kind if narrow is None else narrow)
+
+    def certain(self, kind: DataType) -> Value:
+        """The object's value as `widened` reads it, where its sign cannot be another.
+
+        Raises:
+            CodecError: the bytes are none of this type, or a shorter number is positive in it and
+                negative in a type of their own length.
+        """
+        value, length = self.widened(kind), len(self.result)
+        if length < (size_of(kind) or 0) and isinstance(value, int) and value >> 8 * length - 1 > 0:
+            raise CodecError(
+                f"reads {value} in {length} bytes, or {value - (1 << 8 * length)} if it has a "
+                "sign: give it in the drive's type in the bus file"
+            )
+        return value
 
     def feed(self, data: bytes) -> Progress:
         """Take a reply.

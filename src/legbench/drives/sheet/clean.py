@@ -8,14 +8,13 @@ import re
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 
-from legbench.drives.protocol.objects import LINK_SHORT, OBJECTS, TEMPERATURE, Key
+from legbench.drives.protocol.objects import OBJECTS, Key
 from legbench.drives.setup.needs import MAPPINGS
+from legbench.drives.sheet.plausible import OUR_OWN
 from legbench.drives.sheet.text import Section, Sections, bare, node_number, number, words
 from legbench.reading import UnreadableError
 
 RECORD = 0x9
-OUR_OWN = (LINK_SHORT, TEMPERATURE)
-"""Manufacturer specific objects of the emulated drive, which mean something else elsewhere."""
 LAST_BASIC_TYPE = 0x1B
 """Last data type of CiA 301's table; a later one is a maker's own, which an object defines."""
 TEXTS = (0x09, 0x0A, 0x0B, 0x0F)
@@ -115,7 +114,8 @@ def _variable(
     access = _access(words(section, "accesstype"))
     if access is None:
         remarks["without a known access type have the profile's, else can be written"] += 1
-        access = OBJECTS[key].access.value if key in OBJECTS else "rw"
+        known = OBJECTS.get(key) if key[0] not in OUR_OWN else None
+        access = "rw" if known is None else known.access.value
     yield f"[{where}]"
     yield f"ParameterName={words(section, 'parametername') or 'object'}"
     yield "ObjectType=0x7"

@@ -4,10 +4,12 @@ from collections.abc import Iterable, Mapping
 
 from legbench.drives.protocol.datatypes import FORMATS, DataType, range_of
 from legbench.drives.protocol.frame import COB_INVALID, COB_MASK, RPDO_BASES, TPDO_BASES
-from legbench.drives.protocol.objects import OBJECTS, Key
+from legbench.drives.protocol.objects import LINK_SHORT, OBJECTS, TEMPERATURE, Key
 from legbench.drives.protocol.pdo import split_word
 from legbench.drives.setup.needs import MAPPINGS, RPDOS, TPDOS
 
+OUR_OWN = (LINK_SHORT, TEMPERATURE)
+"""Manufacturer specific objects of the emulated drive, which mean something else elsewhere."""
 POSITIONS = (0x6064, 0x607A, 0x607D, 0x60E4)
 """Positions and their limits, which count from 0 on some drives and from both sides on others."""
 NAMING = (0x1016, *MAPPINGS[0], *MAPPINGS[1])
@@ -62,10 +64,10 @@ def meant_type(key: Key, kind: DataType, default: int | None) -> DataType:
 
     Makers mix up the signs of types, which are the same bits on the bus, and tell types that cannot
     hold the object's own default, or what it is there to name. Positions may have either sign, and
-    are left as they are.
+    are left as they are; so are a maker's own objects.
     """
-    known = OBJECTS.get(key)
-    if known is None or known.kind not in FORMATS or kind not in FORMATS or key[0] in POSITIONS:
+    known = None if key[0] in (*POSITIONS, *OUR_OWN) else OBJECTS.get(key)
+    if known is None or known.kind not in FORMATS or kind not in FORMATS:
         return kind
     if default is not None and in_type(kind, default) is None:
         return kind if in_type(known.kind, default) is None else known.kind

@@ -4,7 +4,13 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import takewhile
 
-from legbench.drives.protocol.datatypes import FORMATS, DataType, range_of, resized, size_of
+from legbench.drives.protocol.datatypes import (
+    FORMATS,
+    DataType,
+    fitting_type,
+    range_of,
+    size_of,
+)
 from legbench.drives.protocol.frame import COB_INVALID, COB_MASK
 from legbench.drives.protocol.objects import PDO_COUNT, Access, Key
 from legbench.drives.protocol.sdo import Abort
@@ -66,11 +72,10 @@ def _written(
 def _fits(kind: DataType, parameter: Parameter) -> bool:
     """Whether an object takes a value, in a length of its own where it has another one."""
     size = size_of(kind)
-    own = None if size is None or kind not in FORMATS else resized(parameter.kind, size)
-    if own is None:
+    if size is None or kind not in FORMATS:
         return False
-    low, high = range_of(own)
-    return size == size_of(parameter.kind) or low <= parameter.value <= high
+    same = size == size_of(parameter.kind)
+    return same or fitting_type(parameter.kind, size, parameter.value) is not None
 
 
 def _is_mapping(parameter: Parameter) -> bool:
