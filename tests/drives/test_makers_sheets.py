@@ -434,6 +434,21 @@ def test_a_value_that_is_fixed_and_not_told_is_as_wanted(tmp_path: Path) -> None
     assert all(one.passes for one in really(bus_of(tmp_path / "it.eds")))
 
 
+def test_a_value_that_is_fixed_and_not_told_is_not_called_as_wanted(tmp_path: Path) -> None:
+    bus, key = learned_by(tmp_path, stranger()), (0x6007, 0)
+    for default, words in (
+        (None, "fixed to a value that the data sheet does not tell, taken to be 3; `legbench "),
+        ("3", "as it is wanted"),
+    ):
+        sheet = stranger()
+        sheet.entries[key].access, sheet.entries[key].default = "ro", default
+        found = assess(read(sheet.text()), bus, bus.nodes[0])
+        (remark,) = (one.remark for one in found.findings if one.object.startswith("6007h"))
+        assert remark.startswith(words)
+        told = [line for line in found.unprotected if line.startswith("6007h")]
+        assert len(told) == (default is None)
+
+
 def test_what_can_only_be_written_is_taken_at_its_word(tmp_path: Path) -> None:
     sheet = stranger()
     for key in ((0x607A, 0), (0x607D, 1), (0x607D, 2)):

@@ -37,6 +37,8 @@ READ = {
     (0x603F, 0): "the reason of a fault, but for what an emergency message says",
 }
 """Objects that are read, and what is not known without them."""
+NOT_TOLD = "fixed to a value that the data sheet does not tell"
+"""What a drive holds that only the drive itself can show."""
 IF_PRESENT = "if present"
 """Need of an object that may be missing, but has to agree where it is there."""
 NEEDED_READS = ((0x1000, 0), (0x1018, 1))
@@ -92,6 +94,8 @@ def assess(
     given = {entry.parameter.key for entry in outcomes}
     unused = tuple(_unused(sheet, given))
     lost = [entry.line for entry in outcomes if entry.passes and entry.line is not None]
+    found = [_finding(entry, sheet, node) for entry in written]
+    untold = [one for one in found if one.need == Need.PROTECTION.value and NOT_TOLD in one.remark]
     reads = [finding for finding in _reads(sheet) if finding.state is State.LACKS]
     return Assessment(
         node=node.name,
@@ -99,12 +103,12 @@ def assess(
             *_cyclic(sheet),
             *_encoders(node),
             *_reads(sheet),
-            *map(_finding, written),
+            *found,
             *unused,
             *_replaced(sheet, given),
         ),
         problems=tuple(_problems(sheet, node, outcomes)),
-        unprotected=(*lost, *(f"{one.object}: {one.remark}" for one in (*reads, *unused))),
+        unprotected=(*lost, *(f"{one.object}: {one.remark}" for one in (*untold, *reads, *unused))),
         means=means_of(bus, node, speed=speed, held=held_by(outcomes)),
         outcomes=outcomes,
     )
@@ -119,20 +123,25 @@ def _is_mapping(entry: ObjectOutcome) -> bool:
     return any(entry.parameter.index in mapping for mapping in MAPPINGS)
 
 
-def _finding(entry: ObjectOutcome) -> Finding:
+def _finding(entry: ObjectOutcome, sheet: DataSheet, node: NodeConfig) -> Finding:
+    told = sheet.default(entry.parameter.key, node.node_id) is not None
     state = State.LACKS if entry.missing else State.HAS if entry.code is None else State.FIXED
     return Finding(
         object=entry.name,
         need=IF_PRESENT if entry.row.may_lack else entry.row.need.value,
         state=state,
-        remark=(entry.line or "").removeprefix(f"{entry.name}: ") or _nothing_lost(entry),
+        remark=(entry.line or "").removeprefix(f"{entry.name}: ")
+        or _nothing_lost(entry, told=told),
     )
 
 
-def _nothing_lost(entry: ObjectOutcome) -> str:
+def _nothing_lost(entry: ObjectOutcome, *, told: bool) -> str:
     if entry.code is None or not entry.passes:
         return ""
-    return "where it is missing nothing is lost" if entry.missing else "as it is wanted"
+    if entry.missing:
+        return "where it is missing nothing is lost"
+    taken = f"{NOT_TOLD}, taken to be {entry.parameter.value}; `legbench drives configure` reads it"
+    return "as it is wanted" if told else taken
 
 
 def _unused(sheet: DataSheet, written: set[Key]) -> Iterator[Finding]:
