@@ -19,6 +19,7 @@ from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.objects import Key
 from legbench.drives.protocol.pdo import Mapped
 from legbench.drives.protocol.sdo import Abort
+from legbench.drives.setup.bus_file import parse_object
 from legbench.drives.setup.config import Parameter
 from legbench.drives.sheet.assess import assess
 from legbench.drives.sheet.bus_text import bus_text
@@ -317,7 +318,7 @@ def test_limits_of_a_mapping_and_of_a_transmission_type_are_kept(tmp_path: Path)
     sheet.entries[0x1401, 2].limits, sheet.entries[0x1402, 2].limits = ("254", "255"), ("0", "240")
     assert [pdo.number for pdo in learned_by(tmp_path, sheet).nodes[0].rpdos] == [1, 3]
     sheet.fixed({(0x1400, 2): "255"})
-    with pytest.raises(ConfigError, match="RPDO2: 1401h:02 is fixed to 255, it does not follow"):
+    with pytest.raises(ConfigError, match="RPDO2: 1401h:02 takes 254 to 255, not 1, which"):
         propose(read(sheet.without(0x1403).text()), "it.eds")
 
 
@@ -413,6 +414,36 @@ def test_words_and_positions_are_as_long_as_the_bus_file_says(tmp_path: Path) ->
     problems = assess(read(sheet.text()), bus, bus.nodes[0]).problems
     for key, problem in zip(shown, problems, strict=True):
         assert re.search(rf"^{key[0]:04X}h:0{key[1]} .* cannot be read; .*: another", problem)
+
+
+def test_a_position_that_a_drive_has_not_is_missing_whatever_its_index(tmp_path: Path) -> None:
+    bus = learned_by(tmp_path, stranger())
+    first, odd = bus.nodes[0], Mapped(0x6064, 1, DataType.INTEGER32)
+    tpdos = tuple(
+        replace(pdo, objects=tuple(odd if one.index == 0x6064 else one for one in pdo.objects))
+        for pdo in first.tpdos
+    )
+    node = replace(first, motor_object=odd, tpdos=tpdos)
+    (problem,) = assess(read(stranger().text()), bus, node).problems
+    assert problem == "6064h:01 is missing; name another object in the bus file"
+
+
+def test_what_a_proposal_cannot_take_as_told_is_said(tmp_path: Path) -> None:
+    late = stranger()
+    for index in range(0x1400, 0x1404):
+        late.entries[index, 2].default, late.entries[index, 2].limits = "255", ("254", "255")
+    with pytest.raises(ConfigError, match=r"RPDO1: 1400h:02 takes 254 to 255, not 1, which foll"):
+        propose(read(late.text()), "it.eds")
+    for link, words in (("6064:00 i32", "motor's own position"), ("6077:00 i16", "drive's torque")):
+        with pytest.raises(ConfigError, match=f"{words}; name another object with --link"):
+            propose(read(stranger().text()), "it.eds", parse_object(link))
+    # The sign of the position is that of its target, which is a guess.
+    signs = stranger()
+    signs.entries[0x607A, 0].kind = int(DataType.UNSIGNED32)
+    text = bus_text(propose(read(signs.text()), "it.eds"), [1, 2])
+    line = next(line for line in text.splitlines() if line.startswith("motor_object"))
+    told = "# MEASURE: its sign; the data sheet says i32"
+    assert line == f'motor_object = "6064:00 u32"  {told}'
 
 
 def test_a_number_that_is_no_whole_one_is_not_written(tmp_path: Path) -> None:

@@ -273,7 +273,8 @@ def _pdo_problems(sheet: DataSheet, pdo: PdoConfig, *, commands: bool) -> Iterat
 def _object_problems(sheet: DataSheet, entry: Mapped) -> Iterator[str]:
     known = sheet.objects.get(entry.key)
     if known is None:
-        if entry.index not in CYCLIC and entry.index not in DUMMIES:
+        # Objects of every cycle that are missing are told for all drives alike.
+        if entry.key not in [(index, 0) for index in CYCLIC] and entry.index not in DUMMIES:
             yield f"{name_of(*entry.key)} is missing; name another object in the bus file"
     elif known.kind is entry.kind or (entry.index in CYCLIC and _as_long(known.kind, entry)):
         return

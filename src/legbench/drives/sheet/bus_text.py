@@ -3,6 +3,7 @@
 import json
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from legbench.drives.protocol.datatypes import FORMATS, range_of
 from legbench.drives.protocol.objects import Key
@@ -114,8 +115,13 @@ def _limits_itself(proposal: Proposal) -> bool:
 
 def _objects(proposal: Proposal) -> Iterator[str]:
     """Yield the objects of positions and torque, where they are not the usual ones."""
-    if proposal.motor != POSITION_ACTUAL:
-        yield f'motor_object = "{format_object(proposal.motor)}"'
+    known = proposal.sheet.objects.get(proposal.motor.key)
+    told = proposal.motor if known is None else replace(proposal.motor, kind=known.kind)
+    if proposal.motor != POSITION_ACTUAL or proposal.motor != told:
+        # It has the target's sign where the data sheet tells two.
+        doubt = "" if proposal.motor == told else f"  # {MARK}: its sign; the data sheet says "
+        said = doubt and format_object(told).split()[1]
+        yield f'motor_object = "{format_object(proposal.motor)}"{doubt}{said}'
     if proposal.target != TARGET_POSITION:
         yield f'target_object = "{format_object(proposal.target)}"'
     if proposal.link is not None:

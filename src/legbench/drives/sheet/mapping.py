@@ -107,8 +107,11 @@ def _obstacle(sheet: DataSheet, number: int, *, commands: bool) -> str | None:
     low, high = sheet.limits.get((comm, 2), (EVERY_SYNC, EVERY_SYNC))
     if kind is None or (sheet.writable((comm, 2)) and low <= EVERY_SYNC <= high):
         return None
-    fits = kind <= LAST_SYNCHRONOUS if commands else kind == EVERY_SYNC
-    return None if fits else f"{comm:04X}h:02 is fixed to {kind}, it does not follow every SYNC"
+    if kind <= LAST_SYNCHRONOUS if commands else kind == EVERY_SYNC:
+        return None
+    if sheet.writable((comm, 2)):
+        return f"{comm:04X}h:02 takes {low} to {high}, not {EVERY_SYNC}, which follows every SYNC"
+    return f"{comm:04X}h:02 is fixed to {kind}, it does not follow every SYNC"
 
 
 def _fixed(

@@ -21,6 +21,8 @@ from legbench.errors import ConfigError
 ONE_ENCODER = "none"
 """Word that stands for no second encoder, where an object is asked for."""
 TORQUE = (0x6077, 0)
+OWN = {POSITION_ACTUAL.key: "motor's own position", TORQUE: "drive's torque"}
+"""Objects that no link's position is shown by."""
 LEAST = 2
 """Fewest objects that a drive takes, and answers, in every cycle."""
 
@@ -62,9 +64,9 @@ def propose(sheet: DataSheet, eds: str, link: Mapped | str | None = None) -> Pro
     if isinstance(link, Mapped):
         if not sheet.has(link.key):
             raise ConfigError(f"{sheet.name}: {link} is missing; name another object with --link")
-        if link.key == POSITION_ACTUAL.key:
+        if link.key in OWN:
             raise ConfigError(
-                f"{sheet.name}: {link} is the motor's own position; name another object with --link"
+                f"{sheet.name}: {link} is the {OWN[link.key]}; name another object with --link"
             )
         seconds: tuple[Mapped | None, ...] = (link,)
     else:
