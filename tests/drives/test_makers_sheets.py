@@ -73,7 +73,10 @@ def test_identifiers_without_the_node_id_count_from_it() -> None:
         for key, (_, own, relative) in cases.items():
             assert sheet.default(key, 5) == own
             assert (key in sheet.relative) is relative
-        told = "3 identifiers count from the node id, though they do not say so"
+        told = (
+            "3 identifiers count from the node id, though they do not say so: 1014h:00, 1400h:01, "
+            "1801h:01"
+        )
         assert sheet.remarks == (told,)
     # Two drives whose data sheet tells no identifier do not share that of SYNC.
     it.entries[0x1014, 0].default = None
@@ -118,7 +121,9 @@ def test_limits_that_cannot_be_meant_are_none() -> None:
     assert {key: found.limits.get(key) for key in cases} == {
         key: kept for key, (_, _, kept) in cases.items()
     }
-    assert found.remarks == ("6 objects have limits that cannot be meant; they were left out",)
+    (remark,) = found.remarks
+    assert remark.startswith("6 objects have limits that cannot be meant, which were left out: ")
+    assert remark.endswith(" and 2 more")
 
 
 def test_types_that_cannot_be_meant_are_the_profiles() -> None:
@@ -154,7 +159,11 @@ def test_types_that_cannot_be_meant_are_the_profiles() -> None:
     for key, (_, _, kind, default) in cases.items():
         assert (found.objects[key].kind, found.objects[key].default) == (kind, default)
         assert (key in found.given) is (key not in ((0x1017, 0), (0x605C, 0)))
-    assert found.remarks == ("11 objects have the profile's type instead of their own",)
+    (remark,) = found.remarks
+    assert remark == (
+        "11 objects have the profile's type instead of their own: 1000h:00, 1016h:01, 1018h:01, "
+        "1400h:01 and 7 more"
+    )
     # What the emulated drive calls its link's position is something else to its maker.
     own = stranger().add((0x2064, 0), u16, name="x", limits=("0", "65535"), default="0x8000")
     found = read(own.text())

@@ -2,8 +2,8 @@
 
 import io
 import struct
-from collections import Counter
-from collections.abc import Collection, Iterator
+from collections import defaultdict
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -34,6 +34,8 @@ BYTES |= {0x16: 3, 0x18: 5, 0x19: 6, 0x1A: 7}
 """Lengths of the basic types that are no whole numbers of 1, 2, 4 or 8 bytes [bytes]."""
 REAL64 = 0x11
 KINDS = frozenset(DataType) - BYTES.keys()
+MOST_NAMED = 4
+"""Number of objects that a remark names."""
 NEVER_ZERO = ((0x1000, 0), (0x6502, 0))
 """Device type and supported modes, which are not 0 on any drive: there 0 says nothing."""
 ACCESS = {"ro": Access.RO, "wo": Access.WO, "const": Access.CONST}
@@ -70,7 +72,7 @@ def sheet_of(content: bytes, name: str) -> DataSheet:
     mapped = mapped_keys(((one.index, one.subindex), _typed(one)[1]) for one in variables)
     for variable in variables:
         found.add(variable, node_id, mapped)
-    sections.remarks += [f"{count} {what}" for what, count in sorted(found.guessed.items())]
+    sections.remarks += [_remark(what, keys) for what, keys in sorted(found.guessed.items())]
     return _described(sections, name, found)
 
 
@@ -82,14 +84,14 @@ class _Found:
     given: set[Key] = field(default_factory=set)
     relative: set[Key] = field(default_factory=set)
     limits: dict[Key, tuple[int, int]] = field(default_factory=dict)
-    guessed: Counter[str] = field(default_factory=Counter)
+    guessed: dict[str, list[Key]] = field(default_factory=lambda: defaultdict(list))
 
     def add(self, variable: "ODVariable", node_id: int | None, mapped: Collection[Key]) -> None:
         """Add an object, of a configured device with a node id; some are mapped at power-on."""
         key = (variable.index, variable.subindex)
         kind, default = _typed(variable)
         if kind != variable.data_type and kind in FORMATS:
-            self.guessed["objects have the profile's type instead of their own"] += 1
+            self.guessed["objects have the profile's type instead of their own"].append(key)
         if key in NEVER_ZERO and default == 0:
             default = None
         if variable.relative:
@@ -119,7 +121,7 @@ class _Found:
         if own is None:
             return default
         self.relative.add(key)
-        self.guessed["identifiers count from the node id, though they do not say so"] += 1
+        self.guessed["identifiers count from the node id, though they do not say so"].append(key)
         return own
 
     def _limit(
@@ -131,7 +133,16 @@ class _Found:
         if are_limits(key, kind, (low, high), default if isinstance(default, int) else None):
             self.limits[key] = low, high
         else:
-            self.guessed["objects have limits that cannot be meant; they were left out"] += 1
+            self.guessed["objects have limits that cannot be meant, which were left out"].append(
+                key
+            )
+
+
+def _remark(what: str, keys: Sequence[Key]) -> str:
+    """Return a line that says of how many objects something was guessed, and names the first."""
+    names = ", ".join(f"{index:04X}h:{sub:02X}" for index, sub in keys[:MOST_NAMED])
+    more = f" and {len(keys) - MOST_NAMED} more" if len(keys) > MOST_NAMED else ""
+    return f"{len(keys)} {what}: {names}{more}"
 
 
 def _commissioning(sections: Sections) -> dict[str, str]:
