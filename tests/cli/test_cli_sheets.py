@@ -87,6 +87,10 @@ def test_learn_says_of_each_object_whether_it_is_there_fixed_or_missing(
         "object; instead: 6084h:00 Profile deceleration [counts/s2], by 605Ah = 1" in others
     )
     assert others[-1] == "without master no reaction of it is known\n"
+    # What the proposal does without is said before anybody reads the file.
+    waived = "the bus file waives the master watch: drives may go on for "
+    assert waived in done.err
+    assert waived in call("drives", "check", "--bus", folder / "my.toml").err
     done = call("drives", "budget", "--bus", folder / "my.toml")
     assert "without master, motor1 is not known to stop\n" in done.out
 

@@ -10,6 +10,7 @@ from tyro.conf import Positional, UseAppendAction
 
 from legbench.cli.drives_reading import BenchFlags
 from legbench.cli.output import note, print_json, report_error
+from legbench.cli.waived import note_waived
 from legbench.plant.can_choice import LIMITS_NAME
 from legbench.shipped import locate
 
@@ -42,6 +43,7 @@ class Learn:
         learned = learn(self.eds, self.out, self.node, link)
         if not learned.problems:
             write_bus(learned, self.out)
+            note_waived(self.out, None)
         _print(learned, as_json=bench.json, out=self.out)
         return _ended(learned)
 
@@ -58,7 +60,9 @@ class Check:
         from legbench.commissioning.learn import check
         from legbench.drives.setup.exchange import check_budget
 
-        learned = check(locate(bench.bus), self.eds)
+        bus = locate(bench.bus)
+        learned = check(bus, self.eds)
+        note_waived(bus, None)
         _print(learned, as_json=bench.json, out=None)
         check_budget(bench.config().at(bench.bitrate))
         return _ended(learned)
