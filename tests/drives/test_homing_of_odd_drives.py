@@ -15,8 +15,9 @@ from legbench.drives.master.session import Session
 from legbench.drives.protocol.cia402 import POWERED
 from legbench.drives.setup.bus_file import load_bus
 from legbench.drives.setup.quirks import ModeShown, Quirks
+from legbench.errors import ConfigError
 
-IN_PLACE = 37
+IN_PLACE, INDEX_PULSE = 37, 33
 
 
 def opened(lag_us: int, *, needs_power: bool, quirks: Quirks) -> tuple[Session, Network]:
@@ -53,3 +54,39 @@ def test_a_mode_that_never_comes_is_refused_and_the_drive_has_no_power() -> None
     assert "within 200 ms" in str(caught.value)
     assert "mode_patience_ms in [node.quirks]" in str(caught.value)
     assert not {drive.axis.power.state for drive in network.drives} & set(POWERED)
+
+
+@pytest.mark.parametrize("index", [0x6065, 0x6072])
+def test_a_search_is_not_made_by_a_drive_that_lacks_its_bounds(index: int) -> None:
+    # The bus file gives both: a value that the drive has no object for bounds nothing.
+    config = load_bus(BUS)
+    network = emulate(config, [Behaviour(lacks=frozenset({index}))] * 2, keep_log=True)
+    words = rf"'motor1' by itself, .* {index:04X}h:00 .*no such"
+    session = Session(LockstepBus("leg", network=network), config)
+    with session, pytest.raises(DriveError, match=words):
+        home(session, config.nodes[0], INDEX_PULSE)
+    assert not {drive.axis.power.state for drive in network.drives} & set(POWERED)
+    with Session(LockstepBus("leg", network=network), config) as session:
+        assert abs(home(session, config.nodes[0], IN_PLACE).after_counts) <= 2
+
+
+def test_a_search_is_bounded_by_the_ramp_that_its_drive_brakes_on() -> None:
+    config = load_bus(BUS)
+    slow = {(0x6085, 0): 0x6084}
+    nodes = tuple(
+        replace(
+            node,
+            parameters=tuple(
+                replace(one, index=slow.get(one.key, one.index)) for one in node.parameters
+            ),
+        )
+        for node in config.nodes
+    )
+    config = replace(config, nodes=nodes)
+    with Session(LockstepBus("leg", network=emulate(config)), config) as session:
+        assert home(session, config.nodes[0], INDEX_PULSE).method == INDEX_PULSE
+    none = tuple(one for one in nodes[0].parameters if one.index != 0x6084)
+    bare = replace(config, nodes=(replace(nodes[0], parameters=none), nodes[1]))
+    session = Session(LockstepBus("leg", network=emulate(bare)), bare)
+    with session, pytest.raises(ConfigError, match=r"leave out 6085h:00 .*; give each a value"):
+        home(session, bare.nodes[0], INDEX_PULSE)

@@ -7,6 +7,7 @@ when this master falls silent; it is always led out by quick stop.
 from dataclasses import dataclass
 from typing import final
 
+from legbench.commissioning.search_bounds import check_given, check_held
 from legbench.drives.errors import DriveError, SdoAbortError
 from legbench.drives.master.bring_up import BringUp
 from legbench.drives.master.preparation import is_homed, take_power
@@ -26,7 +27,6 @@ from legbench.drives.protocol.cia402 import (
 )
 from legbench.drives.protocol.datatypes import DataType
 from legbench.drives.protocol.nmt import NmtCommand, NmtState, heartbeat_frame, nmt_frame
-from legbench.drives.protocol.objects import name_of
 from legbench.drives.setup.config import NodeConfig
 from legbench.drives.setup.master_watch import check_master_watch
 from legbench.drives.setup.quirks import ModeShown
@@ -42,8 +42,6 @@ INDEX_ONLY = (33, 34)
 """Methods that search the index pulse alone, at the slower speed."""
 STANDARD, MAKERS = range(1, 38), range(-128, 0)
 """Homing methods of CiA 402-2, and of the makers of drives."""
-NEEDED = ((0x6065, 0), (0x6072, 0), (0x6085, 0))
-"""Window, torque and ramp that a search is not made without, in the bus file."""
 FASTEST = 1.0
 """Highest speed of a search for a hard stop (6099h:01) [rad/s]."""
 LONGEST = 600.0
@@ -85,7 +83,8 @@ def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20
         BusError: the channel has a master.
         PlantFault: somebody else leads these drives; before the homing has begun, nothing has been
             sent since it was heard.
-        DriveError: another drive, a refused step, homing failed, or is not shown afterwards.
+        DriveError: another drive, a refused step, a search that the drive does not bound, homing
+            failed, or is not shown afterwards.
         StopError: the drive keeps its power, or does not answer.
     """
     _check_asked(node, method, timeout)
@@ -95,9 +94,11 @@ def home(session: Session, node: NodeConfig, method: int, *, timeout: float = 20
     up = session.bring_up()
     take_power(up)
     up.pre_operational()
-    check_taken(session.config, {node.name: up.configure(node)}, speed=FASTEST, commands=False)
+    outcomes = up.configure(node)
+    check_taken(session.config, {node.name: outcomes}, speed=FASTEST, commands=False)
     sdo = up.sdo(node)
     if method not in IN_PLACE:
+        check_held(node, outcomes)
         _check_speed(sdo, node, method)
     before = up.preload(node)
     _choose(sdo, node, method)
@@ -137,17 +138,7 @@ def _check_asked(node: NodeConfig, method: int, timeout: float) -> None:
             f"{MAKERS[0]} to -1"
         )
     if method not in IN_PLACE:
-        _check_bounded(node)
-
-
-def _check_bounded(node: NodeConfig) -> None:
-    given = {parameter.key for parameter in node.parameters if parameter.value > 0}
-    missing = [name_of(*key) for key in NEEDED if key not in given]
-    if missing:
-        raise ConfigError(
-            f"a search moves '{node.name}' by itself, and its parameters in the bus file leave "
-            f"out {', '.join(missing)}; give each a value"
-        )
+        check_given(node)
 
 
 def _check_speed(sdo: SdoPort, node: NodeConfig, method: int) -> None:
