@@ -101,13 +101,20 @@ def test_either_drive_that_would_go_on_without_its_master_is_named(place: int) -
     words = rf"drive '{nodes[place].name}' would not stand within 100 ms .*: it has no means"
     with pytest.raises(ConfigError, match=words):
         check_master_watch(bus)
-    # A deadline helps where commands are sent.
-    for commands, ways in (
-        (True, "RPDO a deadline_ms, lower"),
-        (False, "with 6007h; lower master"),
+    # A deadline helps where commands are sent, and a faster heartbeat where it is watched.
+    watching = [replace(node, heartbeat_consumer=True) for node in nodes]
+    deaf = {entry.key: entry.value for entry in configuration(bus, nodes[place])}
+    for commands, chosen, ways in (
+        (
+            True,
+            bus,
+            "both with 6007h; give its RPDO a deadline_ms, or heartbeat_consumer = true, or",
+        ),
+        (False, bus, "that is 1016h with 6007h; heartbeat_consumer = true, or waive = "),
+        (False, replace(bus, nodes=tuple(watching)), "that is 1016h with 6007h; waive = "),
     ):
         with pytest.raises(ConfigError, match=ways):
-            check_master_watch(bus, commands=commands)
+            check_master_watch(chosen, commands=commands, held={nodes[place].name: deaf})
     check_master_watch(replace(bus, waive=("master watch",)))
     check_master_watch(config())
     # One that is not known to hold anything is not looked at.

@@ -123,18 +123,23 @@ def check_master_watch(
         means = means_of(config, node, speed=speed, commands=commands, held=there)
         if means and means[0].stop_ms <= LONGEST_STOP_MS:
             continue
-        deadline = "give its RPDO a deadline_ms, " if commands else ""
+        ways = ["give its RPDO a deadline_ms"] if commands else []
+        if means:
+            ramp, _ = quick_stop_ramp(node)
+            ways.append(f"lower master_heartbeat_ms or raise {ramp:04X}h")
+        elif not node.heartbeat_consumer:
+            ways.append("heartbeat_consumer = true")
+        ways.append(f'waive = ["{MASTER_WATCH}"] in the bus file')
         raise ConfigError(
             f"drive '{node.name}' would not stand within {LONGEST_STOP_MS:g} ms of its master's "
-            f"death: {_describe(means, commands=commands)}; {deadline}lower master_heartbeat_ms or "
-            f'raise 6085h, or waive = ["{MASTER_WATCH}"] in the bus file'
+            f"death: {_describe(means, commands=commands)}; {', or '.join(ways)}"
         )
 
 
 def _describe(means: Sequence[Means], *, commands: bool) -> str:
     if not means:
-        which = "1016h or 140xh:05, both" if commands else "1016h alone where no RPDO is sent,"
-        return f"it has no means to notice it, which are {which} with 6007h"
+        which = "that is 1016h or 140xh:05, both" if commands else "led by SDO, that is 1016h"
+        return f"it has no means to notice it, {which} with 6007h"
     return ", ".join(f"{one.stop_ms:.1f} ms by its {one.name}" for one in means)
 
 
