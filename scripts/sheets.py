@@ -86,7 +86,10 @@ def death(config: BusConfig) -> str:
             hip, knee = hip + 1e-3 * SPEED, knee - 1e-3 * SPEED
             link.command((hip, knee))
             link.exchange()
-        return f"no drive is enabled and none moves after {_stood_ms(network):.0f} ms"
+        stood_ms = _stood_ms(network)
+    if math.isinf(stood_ms):
+        return "a drive is enabled or moves for a second and longer: it lacks what stops it"
+    return f"no drive is enabled and none moves after {stood_ms:.0f} ms"
 
 
 def _stood_ms(network: Network) -> float:
