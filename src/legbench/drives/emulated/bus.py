@@ -20,8 +20,8 @@ from legbench.drives.emulated.station import Heard, Station
 from legbench.drives.errors import BusError
 from legbench.drives.protocol.frame import Frame
 from legbench.drives.setup.bus_file import load_bus
+from legbench.drives.transport.checked_bus import CheckedBus
 from legbench.drives.transport.messages import frame_of, message_of, refuse_fd
-from legbench.drives.transport.shut_bus import ShutBus
 from legbench.drives.transport.virtual_bus import VirtualBus
 from legbench.errors import ConfigError
 from legbench.shipped import locate
@@ -35,7 +35,7 @@ LOOK_NS = 50_000
 
 
 @final
-class LockstepBus(ShutBus, VirtualBus):
+class LockstepBus(CheckedBus, VirtualBus):
     """One master's port to an emulated bus.
 
     Attributes:

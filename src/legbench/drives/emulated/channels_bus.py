@@ -9,13 +9,13 @@ from legbench.drives.emulated.bus import IDLE_NS, LockstepBus
 from legbench.drives.emulated.network import Network
 from legbench.drives.emulated.shared_body import LockstepChannels
 from legbench.drives.setup.config import BusConfig
-from legbench.drives.transport.shut_bus import ShutBus
+from legbench.drives.transport.checked_bus import CheckedBus
 from legbench.drives.transport.split_bus import Routes, worst_state
 from legbench.drives.transport.virtual_bus import VirtualBus
 
 
 @final
-class ChannelsBus(ShutBus, VirtualBus):
+class ChannelsBus(CheckedBus, VirtualBus):
     """One master's ports to the emulated channels of a bus file.
 
     Attributes:

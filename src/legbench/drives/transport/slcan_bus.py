@@ -16,8 +16,8 @@ import can
 from can.interfaces.slcan import slcanBus
 
 from legbench.drives.protocol.slcan import OK, REFUSED, format_frame, parse_frame
+from legbench.drives.transport.checked_bus import CheckedBus
 from legbench.drives.transport.messages import frame_of, message_of, refuse_fd
-from legbench.drives.transport.shut_bus import ShutBus
 
 CHUNK = 4096
 """Largest number of bytes read at once."""
@@ -31,7 +31,7 @@ CLOSING_S = 0.1
 
 
 @final
-class SlcanBus(ShutBus, slcanBus):
+class SlcanBus(CheckedBus, slcanBus):
     """Bus behind a CAN adapter on a serial line."""
 
     def __init__(self, channel: str, **options: Any) -> None:

@@ -10,7 +10,7 @@ import can
 
 from legbench.drives.protocol.frame import LAST_NODE, NMT_ID, SDO_REQUEST_BASE
 from legbench.drives.setup.config import BusConfig
-from legbench.drives.transport.shut_bus import ShutBus
+from legbench.drives.transport.checked_bus import CheckedBus
 
 LOOK_S = 2e-4
 """Time between two looks at interfaces that cannot be waited for together [s]."""
@@ -61,7 +61,7 @@ def wait_for_any(parts: Sequence[can.BusABC], left: float | None) -> None:
 
 
 @final
-class SplitBus(ShutBus):
+class SplitBus(CheckedBus):
     """Buses of several channels as one interface of python-can.
 
     Attributes:

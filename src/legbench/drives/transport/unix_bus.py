@@ -16,8 +16,8 @@ from typing import Any, final
 import can
 from can.typechecking import CanFilters
 
+from legbench.drives.transport.checked_bus import CheckedBus
 from legbench.drives.transport.messages import frame_of, message_of, refuse_fd
-from legbench.drives.transport.shut_bus import ShutBus
 from legbench.drives.transport.system import require_linux
 from legbench.drives.transport.unix_packet import (
     NOTE,
@@ -46,7 +46,7 @@ STATES = {
 
 
 @final
-class UnixBus(ShutBus):
+class UnixBus(CheckedBus):
     """A port to a bus that another process serves."""
 
     def __init__(

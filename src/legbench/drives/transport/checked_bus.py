@@ -5,7 +5,7 @@ from typing import Any
 import can
 
 
-class ShutBus(can.BusABC):
+class CheckedBus(can.BusABC):
     """Interface of python-can whose use after `shutdown` is an error."""
 
     _shut = False
