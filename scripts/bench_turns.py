@@ -22,7 +22,7 @@ ROUNDS, BLOCK = 20, 60
 UNTIMED = 30
 """Cycles at the beginning of a block that are not timed: its code and data have to come into the
 caches again."""
-OTHER_EVERY = 4
+OTHER_EVERY = 2
 """Rounds between two of the other stack, whose threads take long to begin and to end."""
 PERIOD_NS = 1_000_000
 """Period of the cycles of a run [ns]."""
