@@ -172,9 +172,24 @@ def test_types_that_cannot_be_meant_are_the_profiles() -> None:
     assert not found.remarks
 
 
-def test_modes_of_0_say_nothing() -> None:
-    sheet = read(stranger().add((0x6502, 0), DataType.UNSIGNED32, default="0").text())
-    assert (0x6502, 0) not in sheet.given
+def test_modes_and_a_device_type_of_0_say_nothing() -> None:
+    it = stranger().add((0x6502, 0), DataType.UNSIGNED32, default="0")
+    assert (0x1000, 0) in read(it.text()).given
+    it.entries[0x1000, 0].default = "0"
+    assert not {(0x1000, 0), (0x6502, 0)} & read(it.text()).given
+
+
+@pytest.mark.parametrize(("count", "more"), [(4, ""), (5, " and 1 more")])
+def test_a_remark_names_four_objects(count: int, more: str) -> None:
+    it = stranger()
+    for number in range(count):
+        key = (0x1A00 + number, 0)
+        it.add(key, DataType.UNSIGNED8, default="5", limits=("9", "10"))
+    (remark,) = read(it.text()).remarks
+    assert remark == (
+        f"{count} objects have limits that cannot be meant, which were left out: "
+        f"1A00h:00, 1A01h:00, 1A02h:00, 1A03h:00{more}"
+    )
 
 
 def test_a_record_without_its_sub_index_0_has_got_one() -> None:
