@@ -6,6 +6,7 @@ import pytest
 from can_rig import BUS
 
 from legbench.commissioning.home import home
+from legbench.commissioning.search_bounds import check_given
 from legbench.drives.emulated.behaviour import Behaviour
 from legbench.drives.emulated.build import emulate
 from legbench.drives.emulated.bus import LockstepBus
@@ -68,6 +69,21 @@ def test_a_search_is_not_made_by_a_drive_that_lacks_its_bounds(index: int) -> No
     assert not {drive.axis.power.state for drive in network.drives} & set(POWERED)
     with Session(LockstepBus("leg", network=network), config) as session:
         assert abs(home(session, config.nodes[0], IN_PLACE).after_counts) <= 2
+
+
+@pytest.mark.parametrize("index", [0x6065, 0x6072, 0x6085])
+def test_a_bound_of_a_search_is_above_zero(index: int) -> None:
+    node = load_bus(BUS).nodes[0]
+    for value in (1, 0):
+        given = tuple(
+            replace(one, value=value) if one.index == index else one for one in node.parameters
+        )
+        bound = replace(node, parameters=given)
+        if value:
+            check_given(bound)
+        else:
+            with pytest.raises(ConfigError, match=f"leave out {index:04X}h:00"):
+                check_given(bound)
 
 
 def test_a_search_is_bounded_by_the_ramp_that_its_drive_brakes_on() -> None:
