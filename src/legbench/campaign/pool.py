@@ -13,7 +13,7 @@ from typing import Any, final
 from legbench.campaign.executor import AbstractExecutor, Done, Note
 from legbench.campaign.work import StoppedError, Work, do_work
 from legbench.errors import ConfigError, LegbenchError, RecordingError
-from legbench.interrupts import StopFlag, children_without_interrupts, ignore_interrupts
+from legbench.interrupts import StopFlag, children_without_interrupts, ignore_interrupts, shielded
 
 LOOK_EVERY = 0.2
 """Time after which it is looked whether somebody has asked for the end [s]."""
@@ -99,8 +99,11 @@ def workers_or_processors(workers: int | None) -> int:
 def _pool(workers: int, stop: StopFlag) -> Iterator[ProcessPoolExecutor]:
     """Pool of new processes, which are told to give up when it is left early."""
     context: Any = multiprocessing.get_context("spawn")
-    asked = context.Event()
-    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_start, initargs=(asked,))
+    with shielded():  # A ^C in the middle would leave semaphores behind, with a warning of them.
+        asked = context.Event()
+        pool = ProcessPoolExecutor(
+            workers, mp_context=context, initializer=_start, initargs=(asked,)
+        )
     try:
         yield pool
     except BaseException:

@@ -25,7 +25,7 @@ from legbench.control import JumpConfig
 from legbench.design import LegDesign
 from legbench.design.toml import design_to_mapping
 from legbench.errors import ConfigError, UnwritableError
-from legbench.interrupts import children_without_interrupts, ignore_interrupts
+from legbench.interrupts import children_without_interrupts, ignore_interrupts, shielded
 from legbench.modes.attraction import Attraction, find_attraction
 from legbench.modes.drive import AbstractDrive, JumpLaw, Passive
 from legbench.modes.fixed_point import UNITS
@@ -277,9 +277,10 @@ def _rows(task: BasinTask, todo: list[int], workers: int) -> Iterator[tuple[int,
 def _pool(task: BasinTask, workers: int) -> Iterator[ProcessPoolExecutor]:
     """Pool of new processes; they are not forked, since a compiled leg does not survive a fork."""
     context: Any = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(
-        workers, mp_context=context, initializer=_start_process, initargs=(task,)
-    )
+    with shielded():  # A ^C in the middle would leave semaphores behind, with a warning of them.
+        pool = ProcessPoolExecutor(
+            workers, mp_context=context, initializer=_start_process, initargs=(task,)
+        )
     try:
         yield pool
     finally:

@@ -13,6 +13,7 @@ from typing import Any, Final
 
 from legbench import __version__
 from legbench.guests import load_text
+from legbench.interrupts import shielded
 from legbench.reading import UnreadableError, parse_json, read_file
 from legbench.runs.find import find_runs
 from legbench.writing import write_whole
@@ -79,7 +80,9 @@ def _rows(paths: list[Path]) -> Iterator[dict[str, Any]]:
     if len(paths) < MANY or workers == 1:
         yield from map(measure, paths)
         return
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+    with shielded():  # A ^C in the middle would leave semaphores behind, with a warning of them.
+        made = ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
+    with made as pool:
         yield from pool.map(measure, paths, chunksize=16)
 
 
